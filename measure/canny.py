@@ -1,0 +1,168 @@
+"""The classic pipeline: gradient threshold and Canny's thinning, each edge pixel refined by a parabola."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy import sparse
+
+from measure.frames import EdgeFrame
+from measure.points import EdgePoints
+from planner.locator import edge_blur
+from scenes import Scene
+
+_FIXED_POINT = 64  # Canny takes gradients as 16-bit integers: 1/64 grey level a pixel
+_TRUNCATE = 4
+
+
+@dataclass(frozen=True)
+class CannyLocator:
+    """Edge pixels near one expected edge.
+
+    Attributes
+    ----------
+    frame : EdgeFrame
+    threshold : float
+        Smallest gradient of an edge pixel, grey levels a pixel (no hysteresis: one threshold, as in the paper).
+    rows, columns : slice
+        Part of the image that matters.
+    near : ndarray of bool
+        Pixels of that part that belong to the edge: within the search window, away from the corners.
+    smooth, derive : ndarray
+        Sampled Gaussian and its derivative.
+    gradient_to_contrast : float
+        Contrast of a straight blurred edge whose gradient is 1 at its middle.
+    """
+
+    frame: EdgeFrame
+    threshold: float
+    rows: slice
+    columns: slice
+    near: np.ndarray
+    smooth: np.ndarray
+    derive: np.ndarray
+    gradient_to_contrast: float
+
+    @classmethod
+    def of(cls, scene: Scene, frame: EdgeFrame, threshold: float) -> CannyLocator:
+        """Prepare the locator of one edge."""
+        scale, window = scene.locator.scale_px, scene.locator.window_px
+        x = np.arange(-int(np.ceil(_TRUNCATE * scale)), int(np.ceil(_TRUNCATE * scale)) + 1)
+        gauss = np.exp(-(x**2) / (2 * scale**2))
+        gauss /= gauss.sum()
+        derive = x * gauss / (x**2 * gauss).sum()  # exactly 1 on a ramp of 1 grey level a pixel
+        margin = window + _TRUNCATE * scale + 2
+        ends = frame.at(frame.stations[[0, -1]], np.zeros(2))
+        low = np.maximum(np.floor(ends.min(0) - margin), 0).astype(int)
+        high = np.minimum(np.ceil(ends.max(0) + margin) + 1, [scene.camera.width, scene.camera.height]).astype(int)
+        rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
+        y, x = np.mgrid[rows, columns]
+        along, offset = frame.coordinates(np.stack([x, y], -1))
+        near = (np.abs(offset) <= window) & (along >= frame.stations[0] - 0.5) & (along <= frame.stations[-1] + 0.5)
+        total = np.hypot(scale, edge_blur(scene.camera.blur_px))
+        return cls(frame, threshold, rows, columns, near, gauss, derive, float(np.sqrt(2 * np.pi) * total))
+
+    def locate(self, images: np.ndarray) -> EdgePoints:
+        """Edge points in a stack of images, shape (n, height, width)."""
+        gradients = [self._gradient(image) for image in images]
+        pixels = [np.nonzero(self._edge_pixels(*gradient)) for gradient in gradients]
+        counts = np.array([len(y) for y, _ in pixels])
+        which = np.repeat(np.arange(len(images)), counts)
+        y, x = (np.concatenate(part) for part in zip(*pixels, strict=True))
+        gx, gy = (np.stack(part) for part in zip(*gradients, strict=True))
+        slot = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        along, offset, strength = (np.zeros((len(images), max(counts.max(), 1))) for _ in range(3))
+        valid = np.zeros(along.shape, bool)
+        points, peak, good = _parabola(gx, gy, which, y, x)
+        along[which, slot], offset[which, slot] = self.frame.coordinates(points + [self.columns.start, self.rows.start])
+        strength[which, slot], valid[which, slot] = peak, good
+        contrast = self.gradient_to_contrast * (strength * valid).sum(1) / np.maximum(valid.sum(1), 1)
+        return EdgePoints(along, offset, valid, contrast)
+
+    def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
+        """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width).
+
+        Linear in the noise once the edge pixels are chosen; the choice itself is not, and is held fixed.
+        """
+        gx, gy = self._gradient(clean)
+        y, x = np.nonzero(self._edge_pixels(gx, gy))
+        shift, d_low, d_mid, d_high, gx0, gy0, m0 = _peak(gx[None], gy[None], np.zeros_like(x), y, x)
+        toward = (gx0 * self.frame.normal[0] + gy0 * self.frame.normal[1]) / m0
+        shape = gx.shape
+        d_magnitude = sparse.csr_array((x.size, gx.size))
+        for step, derivative in ((-1, d_low), (0, d_mid), (1, d_high)):
+            picked = _bilinear_matrix(x + step * gx0 / m0, y + step * gy0 / m0, shape)
+            d_magnitude = d_magnitude + sparse.diags_array(derivative * toward) @ picked
+        magnitude = np.maximum(np.hypot(gx, gy), np.finfo(float).tiny).ravel()
+        response = d_magnitude @ (
+            sparse.diags_array(gx.ravel() / magnitude) @ self._filter_matrix(shape, self.derive, self.smooth)
+            + sparse.diags_array(gy.ravel() / magnitude) @ self._filter_matrix(shape, self.smooth, self.derive)
+        )
+        local = sparse.coo_array(response)
+        row, column = np.divmod(local.col, shape[1])
+        flat = (row + self.rows.start) * clean.shape[1] + column + self.columns.start
+        return self.locate(clean[None]), sparse.csr_array((local.data, (local.row, flat)), (x.size, clean.size))
+
+    def _gradient(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        part = np.ascontiguousarray(image[self.rows, self.columns], dtype=np.float32)
+        border = cv2.BORDER_REPLICATE
+        return (
+            cv2.sepFilter2D(part, cv2.CV_32F, self.derive, self.smooth, borderType=border),
+            cv2.sepFilter2D(part, cv2.CV_32F, self.smooth, self.derive, borderType=border),
+        )
+
+    def _edge_pixels(self, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
+        fixed = [np.clip(np.rint(g * _FIXED_POINT), -32767, 32767).astype(np.int16) for g in (gx, gy)]
+        limit = self.threshold * _FIXED_POINT
+        return (cv2.Canny(fixed[0], fixed[1], limit, limit, L2gradient=True) > 0) & self.near
+
+    def _filter_matrix(self, shape: tuple[int, int], along_x: np.ndarray, along_y: np.ndarray) -> sparse.csr_array:
+        """The separable filter as a matrix on the flattened part of the image (inside its border)."""
+        radius = len(along_x) // 2
+        matrices = [
+            sparse.diags_array(list(kernel), offsets=list(range(-radius, radius + 1)), shape=(size, size))
+            for kernel, size in ((along_y, shape[0]), (along_x, shape[1]))
+        ]
+        return sparse.csr_array(sparse.kron(*matrices))
+
+
+def _parabola(gx, gy, which, y, x):
+    """Refined points (k, 2) as (x, y), gradient there, and whether the pixel is a proper peak."""
+    shift, *_, gx0, gy0, m0 = _peak(gx, gy, which, y, x)
+    points = np.stack([x + shift * gx0 / m0, y + shift * gy0 / m0], -1)
+    return points, m0, np.abs(shift) <= 1
+
+
+def _peak(gx, gy, which, y, x):
+    """Shift of the gradient's maximum along the gradient, px, its derivatives by the three magnitudes, and the gradient."""
+    gx0, gy0 = gx[which, y, x].astype(float), gy[which, y, x].astype(float)
+    m0 = np.hypot(gx0, gy0)
+    magnitude = np.hypot(gx, gy)
+    low = _bilinear(magnitude, which, x - gx0 / m0, y - gy0 / m0)
+    high = _bilinear(magnitude, which, x + gx0 / m0, y + gy0 / m0)
+    bend = np.minimum(low - 2 * m0 + high, -np.finfo(float).tiny)
+    shift = (low - high) / (2 * bend)
+    return shift, (0.5 - shift) / bend, 2 * shift / bend, (-0.5 - shift) / bend, gx0, gy0, m0
+
+
+def _corners_of(x, y):
+    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = x - x0, y - y0
+    return [
+        (y0, x0, (1 - fy) * (1 - fx)), (y0, x0 + 1, (1 - fy) * fx), (y0 + 1, x0, fy * (1 - fx)), (y0 + 1, x0 + 1, fy * fx),
+    ]  # fmt: skip
+
+
+def _bilinear(stack, which, x, y):
+    height, width = stack.shape[1:]
+    return sum(w * stack[which, np.minimum(j, height - 1), np.minimum(i, width - 1)] for j, i, w in _corners_of(x, y))
+
+
+def _bilinear_matrix(x, y, shape):
+    rows = np.arange(x.size)
+    parts = [(w, (rows, j * shape[1] + i)) for j, i, w in _corners_of(x, y)]
+    data = np.concatenate([w for w, _ in parts])
+    index = tuple(np.concatenate([p[1][k] for p in parts]) for k in (0, 1))
+    return sparse.csr_array((data, index), (x.size, shape[0] * shape[1]))

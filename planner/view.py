@@ -1,0 +1,77 @@
+"""Poses, projection and visibility: how the sensor and the light see the object.
+
+Everything takes arrays of poses, shape (..., 2) = (polar, azimuth) in degrees, and keeps the leading shape.
+Image coordinates are px with (0, 0) the centre of the first pixel, x to the right, y down.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from scenes import Camera, Solid
+
+
+class Frame(NamedTuple):
+    """Axes of a sensor that looks at the origin: unit vectors, shape (..., 3)."""
+
+    right: np.ndarray
+    down: np.ndarray
+    forward: np.ndarray
+
+
+def direction(poses: np.ndarray) -> np.ndarray:
+    """Unit vector from the origin to each pose, shape (..., 3)."""
+    polar, azimuth = np.moveaxis(np.radians(poses), -1, 0)
+    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+
+
+def frame(poses: np.ndarray) -> Frame:
+    """Axes of the sensor at each pose.
+
+    They are derivatives of the direction by the angles, so they exist at the poles too, where "the object's
+    z axis up" says nothing.
+    """
+    polar, azimuth = np.moveaxis(np.radians(poses), -1, 0)
+    down = np.stack([np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)], -1)
+    right = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], -1)
+    return Frame(right, down, -direction(poses))
+
+
+def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Perspective image of points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Object coordinates, cm.
+    poses : ndarray, shape (..., 2)
+        Sensor poses.
+
+    Returns
+    -------
+    ndarray, shape (..., n, 2)
+        Image coordinates, px; NaN for points that are not in front of the sensor.
+    """
+    axes = frame(poses)
+    beside = points @ np.stack([axes.right, axes.down], -1)
+    away = depth(points, poses, camera)[..., None]
+    centre = np.array([camera.width - 1, camera.height - 1]) / 2
+    return centre + camera.focal_px * beside / np.where(away > 0, away, np.nan)
+
+
+def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Distance of points (..., n, 3) from the sensor along its axis, cm, shape (..., n)."""
+    return camera.distance + np.einsum("...ni,...i->...n", points, frame(poses).forward)
+
+
+def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:
+    """Which faces turn towards a position (cm, shape (..., 3)); bool, shape (..., F)."""
+    return positions @ solid.normals.T > solid.offsets
+
+
+def edge_points(solid: Solid, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:
+    """Points on E edges at fractions (n,) or (..., E, n) of their length, cm, shape (..., E, n, 3)."""
+    ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in names])
+    return ends[:, None, 0] + fractions[..., None] * (ends[:, 1] - ends[:, 0])[:, None]

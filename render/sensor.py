@@ -1,0 +1,59 @@
+"""The sensor: noisy, perhaps digitised copies of a noise-free image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes import InvalidInput, Noise
+
+TILE = 16  # px; large enough that making a tile's stream costs little, small enough to follow an edge
+
+
+def expose(
+    image: np.ndarray, noise: Noise, rng: np.random.Generator, count: int, where: np.ndarray | None = None
+) -> np.ndarray:
+    """Take ``count`` pictures of the same scene.
+
+    The noise is drawn tile by tile, each tile from a stream of its own, so a pixel's noise does not depend on
+    which other pixels are wanted: drawing only part of the image gives the numbers of the whole.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+        Noise-free grey levels.
+    noise : Noise
+        Standard deviation and bits of digitisation.
+    rng : numpy.random.Generator
+        Two 64-bit numbers are taken from it as the key of all streams.
+    count : int
+        Number of pictures, at least 1.
+    where : ndarray of bool, shape (height, width), optional
+        Pixels whose noise is needed. Tiles without one keep their noise-free value.
+
+    Returns
+    -------
+    ndarray of float64, shape (count, height, width)
+        Grey levels; whole numbers from 0 to 2^bits - 1 if the noise has bits.
+
+    Examples
+    --------
+    >>> pictures = expose(np.full((4, 4), 9.0), Noise(sigma=2.0, bits=8), np.random.default_rng(1), 1000)
+    >>> pictures.shape, bool(abs(pictures.var() - (4 + 1 / 12)) < 0.2)
+    ((1000, 4, 4), True)
+    """
+    if count < 1:
+        raise InvalidInput(f"count must be at least 1, got {count}")
+    key = rng.integers(2**64, size=2, dtype=np.uint64)
+    pictures = np.repeat(np.asarray(image, float)[None], count, axis=0)
+    height, width = image.shape
+    across = -(-width // TILE)
+    for index in range(across * -(-height // TILE)):
+        top, left = TILE * (index // across), TILE * (index % across)
+        tile = np.s_[top : top + TILE, left : left + TILE]
+        if where is None or where[tile].any():
+            stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
+            block = pictures[(slice(None), *tile)]
+            block += noise.sigma * stream.standard_normal(block.shape)
+    if noise.bits is not None:
+        np.clip(np.rint(pictures, out=pictures), 0, 2**noise.bits - 1, out=pictures)
+    return pictures

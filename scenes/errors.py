@@ -1,0 +1,71 @@
+"""The one error that bad input raises, and how pydantic's reports become one line of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+
+_LIMITS = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+    "too_short": ("at least as long as", "min_length"),
+    "too_long": ("at most as long as", "max_length"),
+}
+_KINDS = {
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "string_type": "a text",
+    "tuple_type": "a list",
+    "missing": "given",
+    "extra_forbidden": "a known key",
+    "model_type": "a table of keys",
+    "model_attributes_type": "a table of keys",
+    "dict_type": "a table of keys",
+}
+
+
+class InvalidInput(ValueError):
+    """Input that cannot be used. Its text is one line, "X must be ..., got ..."."""
+
+
+def describe(error: ValidationError) -> str:
+    """First problem of a pydantic report as one line "key must be ..., got ..."."""
+    problem = error.errors(include_url=False)[0]
+    if problem["type"] == "value_error" and " must be " in str(problem["ctx"]["error"]):
+        text = str(problem["ctx"]["error"])
+        return text if not problem["loc"] or "." in text.split(" must be ")[0] else f"{_key(problem['loc'])}: {text}"
+    return f"{_key(problem['loc'])} must be {_requirement(problem)}, got {_shown(problem)}"
+
+
+def _key(location: tuple[int | str, ...]) -> str:
+    """("settings", 3, "light") becomes settings[3].light."""
+    key = ""
+    for part in location:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
+    return key or "the scene"
+
+
+def _requirement(problem: Any) -> str:
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind in _LIMITS:
+        words, name = _LIMITS[kind]
+        return f"{words} {context[name]}"
+    if kind in ("literal_error", "enum"):
+        return f"one of {context['expected']}"
+    return _KINDS.get(kind, f"valid ({problem['msg']})")
+
+
+def _shown(problem: Any) -> str:
+    if problem["type"] == "missing":
+        return "nothing"
+    text = repr(problem["input"])
+    return text if len(text) <= 80 else text[:77] + "..."

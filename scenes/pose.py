@@ -1,0 +1,66 @@
+"""A direction of the viewing space: where on its sphere the sensor or the light stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PlainSerializer
+
+from scenes.errors import InvalidInput
+
+
+@dataclass(frozen=True, order=True)
+class Pose:
+    """Place on a sphere around the object's reference point, in degrees.
+
+    Parameters
+    ----------
+    polar_deg : float
+        Angle from the vertical (the object's z axis), 0 to 180.
+    azimuth_deg : float
+        Angle in the horizontal plane from the x axis towards the y axis.
+
+    Raises
+    ------
+    InvalidInput
+        If an angle is not finite or the polar angle lies outside 0 to 180.
+
+    Examples
+    --------
+    >>> Pose(30, 90)
+    Pose(polar_deg=30.0, azimuth_deg=90.0)
+    """
+
+    polar_deg: float
+    azimuth_deg: float
+
+    def __post_init__(self) -> None:
+        for name in ("polar_deg", "azimuth_deg"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise InvalidInput(f"{name} must be a finite number of degrees, got {value!r}")
+            object.__setattr__(self, name, float(value))
+        if not 0 <= self.polar_deg <= 180:
+            raise InvalidInput(f"polar_deg must be between 0 and 180, got {self.polar_deg:g}")
+
+    @classmethod
+    def of(cls, value: Any) -> Pose:
+        """A pose from a pose, or from a pair (polar, azimuth) in degrees."""
+        if isinstance(value, cls):
+            return value
+        try:
+            polar, azimuth = value
+        except (TypeError, ValueError):
+            raise InvalidInput(f"pose must be a pair (polar, azimuth) in degrees, got {value!r}") from None
+        return cls(polar, azimuth)
+
+    def __iter__(self):
+        return iter((self.polar_deg, self.azimuth_deg))
+
+    def __str__(self) -> str:
+        return f"({self.polar_deg:g}, {self.azimuth_deg:g})"
+
+
+PoseField = Annotated[Pose, BeforeValidator(Pose.of), PlainSerializer(list)]

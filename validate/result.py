@@ -1,0 +1,217 @@
+"""What a run has shown: one row a setting, the correlations and the verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+import planner
+import scenes
+from scenes import Scene
+from validate import statistics
+from validate.statistics import Verdict
+from validate.store import RunFile
+from validate.work import Method, methods, predictions
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One method in one setting: predicted from its image against measured.
+
+    Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
+    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px.
+    """
+
+    method: str
+    propagated: float
+    empirical: float | None
+    n: int
+    failed: int
+    failures: dict[str, int]
+    ratio: float | None
+    ratio_interval: tuple[float, float] | None
+    bias: float | None
+    status: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting. ``paper`` carries the one free scale; ``main`` is the method of the verdict, ``classic`` the others."""
+
+    sensor: tuple[float, float]
+    light: tuple[float, float]
+    paper_ice: float | None
+    paper_real: tuple[float, float] | None
+    paper: float
+    calibrated: float
+    bound: float
+    main: Judged
+    classic: tuple[Judged, ...]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The outcome of a run.
+
+    ``paper_scale`` is the free scale: the median of paper_ice / our paper price over all rows that have both.
+    ``search`` repeats the paper's Table 1 with the same scale: (scene, sensor, light, paper, ours).
+    """
+
+    scene: str
+    title: str
+    seed: int
+    variant: str
+    paper_scale: float | None
+    rows: tuple[Row, ...]
+    search: tuple[tuple[str, tuple[float, float], tuple[float, float], float, float], ...]
+    correlation: dict[str, Any]
+    verdict: Verdict
+    classic_verdicts: dict[str, Verdict]
+    seconds: dict[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """The document of ``ice validate --json``; numbers that are not finite become null."""
+        return _finite(
+            {
+                "scene": self.scene,
+                "seed": self.seed,
+                "variant": self.variant,
+                "paper_scale": self.paper_scale,
+                "settings": [_row_json(row) for row in self.rows],
+                "paper_table_1": [
+                    {"scene": scene, "sensor": sensor, "light": light, "paper_ice": theirs, "paper": ours}
+                    for scene, sensor, light, theirs, ours in self.search
+                ],
+                "correlation": self.correlation,
+                "verdict": asdict(self.verdict),
+                "classic_verdicts": {name: asdict(found) for name, found in self.classic_verdicts.items()},
+                "seconds": self.seconds,
+            }
+        )
+
+
+def collect(scene: Scene, seed: int, variant: str, store: RunFile, seconds: dict[str, float]) -> Validation:
+    """Put a finished run's results together."""
+    prices = [predictions(scene, i) for i in range(len(scene.settings))]
+    scale = _free_scale(scene, prices)
+    rows = tuple(_row(scene, i, prices[i], scale, store) for i in range(len(scene.settings)))
+    main = [row.main for row in rows]
+    return Validation(
+        scene=scene.name,
+        title=scene.title,
+        seed=seed,
+        variant=variant,
+        paper_scale=scale,
+        rows=rows,
+        search=_search(scene, scale),
+        correlation=_correlations(rows),
+        verdict=_judge(main),
+        classic_verdicts={group[0].method: _judge(group) for group in zip(*(row.classic for row in rows), strict=True)},
+        seconds=seconds,
+    )
+
+
+def _free_scale(scene: Scene, prices: list[dict[str, float]]) -> float | None:
+    """The paper prints no unit of intensity; the median is deaf to the rows that do not fit."""
+    known = [(s.paper_ice, p["paper"]) for s, p in zip(scene.settings, prices, strict=True) if s.paper_ice]
+    ratios = [ice / ours for ice, ours in known if math.isfinite(ours)]
+    return float(np.median(ratios)) if ratios else None
+
+
+def _row(scene: Scene, i: int, price: dict[str, float], scale: float | None, store: RunFile) -> Row:
+    setting = scene.settings[i]
+    model_px = planner.predict(scene, setting.sensor, setting.light).value_px
+    main, *classic = (_judged(i, method, model_px, store) for method in methods(scene))
+    return Row(
+        sensor=tuple(setting.sensor),
+        light=tuple(setting.light),
+        paper_ice=setting.paper_ice,
+        paper_real=setting.paper_real,
+        paper=price["paper"] * (scale or 1.0),
+        calibrated=price["calibrated"],
+        bound=price["bound"],
+        main=main,
+        classic=tuple(classic),
+    )
+
+
+def _judged(setting: int, method: Method, model_px: float, store: RunFile) -> Judged:
+    propagated, _, status = store.propagated(setting, method.name)
+    distances = store.distances(setting, method.name)
+    good = distances[np.isfinite(distances)]
+    failures = store.failures(setting, method.name)
+    empirical = float(np.var(good, ddof=1)) if good.size > 1 else None
+    judged = empirical is not None and math.isfinite(propagated) and propagated > 0
+    ratio = empirical / propagated if judged else None
+    if failures and status == "ok":
+        status = max(failures, key=failures.get)
+    return Judged(
+        method=method.name,
+        propagated=propagated,
+        empirical=empirical,
+        n=distances.size,
+        failed=distances.size - good.size,
+        failures=failures,
+        ratio=ratio,
+        ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
+        bias=float(good.mean() - model_px) if good.size else None,
+        status=status,
+    )
+
+
+def _judge(judged: list[Judged]) -> Verdict:
+    return statistics.verdict(
+        [float("nan") if j.ratio is None else j.ratio for j in judged], [j.n - j.failed for j in judged]
+    )
+
+
+def _correlations(rows: tuple[Row, ...]) -> dict[str, Any]:
+    empirical = [row.main.empirical for row in rows]
+    real = [row.paper_real or (None, None) for row in rows]
+    ice = [row.paper_ice for row in rows]
+    return {
+        "paper_with_empirical": statistics.correlation([row.paper for row in rows], empirical),
+        "calibrated_with_empirical": statistics.correlation([row.calibrated for row in rows], empirical),
+        "propagated_with_empirical": statistics.correlation([row.main.propagated for row in rows], empirical),
+        "printed_ice_with_empirical": statistics.correlation(ice, empirical),
+        "printed_ice_with_printed_real_12": statistics.correlation(ice, [pair[0] for pair in real]),
+        "printed_ice_with_printed_real_10": statistics.correlation(ice, [pair[1] for pair in real]),
+        "claimed_by_paper": 0.768 if any(ice) else None,
+    }
+
+
+def _search(scene: Scene, scale: float | None):
+    if scale is None:
+        return ()
+    found = []
+    for other in map(scenes.load, scene.same_scale):
+        for setting in other.settings:
+            ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_px2 * scale
+            found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
+    return tuple(found)
+
+
+def _row_json(row: Row) -> dict[str, Any]:
+    main = asdict(row.main)
+    return {
+        "sensor": row.sensor,
+        "light": row.light,
+        "paper_ice": row.paper_ice,
+        "paper_real": row.paper_real,
+        "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
+        **main,
+        "bound": row.bound,
+        "classic": [asdict(judged) for judged in row.classic],
+    }
+
+
+def _finite(value: Any) -> Any:
+    """The same document with null for NaN and infinity, which JSON lacks."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
