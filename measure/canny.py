@@ -64,10 +64,13 @@ class CannyLocator:
         total = np.hypot(scale, edge_blur(scene.camera.blur_px))
         return cls(frame, threshold, rows, columns, near, gauss, derive, float(np.sqrt(2 * np.pi) * total))
 
-    def locate(self, images: np.ndarray) -> EdgePoints:
-        """Edge points in a stack of images, shape (n, height, width)."""
-        gradients = [self._gradient(image) for image in images]
-        pixels = [np.nonzero(self._edge_pixels(*gradient)) for gradient in gradients]
+    def locate(self, images: np.ndarray, chosen: np.ndarray | None = None) -> EdgePoints:
+        """Edge points in a stack of images, shape (n, height, width).
+
+        ``chosen`` are the edge pixels to refine, bool like `near`; Canny's own choice in each image when not given.
+        """
+        gradients = [self.gradient(image) for image in images]
+        pixels = [np.nonzero(self.edge_pixels(*gradient) if chosen is None else chosen) for gradient in gradients]
         counts = np.array([len(y) for y, _ in pixels])
         which = np.repeat(np.arange(len(images)), counts)
         y, x = (np.concatenate(part) for part in zip(*pixels, strict=True))
@@ -86,9 +89,9 @@ class CannyLocator:
 
         Linear in the noise once the edge pixels are chosen; the choice itself is not, and is held fixed.
         """
-        gx, gy = self._gradient(clean)
-        y, x = np.nonzero(self._edge_pixels(gx, gy))
-        shift, d_low, d_mid, d_high, gx0, gy0, m0 = _peak(gx[None], gy[None], np.zeros_like(x), y, x)
+        gx, gy = self.gradient(clean)
+        y, x = np.nonzero(self.edge_pixels(gx, gy))
+        _, d_low, d_mid, d_high, gx0, gy0, m0 = _peak(gx[None], gy[None], np.zeros_like(x), y, x)
         toward = (gx0 * self.frame.normal[0] + gy0 * self.frame.normal[1]) / m0
         shape = gx.shape
         d_magnitude = sparse.csr_array((x.size, gx.size))
@@ -105,7 +108,8 @@ class CannyLocator:
         flat = (row + self.rows.start) * clean.shape[1] + column + self.columns.start
         return self.locate(clean[None]), sparse.csr_array((local.data, (local.row, flat)), (x.size, clean.size))
 
-    def _gradient(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def gradient(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaussian derivatives along x and y of the part that matters, grey levels a pixel."""
         part = np.ascontiguousarray(image[self.rows, self.columns], dtype=np.float32)
         border = cv2.BORDER_REPLICATE
         return (
@@ -113,7 +117,8 @@ class CannyLocator:
             cv2.sepFilter2D(part, cv2.CV_32F, self.smooth, self.derive, borderType=border),
         )
 
-    def _edge_pixels(self, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
+    def edge_pixels(self, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
+        """Pixels near the edge that Canny keeps: gradient above the threshold and largest along its direction."""
         fixed = [np.clip(np.rint(g * _FIXED_POINT), -32767, 32767).astype(np.int16) for g in (gx, gy)]
         limit = self.threshold * _FIXED_POINT
         return (cv2.Canny(fixed[0], fixed[1], limit, limit, L2gradient=True) > 0) & self.near
@@ -136,7 +141,7 @@ def _parabola(gx, gy, which, y, x):
 
 
 def _peak(gx, gy, which, y, x):
-    """Shift of the gradient's maximum along the gradient, px, its derivatives by the three magnitudes, and the gradient."""
+    """Shift of the gradient's maximum along itself, px, its derivatives by the three magnitudes, and the gradient."""
     gx0, gy0 = gx[which, y, x].astype(float), gy[which, y, x].astype(float)
     m0 = np.hypot(gx0, gy0)
     magnitude = np.hypot(gx, gy)
@@ -151,7 +156,7 @@ def _corners_of(x, y):
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - x0, y - y0
     return [
-        (y0, x0, (1 - fy) * (1 - fx)), (y0, x0 + 1, (1 - fy) * fx), (y0 + 1, x0, fy * (1 - fx)), (y0 + 1, x0 + 1, fy * fx),
+    """Shift of the gradient's maximum along itself, px, its derivatives by three magnitudes, and the gradient."""
     ]  # fmt: skip
 
 

@@ -14,12 +14,11 @@ from measure.corners import corner_response, intersect, line_equation
 from measure.frames import EdgeFrame, edge_frames
 from measure.gradient import GradientLocator
 from measure.lines import Lines, fit_lines, unit_covariance
-from planner.locator import kappa2
+from planner.locator import MIN_CONTRAST, kappa2
 from planner.propagation import distance_variance
 from scenes import InvalidInput, Pose, Scene
 
 LOCATORS = ("gradient", "canny")
-MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longer linear in the noise
 _MIN_FOUND = 0.5  # part of an edge's stations at which a point must be found
 _MIN_SINE = 0.02  # of the angle between the lines of a corner
 
@@ -59,7 +58,12 @@ class Measurement:
 
 
 def distance(
-    image: np.ndarray, scene: Scene, sensor: Any, light: Any = None, locator: str = "gradient", threshold: float | None = None
+    image: np.ndarray,
+    scene: Scene,
+    sensor: Any,
+    light: Any = None,
+    locator: str = "gradient",
+    threshold: float | None = None,
 ) -> Measurement:
     """Measure the task's distance.
 
@@ -73,8 +77,8 @@ def distance(
     light : Pose or pair of float, optional
         Only checked; the measurement does not depend on it.
     locator : {"gradient", "canny"}
-        ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, Canny edge pixels
-        above a gradient threshold refined by a parabola.
+        ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, edge
+        pixels above a gradient threshold refined by a parabola.
     threshold : float, optional
         Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given.
 
@@ -117,7 +121,9 @@ def prepare(scene: Scene, sensor: Pose, locator: str, threshold: float | None):
     return tuple((f, makers[locator](scene, f) if f.status in status.MEASURED else None) for f in frames)
 
 
-def _measure(images: np.ndarray, scene: Scene, sensor: Pose, locator: str, threshold: float | None) -> tuple[np.ndarray, ...]:
+def _measure(
+    images: np.ndarray, scene: Scene, sensor: Pose, locator: str, threshold: float | None
+) -> tuple[np.ndarray, ...]:
     """All columns of a Measurement for a small stack (n, height, width)."""
     edges = [_edge(images, scene, *pair) for pair in prepare(scene, sensor, locator, threshold)]
     frames, lines = [e[0] for e in edges], [e[1] for e in edges]
@@ -130,10 +136,21 @@ def _measure(images: np.ndarray, scene: Scene, sensor: Pose, locator: str, thres
     measured = np.isin(state, status.MEASURED)
     value = np.where(measured, np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1), np.nan)
     variance = np.where(measured, distance_variance(corners, covariances), np.inf)
-    return value, variance, state, corners, covariances, edge_status, np.stack([line.count for line in lines], -1), contrast
+    return (
+        value,
+        variance,
+        state,
+        corners,
+        covariances,
+        edge_status,
+        np.stack([line.count for line in lines], -1),
+        contrast,
+    )
 
 
-def _edge(images: np.ndarray, scene: Scene, frame: EdgeFrame, locator) -> tuple[EdgeFrame, Lines, np.ndarray, np.ndarray]:
+def _edge(
+    images: np.ndarray, scene: Scene, frame: EdgeFrame, locator
+) -> tuple[EdgeFrame, Lines, np.ndarray, np.ndarray]:
     """Line, status and contrast of one edge in each image."""
     n = len(images)
     if locator is None:
@@ -150,18 +167,20 @@ def _corner(scene: Scene, frames: list[EdgeFrame], lines: list[Lines], contrast:
     """Corner (n, 2), its covariance (n, 2, 2) and the sine of its angle (n,)."""
     equations = [line_equation(*pair) for pair in zip(frames, lines, strict=True)]
     corner, sine = intersect(*(np.stack([e[i] for e in equations], 1) for i in (0, 1)))
+    sine = np.nan_to_num(sine, nan=1.0)  # without a line its own status says so, not the corner's
+    unknown = np.broadcast_to(np.diag([np.inf, np.inf]), (len(corner), 2, 2))
     if any(frame.stations.size == 0 for frame in frames):
-        return corner, np.full((len(corner), 2, 2), np.inf), np.nan_to_num(sine, nan=1.0)
+        return corner, unknown, sine
     expected, angle = intersect(np.stack([[f.normal for f in frames]]), np.stack([[f.origin for f in frames]]))
     if angle[0] < _MIN_SINE:
-        return corner, np.full((len(corner), 2, 2), np.inf), sine
+        return corner, unknown, sine
     alongs = np.array([f.stations.mean() for f in frames])
     response = corner_response(tuple(frames), alongs, expected[0])
     point_variance = kappa2(scene.locator.scale_px, scene.camera.blur_px) * scene.noise.variance
-    covariance = 0.0
-    with np.errstate(divide="ignore"):
-        for k, frame in enumerate(frames):
-            part = response[:, 2 * k : 2 * k + 2]
-            unit = part @ unit_covariance(frame.stations, scene.locator.scale_px) @ part.T
-            covariance = covariance + unit * (point_variance / contrast[:, k] ** 2)[:, None, None]
-    return corner, covariance, np.nan_to_num(sine, nan=1.0)
+    seen = (contrast > 0).all(1)
+    covariance = np.zeros((len(corner), 2, 2))
+    for k, frame in enumerate(frames):
+        part = response[:, 2 * k : 2 * k + 2]
+        unit = part @ unit_covariance(frame.stations, scene.locator.scale_px) @ part.T
+        covariance += unit * (point_variance / np.where(seen, contrast[:, k], 1) ** 2)[:, None, None]
+    return corner, np.where(seen[:, None, None], covariance, unknown), sine

@@ -75,7 +75,9 @@ class GradientLocator:
         rows = np.arange(crossing.shape[0])[:, None]
         columns = rows * self.offsets.size + crossing[:, :1] + np.arange(-1, 3)
         values = -STEP * weights[:, 0] / slope[:, :1] * _polarity(profiles)[0]
-        pick = sparse.csr_array((values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0]))
+        pick = sparse.csr_array(
+            (values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0])
+        )
         near = pick @ self.kernel
         near = sparse.coo_array(near)
         full = sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (rows.size, clean.size))
@@ -142,6 +144,11 @@ def _refine(profiles: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tu
 def _cubic_weights(x: np.ndarray) -> np.ndarray:
     """Weights of the values at -1, 0, 1, 2 in the cubic's value at x, shape (m, n, 4) for x (m, n)."""
     return np.stack(
-        [-x * (x - 1) * (x - 2) / 6, (x + 1) * (x - 1) * (x - 2) / 2, -(x + 1) * x * (x - 2) / 2, (x + 1) * x * (x - 1) / 6],
+        [
+            -x * (x - 1) * (x - 2) / 6,
+            (x + 1) * (x - 1) * (x - 2) / 2,
+            -(x + 1) * x * (x - 2) / 2,
+            (x + 1) * x * (x - 1) / 6,
+        ],
         -1,
     )

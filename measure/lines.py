@@ -42,6 +42,6 @@ def regression(along: np.ndarray) -> np.ndarray:
 
 
 def unit_covariance(along: np.ndarray, scale: float) -> np.ndarray:
-    """Covariance of (mean offset, slope) for points of variance 1 px^2 whose errors the smoothing correlates, (2, 2)."""
+    """Covariance of (mean offset, slope), (2, 2), for points of variance 1 px^2 that the smoothing correlates."""
     response = regression(along)
     return response @ correlation(along[:, None] - along, scale) @ response.T

@@ -40,7 +40,12 @@ class Propagated:
 
 
 def propagate(
-    clean: np.ndarray, scene: Scene, sensor: Any, light: Any = None, locator: str = "gradient", threshold: float | None = None
+    clean: np.ndarray,
+    scene: Scene,
+    sensor: Any,
+    light: Any = None,
+    locator: str = "gradient",
+    threshold: float | None = None,
 ) -> Propagated:
     """Propagate pixel noise through edge points, lines and corners to the distance.
 
@@ -77,7 +82,7 @@ def propagate(
 
 
 def _line_response(locator, clean: np.ndarray) -> tuple[np.ndarray, float]:
-    """Derivative of (mean offset, slope) by the pixels, shape (2, pixels), and the points' mean place along the edge."""
+    """Derivative of (mean offset, slope) by the pixels, (2, pixels), and the points' mean place along the edge."""
     points, response = locator.linear_response(clean)
     keep = points.valid[0]
     along = points.along[0][: response.shape[0]][keep[: response.shape[0]]]

@@ -12,6 +12,9 @@ import numpy as np
 PIXEL_VARIANCE = 1 / 12  # variance of a uniform distribution one pixel wide, px^2
 CLEARANCE = 3.5  # standard deviations of the smoothed edge that a neighbouring edge must keep
 
+MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longer linear in the noise
+MIN_USABLE = 2.0  # px of an edge that must be left after trimming
+
 
 def edge_blur(blur_px: float) -> float:
     """Standard deviation s_e of the edge profile: lens blur and pixel aperture, px."""

@@ -8,7 +8,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner import prices
-from scenes import InvalidInput, Pose, Scene
+from planner.locator import MIN_CONTRAST, MIN_USABLE
+from scenes import InvalidInput, Scene
 
 Price = Literal["paper", "calibrated", "bound"]
 _PRICES = {"paper": prices.paper, "calibrated": prices.calibrated, "bound": prices.bound}
@@ -37,7 +38,8 @@ class Prediction:
         The distance itself, as the model projects it, px.
     variance_px2 : float
         Variance (not sigma) of the measured distance, px^2; infinite, with the reason in `status`, where it
-        cannot be measured. The ``paper`` price is right only up to one factor common to all settings.
+        cannot be measured. The ``paper`` price is right only up to one factor common to all settings, and infinite
+        only where an edge is hidden or without any contrast.
     corners : ndarray, shape (2, 2)
         Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
     covariances : ndarray, shape (2, 2, 2)
@@ -111,7 +113,12 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     edges = tuple(
         EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, usable, step))
         for name, length, usable, step, seen in zip(
-            priced.view.names, priced.view.lengths, priced.view.usable, priced.contrast, priced.view.visible, strict=True
+            priced.view.names,
+            priced.view.lengths,
+            priced.view.usable,
+            priced.contrast,
+            priced.view.visible,
+            strict=True,
         )
     )
     return Prediction(
@@ -134,9 +141,9 @@ def _evaluate(scene: Scene, price: str):
 def _edge_status(scene: Scene, visible: bool, usable: float, step: float) -> str:
     if not visible or not np.isfinite(usable):
         return "not_visible"
-    if not step > 5 * np.sqrt(scene.noise.variance):  # below it the locator's error is no longer linear in the noise
+    if not step > MIN_CONTRAST * np.sqrt(scene.noise.variance):
         return "low_contrast"
-    return "short" if usable < 2 else "ok"
+    return "short" if usable < MIN_USABLE else "ok"
 
 
 def _status(priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:

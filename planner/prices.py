@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.contrast import contrast, side_levels
-from planner.locator import information_bound, kappa2
+from planner.locator import MIN_CONTRAST, MIN_USABLE, correlation, information_bound, kappa2
 from planner.outline import Outline, outline
 from planner.propagation import corner_covariance, distance_variance, fit_line, offset_variance
 from planner.view import depth, edge_points, project
@@ -49,7 +49,7 @@ def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     100 points an edge, equally spaced in space, independent errors of variance 8.697 sigma^2 / C_i^2, no fall-off
     with distance. Its unit of intensity is not printed, so the result is right up to one factor for all settings.
     """
-    sensors, lights = _broadcast(sensors, lights)
+    sensors, lights = np.asarray(sensors, float), np.asarray(lights, float)
     view = outline(scene, sensors)
     points = edge_points(scene.solid, view.names, np.linspace(0, 1, PAPER_POINTS))
     image = project(points.reshape(-1, 3), sensors, scene.camera).reshape(*sensors.shape[:-1], *points.shape[:-1], 2)
@@ -66,7 +66,8 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     Edge points lie densely along the trimmed edge; their errors have variance kappa^2 s_n^2 / C^2 and correlation
     exp(-d^2 / (4 s^2)). With f(t) the weight that the least-squares line gives to an error at t in its own position at
     the corner, the variance there is the double integral of f f' sigma sigma' correlation: to second order
-    2 sqrt(pi) s (integral of g^2 - s^2 integral of g'^2) - 2 s^2 (g^2 at both ends), g = f sigma.
+    2 sqrt(pi) s (integral of g^2 - s^2 integral of g'^2) - 2 s^2 (g^2 at both ends), g = f sigma; on an edge of less
+    than 10 s the double integral itself. Infinite where an edge has too little contrast or length to be measured.
     """
     scale, blur = scene.locator.scale_px, scene.camera.blur_px
     per_point = kappa2(scale, blur) * scene.noise.variance
@@ -78,7 +79,10 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
         slope = 12 * corner / length**3 * np.sqrt(per_point) / steps
         inside = _integral(g**2 - (scale * slope) ** 2, length)
         ends = g[..., 0] ** 2 + g[..., -1] ** 2
-        return 2 * np.sqrt(np.pi) * scale * inside - 2 * scale**2 * ends
+        smooth = 2 * np.sqrt(np.pi) * scale * inside - 2 * scale**2 * ends
+        variance = np.where(length[..., 0] < 10 * scale, _double_integral(g, t, length, scale), smooth)
+        weak = (steps**2).mean(-1) < MIN_CONTRAST**2 * scene.noise.variance
+        return np.where(weak | (length[..., 0] < MIN_USABLE), np.inf, variance)
 
     return _along_edges(scene, sensors, lights, offsets, trimmed=True)
 
@@ -105,22 +109,22 @@ def _along_edges(scene, sensors, lights, offset_variance_at_corner, *, trimmed: 
     ``offset_variance_at_corner(t, contrast, length, corner)`` gets positions t along the edge (px, from the middle
     of its used part) with a last axis of nodes; length and corner have that axis with size 1.
     """
-    sensors, lights = _broadcast(sensors, lights)
+    sensors, lights = np.asarray(sensors, float), np.asarray(lights, float)
     view = outline(scene, sensors)
     ends = _corners(scene, view)
     start = view.ends[..., 0, :]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (view.ends[..., 1, :] - start) / view.lengths[..., None]
+    whole = np.where(view.lengths > 0, view.lengths, np.nan)[..., None]  # an edge seen end-on has no direction
+    along = (view.ends[..., 1, :] - start) / whole
     trims = view.trims if trimmed else np.zeros_like(view.trims)
-    length = np.maximum(view.lengths - trims.sum(-1), 0)[..., None]
+    length = np.where(whole > trims.sum(-1, keepdims=True), whole - trims.sum(-1, keepdims=True), np.nan)
     middle = trims[..., :1] + length / 2
     t = length / 2 * np.concatenate([[-1], _NODES, [1]])
     corner = np.einsum("...ei,...ei->...e", ends.repeat(2, axis=-2) - start, along)[..., None] - middle
-    steps = _contrast_along(scene, view, sensors, lights, (middle + t) / view.lengths[..., None])
+    steps = _contrast_along(scene, view, sensors, lights, (middle + t) / whole)
     with np.errstate(divide="ignore", invalid="ignore"):
         offsets = offset_variance_at_corner(t, steps, length, corner)
     normals = np.stack([-along[..., 1], along[..., 0]], -1)
-    return _assemble(view, ends, normals, np.where(length[..., 0] > 0, offsets, np.inf), steps)
+    return _assemble(view, ends, normals, offsets, steps)
 
 
 def _contrast_along(scene, view, sensors, lights, fractions):
@@ -137,8 +141,11 @@ def _integral(values: np.ndarray, length: np.ndarray) -> np.ndarray:
     return (values[..., 1:-1] * _NODE_WEIGHTS).sum(-1) * length[..., 0] / 2
 
 
-def _broadcast(sensors, lights) -> tuple[np.ndarray, np.ndarray]:
-    return np.broadcast_arrays(np.asarray(sensors, float), np.asarray(lights, float))
+def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: float) -> np.ndarray:
+    """Integral of g(t) g(t') correlation(t - t') over both; never negative."""
+    weighted, inner = g[..., 1:-1] * _NODE_WEIGHTS * length / 2, t[..., 1:-1]
+    kernel = correlation(inner[..., :, None] - inner[..., None, :], scale)
+    return np.einsum("...i,...ij,...j->...", weighted, kernel, weighted)
 
 
 def _corners(scene: Scene, view: Outline) -> np.ndarray:
@@ -153,7 +160,7 @@ def _corners(scene: Scene, view: Outline) -> np.ndarray:
 def _assemble(view: Outline, ends, normals, offsets, steps) -> Priced:
     """From line offsets' variances at the corners (..., E) to the distance."""
     offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
-    shape = (*offsets.shape[:-1], 2, 2)
-    covariances = corner_covariance(normals.reshape(*shape, 2), offsets.reshape(shape))
+    pairs = normals.reshape(*normals.shape[:-2], 2, 2, 2), offsets.reshape(*offsets.shape[:-1], 2, 2)
+    covariances = corner_covariance(*pairs)
     variance = distance_variance(ends, covariances)
     return Priced(variance, ends, covariances, np.sqrt((steps**2).mean(-1)), view)

@@ -33,7 +33,9 @@ class Quality:
             raise InvalidInput(f"samples must be a square number, got {self.samples}")
 
 
-def image(scene: Scene, sensor: Any, light: Any, quality: Quality = Quality(), variant: str | None = None) -> np.ndarray:
+def image(
+    scene: Scene, sensor: Any, light: Any, quality: Quality = Quality(), variant: str | None = None
+) -> np.ndarray:
     """Noise-free image.
 
     Parameters
@@ -59,7 +61,10 @@ def image(scene: Scene, sensor: Any, light: Any, quality: Quality = Quality(), v
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
     if not scene.material.is_diffuse:
-        raise InvalidInput("material must be diffuse (specular_fraction 0, or refractive_index 1 and extinction 0) to be rendered, got a specular one")
+        raise InvalidInput(
+            "material must be diffuse (specular_fraction 0, or refractive_index 1 and extinction 0) to be rendered, "
+            "got a specular one"
+        )
     picture = np.zeros((scene.camera.height, scene.camera.width))
     rows, columns = window(scene, sensor)
     if picture[rows, columns].size:
@@ -84,7 +89,9 @@ def window(scene: Scene, sensor: Pose) -> tuple[slice, slice]:
     return slice(top, bottom), slice(left, right)
 
 
-def _description(mitsuba, scene: Scene, sensor: Pose, light: Pose, quality: Quality, rows: slice, columns: slice) -> dict:
+def _description(
+    mitsuba, scene: Scene, sensor: Pose, light: Pose, quality: Quality, rows: slice, columns: slice
+) -> dict:
     """Mitsuba's description of the scene. No floor: a black one adds nothing but time."""
     axes = frame(np.array(list(sensor)))
     camera, position = scene.camera, scene.position("sensor", sensor)

@@ -7,11 +7,11 @@ candidate is tried in a process of its own, with an operation that those release
 from __future__ import annotations
 
 import functools
-import glob
 import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 from scenes import InvalidInput
 
@@ -19,7 +19,12 @@ SCALAR = "scalar_rgb"
 LLVM = "llvm_ad_mono"
 OVERRIDE = "ICE_VARIANT"
 _LIBRARY = "DRJIT_LIBLLVM_PATH"
-_PLACES = ("/usr/lib/*/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib")
+_PLACES = (
+    "usr/lib/*/libLLVM*.so*",
+    "usr/lib/llvm-*/lib/libLLVM*.so*",
+    "usr/lib64/libLLVM*.so*",
+    "opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
+)
 _PROBE = f"""
 import mitsuba, drjit
 mitsuba.set_variant("{LLVM}")
@@ -62,19 +67,21 @@ def use(name: str):
     try:
         mitsuba.set_variant(name)
     except ImportError as error:
-        raise InvalidInput(f"{OVERRIDE} must be a variant that works here, got {name!r} ({str(error).splitlines()[0]})") from None
+        raise InvalidInput(
+            f"{OVERRIDE} must be a variant that works here, got {name!r} ({str(error).splitlines()[0]})"
+        ) from None
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
 
 
 def _candidates() -> list[str]:
     """Installed libLLVM files, the newest first."""
-    found = {os.path.realpath(path) for place in _PLACES for path in glob.glob(place)}
+    found = {os.path.realpath(path) for place in _PLACES for path in Path("/").glob(place)}
     return sorted(found, key=_release, reverse=True)
 
 
 def _release(path: str) -> tuple[int, ...]:
-    return tuple(int(number) for number in re.findall(r"\d+", os.path.basename(path)))
+    return tuple(int(number) for number in re.findall(r"\d+", Path(path).name))
 
 
 def _works(library: str) -> bool:

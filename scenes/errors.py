@@ -58,7 +58,7 @@ def _requirement(problem: Any) -> str:
     kind, context = problem["type"], problem.get("ctx", {})
     if kind in _LIMITS:
         words, name = _LIMITS[kind]
-        return f"{words} {context[name]}"
+        return f"{words} {context[name]:g}"
     if kind in ("literal_error", "enum"):
         return f"one of {context['expected']}"
     return _KINDS.get(kind, f"valid ({problem['msg']})")

@@ -198,7 +198,9 @@ class Scene(Model):
         for end in ("start", "end"):
             self._check_corner(f"task.{end}", getattr(self.task, end))
         if self.task.start.vertex == self.task.end.vertex:
-            raise ValueError(f"task.end.vertex must be another vertex than task.start.vertex, got {self.task.end.vertex!r}")
+            raise ValueError(
+                f"task.end.vertex must be another vertex than task.start.vertex, got {self.task.end.vertex!r}"
+            )
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")

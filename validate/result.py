@@ -39,7 +39,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Row:
-    """One setting. ``paper`` carries the one free scale; ``main`` is the method of the verdict, ``classic`` the others."""
+    """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others."""
 
     sensor: tuple[float, float]
     light: tuple[float, float]

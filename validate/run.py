@@ -59,11 +59,19 @@ def run(
     _check(scene, renders, seed, workers)
     started = time.perf_counter()
     variant = variants.choose()
-    identity = {"scene": scene.model_dump(mode="json"), "seed": seed, "variant": variant, "chunk": CHUNK, "renders": renders}
+    identity = {
+        "scene": scene.model_dump(mode="json"),
+        "seed": seed,
+        "variant": variant,
+        "chunk": CHUNK,
+        "renders": renders,
+    }
     store = RunFile(Path(out or Path("runs") / scene.name), identity, fresh)
     try:
         store.note("versions", {name: version(name) for name in _PACKAGES})
-        workers = workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count()
+        workers = (
+            workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count()
+        )
         pool = executor or _local(workers)
         try:
             _work(scene, renders, seed, variant, store, pool, progress or (lambda *_: None))
@@ -90,10 +98,14 @@ def _check(scene: Scene, renders: int, seed: int, workers: int | None) -> None:
 def _local(workers: int) -> Executor:
     if workers == 1:
         return ThreadPoolExecutor(1)
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))  # the renderer's threads do not survive a fork
+    return ProcessPoolExecutor(
+        workers, mp_context=multiprocessing.get_context("spawn")
+    )  # the renderer's threads do not survive a fork
 
 
-def _work(scene: Scene, renders: int, seed: int, variant: str, store: RunFile, pool: Executor, progress: Progress) -> None:
+def _work(
+    scene: Scene, renders: int, seed: int, variant: str, store: RunFile, pool: Executor, progress: Progress
+) -> None:
     """Submit what is not yet done; each result is committed as it arrives."""
     sizes = {chunk: min(CHUNK, renders - CHUNK * chunk) for chunk in range(-(-renders // CHUNK))}
     done = store.chunks()

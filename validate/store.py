@@ -24,7 +24,8 @@ CREATE TABLE IF NOT EXISTS chunk (
 CREATE TABLE IF NOT EXISTS distance (
     setting INTEGER, chunk INTEGER, method TEXT, values_px BLOB, PRIMARY KEY (setting, chunk, method));
 CREATE TABLE IF NOT EXISTS failure (
-    setting INTEGER, chunk INTEGER, method TEXT, image INTEGER, status TEXT, PRIMARY KEY (setting, chunk, method, image));
+    setting INTEGER, chunk INTEGER, method TEXT, image INTEGER, status TEXT,
+    PRIMARY KEY (setting, chunk, method, image));
 """
 
 
@@ -62,6 +63,14 @@ class RunFile:
             raise InvalidInput(f"--out must be a writable directory, got {directory} ({error})") from None
         self._claim(directory, identity)
 
+    @classmethod
+    def reopen(cls, directory: Path) -> RunFile:
+        """The run file of a directory, to read."""
+        store = cls.__new__(cls)
+        store.path = directory / "run.sqlite"
+        store._db = sqlite3.connect(f"file:{store.path}?mode=ro", uri=True)
+        return store
+
     def close(self) -> None:
         self._db.close()
 
@@ -80,10 +89,16 @@ class RunFile:
 
     def add_chunk(self, setting: int, chunk: int, count: int, found: Chunk) -> None:
         with self._db:
-            self._db.execute("INSERT INTO chunk VALUES (?, ?, ?, ?)", (setting, chunk, count, json.dumps(found.seconds)))
+            self._db.execute(
+                "INSERT INTO chunk VALUES (?, ?, ?, ?)", (setting, chunk, count, json.dumps(found.seconds))
+            )
             for method, values in found.distances.items():
-                self._db.execute("INSERT INTO distance VALUES (?, ?, ?, ?)", (setting, chunk, method, values.astype("<f8").tobytes()))
-            rows = [(setting, chunk, m, i, status) for m, images in found.failures.items() for i, status in images.items()]
+                self._db.execute(
+                    "INSERT INTO distance VALUES (?, ?, ?, ?)", (setting, chunk, method, values.astype("<f8").tobytes())
+                )
+            rows = [
+                (setting, chunk, m, i, status) for m, images in found.failures.items() for i, status in images.items()
+            ]
             self._db.executemany("INSERT INTO failure VALUES (?, ?, ?, ?, ?)", rows)
 
     def image(self, setting: int) -> np.ndarray | None:
@@ -104,7 +119,9 @@ class RunFile:
     def distances(self, setting: int, method: str) -> np.ndarray:
         """All distances measured so far in the order of the images, px; NaN for failed ones."""
         query = "SELECT values_px FROM distance WHERE setting = ? AND method = ? ORDER BY chunk"
-        return np.concatenate([np.empty(0), *(np.frombuffer(row[0], "<f8") for row in self._db.execute(query, (setting, method)))])
+        return np.concatenate(
+            [np.empty(0), *(np.frombuffer(row[0], "<f8") for row in self._db.execute(query, (setting, method)))]
+        )
 
     def failures(self, setting: int, method: str) -> dict[str, int]:
         """How many images failed, by status."""

@@ -90,7 +90,8 @@ def measure_chunk(scene: Scene, setting: int, image: np.ndarray, seed: int, chun
     distances = {name: np.concatenate([part.value_px for part in found]) for name, found in parts.items()}
     statuses = {name: np.concatenate([part.status for part in found]) for name, found in parts.items()}
     failures = {
-        name: {int(i): str(statuses[name][i]) for i in np.flatnonzero(np.isnan(values))} for name, values in distances.items()
+        name: {int(i): str(statuses[name][i]) for i in np.flatnonzero(np.isnan(values))}
+        for name, values in distances.items()
     }
     return Chunk(distances, failures, clock.seconds)
 
@@ -98,7 +99,9 @@ def measure_chunk(scene: Scene, setting: int, image: np.ndarray, seed: int, chun
 def predictions(scene: Scene, setting: int) -> dict[str, float]:
     """The prices that need no image, px^2; ``paper`` without its free scale."""
     sensor, light = scene.settings[setting].sensor, scene.settings[setting].light
-    return {price: planner.predict(scene, sensor, light, price).variance_px2 for price in ("paper", "calibrated", "bound")}
+    return {
+        price: planner.predict(scene, sensor, light, price).variance_px2 for price in ("paper", "calibrated", "bound")
+    }
 
 
 class _Clock:

@@ -1,0 +1,14 @@
+import numpy as np
+import pytest
+
+import scenes
+
+
+@pytest.fixture(scope="session")
+def task1():
+    return scenes.load("task1")
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20261121)

@@ -1,0 +1,96 @@
+"""The command line as a user meets it: exit status, one line for bad input, one document for --json."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from scenes.load import BUNDLED
+
+pytestmark = pytest.mark.render
+
+
+def ice(*arguments, cwd=None):
+    command = [sys.executable, "-m", "validate.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def short_scene(tmp_path_factory):
+    """Task1 with its first setting only."""
+    text = (BUNDLED / "task1.toml").read_text()
+    head, _, settings = text.partition("[[settings]]")
+    path = tmp_path_factory.mktemp("scene") / "short.toml"
+    path.write_text(head + "[[settings]]" + settings.partition("[[settings]]")[0])
+    return path
+
+
+def test_validate_json_files_and_pictures(short_scene, tmp_path):
+    done = ice("validate", short_scene, "--renders", 200, "--workers", 1, "--out", tmp_path / "out", "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["scene"] == "short"
+    assert document["settings"][0]["n"] == 200
+    assert done.stderr == ""
+    names = {path.name for path in (tmp_path / "out").rglob("*")}
+    assert {"run.sqlite", "table.csv", "result.json", "predicted_measured.png", "sensor_30_90_images.png"} <= names
+    again = ice("validate", short_scene, "--renders", 200, "--workers", 1, "--out", tmp_path / "out")
+    assert again.returncode == 0
+    assert "Table 3" in again.stdout
+    assert document["verdict"]["text"].split(":")[0] in " ".join(again.stdout.split())
+
+
+def test_render_then_measure(tmp_path):
+    poses = ("--sensor", "30,135", "--light", "15,315")
+    done = ice("render", "task1", *poses, "-o", tmp_path / "a.png", "--noise-seed", 1)
+    assert done.returncode == 0, done.stderr
+    measured = ice("measure", tmp_path / "a.png", "task1", *poses, "--json")
+    assert measured.returncode == 0, measured.stderr
+    document = json.loads(measured.stdout)
+    assert document["status"] == "ok"
+    assert document["value_px"] == pytest.approx(100.81, abs=5 * document["variance_px2"] ** 0.5 + 0.01)
+    dark = ice("measure", tmp_path / "a.png", "task1", "--sensor", "60,315")
+    assert dark.returncode == 1
+    assert "not measured" in dark.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("validate", "nothing"), "scene must be a TOML file or one of"),
+        (("validate", "/no/such.toml"), "/no/such.toml must be a readable file, got No such file"),
+        (("validate", "task1", "--renders", "1"), "renders must be at least 2, got 1"),
+        (("validate", "task1", "--renders", "many"), "--renders must be a valid integer, got 'many'"),
+        (("validate", "task1", "--speed", "9"), "option must be a known one (see --help), got '--speed'"),
+        (("validate",), "SCENE must be given, got nothing"),
+        (("render", "task1", "--sensor", "30", "--light", "1,2", "-o", "x.png"), "--sensor must be two numbers P,A"),
+        (
+            ("render", "task1", "--sensor", "30,nan", "--light", "1,2", "-o", "x.png"),
+            "--sensor: azimuth_deg must be a finite",
+        ),
+        (
+            ("render", "task1", "--sensor", "30,20", "--light", "1,2", "-o", "/no/x.png"),
+            "--output must be a writable file",
+        ),
+        (
+            ("measure", "/no/x.png", "task1", "--sensor", "30,20"),
+            "/no/x.png must be a readable image, got: No such file",
+        ),
+        (("paint",), "command must be a known one (see --help), got 'paint'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_2(arguments, line, tmp_path):
+    done = ice(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert line in done.stderr
+    assert done.stdout == ""
+
+
+def test_bad_scene_value_names_file_and_key(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text((BUNDLED / "task1.toml").read_text().replace("sigma = 2.4", "sigma = -2.4"))
+    done = ice("validate", path)
+    assert done.returncode == 2
+    assert done.stderr == f"{path}: noise.sigma must be at least 0, got -2.4\n"

@@ -1,0 +1,100 @@
+"""The renderer against closed forms and against exact polygon images."""
+
+import numpy as np
+import pytest
+
+import measure
+import render
+from planner.view import direction, frame, project
+from render.image import window
+from scenes import InvalidInput, Material, Pose
+from tests.oracle import polygon_image
+
+pytestmark = pytest.mark.render
+
+
+def brightness(scene, normal, point, light):
+    """Lambertian surface under a point light: albedo x exposure x cos x (distance of the light / r)^2."""
+    away = scene.light.distance * direction(np.array(light, float)) - point
+    r = np.linalg.norm(away)
+    return 0.9 * scene.camera.exposure * (away @ normal / r) * (scene.light.distance / r) ** 2
+
+
+def behind(scene, pose, pixel):
+    """Point of the top face's plane that a pixel's centre looks at."""
+    axes, camera = frame(pose), scene.camera
+    u, v = (pixel - np.array([camera.width - 1, camera.height - 1]) / 2) / camera.focal_px
+    ray = axes.forward + u * axes.right + v * axes.down
+    start = -camera.distance * axes.forward
+    return start + ray * (scene.object.size[2] - start[2]) / ray[2]
+
+
+@pytest.mark.parametrize(("sensor", "light"), [((30, 135), (15, 315)), ((45, 225), (60, 45)), ((60, 315), (45, 195))])
+def test_face_intensity_is_cosine_over_squared_distance(task1, sensor, light):
+    """Five pixels of the top face, each against the point of the face behind its centre, to 1e-4."""
+    picture = render.image(task1, sensor, light) - task1.camera.black_level
+    pose = np.array(sensor, float)
+    centre = np.rint(project(np.array([[6.25, 3.75, 2.5]]), pose, task1.camera)[0]).astype(int)
+    for pixel in centre + np.array([[0, 0], [6, 0], [-6, 0], [0, 6], [0, -6]]):
+        point = behind(task1, pose, pixel)
+        expected = brightness(task1, np.array([0, 0, 1.0]), point, light)
+        assert picture[tuple(pixel[::-1])] == pytest.approx(expected, rel=1e-4)
+        assert picture[tuple(pixel[::-1])] != pytest.approx(1.01 * expected, rel=1e-4)
+
+
+def test_darkness_is_the_black_level_and_a_face_behind_is_dark(task1):
+    picture = render.image(task1, (30, 90), (150, 90))
+    assert picture[0, 0] == task1.camera.black_level
+    top = np.rint(project(np.array([[6.0, 4.0, 2.5]]), np.array([30.0, 90.0]), task1.camera)[0]).astype(int)
+    assert picture[top[1], top[0]] == task1.camera.black_level
+
+
+@pytest.mark.parametrize("sensor", [(0, 0), (0, 37)])
+def test_camera_at_the_pole_against_the_exact_polygon(task1, sensor):
+    """Only the top face is seen; corrected for its shading, the image is the exact blurred polygon within 1 %."""
+    scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
+    picture = render.image(scene, sensor, (0, 0)) - scene.camera.black_level
+    corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
+    exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), picture.shape, 0.6, 180.0)
+    assert np.abs(picture - exact).max() < 0.01 * 180
+
+
+@pytest.mark.parametrize("sensor", [(0, 10), (12, 10), (31, 137)])
+def test_edges_lie_where_the_exact_image_has_them(task1, sensor):
+    """Noise-free distance in the render against that in the exact polygon image, light overhead and far: < 0.002 px."""
+    scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
+    rendered = render.image(scene, sensor, (0, 0)) - scene.camera.black_level
+    corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
+    exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), rendered.shape, 0.6, 180.0)
+    ours, oracle = (measure.distance(image, scene, sensor) for image in (rendered, exact))
+    assert abs(float(ours.value_px) - float(oracle.value_px)) < 0.002
+
+
+def test_same_seed_is_bit_identical(task1):
+    first, again = (render.image(task1, (30, 135), (15, 315)) for _ in range(2))
+    assert (first == again).all()
+
+
+def test_only_what_the_object_covers_is_rendered(task1):
+    rows, columns = window(task1, Pose(30, 135))
+    corners = project(task1.solid.vertices, np.array([30.0, 135.0]), task1.camera)
+    assert columns.start < corners[:, 0].min() - 4 * 0.6
+    assert rows.stop > corners[:, 1].max() + 4 * 0.6
+    assert (rows.stop - rows.start) * (columns.stop - columns.start) < 0.4 * 256 * 240
+
+
+def test_object_outside_the_image_is_darkness(task1):
+    camera = task1.camera.model_copy(update={"width": 16, "height": 16})
+    scene = task1.model_copy(update={"camera": camera, "object": task1.object})
+    away = scene.model_copy(update={"camera": camera.model_copy(update={"focal_px": 1e5, "width": 2, "height": 2})})
+    assert render.image(away, (30, 135), (15, 315)).shape == (2, 2)
+
+
+def test_bad_arguments(task1):
+    with pytest.raises(InvalidInput, match="samples must be a square number, got 5"):
+        render.Quality(samples=5)
+    with pytest.raises(InvalidInput, match="supersample must be at least 1, got 0"):
+        render.Quality(supersample=0)
+    glossy = task1.model_copy(update={"material": Material(specular_fraction=0.5, refractive_index=1.5)})
+    with pytest.raises(InvalidInput, match="material must be diffuse"):
+        render.image(glossy, (30, 135), (15, 315))

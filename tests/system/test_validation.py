@@ -1,0 +1,149 @@
+"""The batch job end to end, on a reduced Table 3: verdict, negative control, workers, resumption."""
+
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+
+import measure
+import render
+import scenes
+import validate
+from scenes import InvalidInput
+from validate.store import RunFile
+from validate.work import measure_chunk
+
+pytestmark = pytest.mark.render
+
+
+@pytest.fixture(scope="module")
+def few(task1):
+    """Four of the 16 settings, one a sensor position."""
+    return task1.model_copy(update={"settings": task1.settings[1::4]})
+
+
+@pytest.fixture(scope="module")
+def found(few, tmp_path_factory):
+    return validate.run(few, renders=500, seed=11, out=tmp_path_factory.mktemp("run"), workers=1)
+
+
+def test_predictions_agree(found):
+    assert found.verdict.agrees
+    assert found.verdict.rows == 4
+    for row in found.rows:
+        assert row.main.failed == 0
+        assert row.main.n == 500
+        assert row.bound < row.main.empirical
+        assert row.calibrated == pytest.approx(row.main.propagated, rel=0.05)
+        assert abs(row.main.bias) < 0.01
+
+
+def test_wrong_predictions_are_rejected_by_the_same_verdict(found):
+    """Negative control: predictions 1.3 x too large, 1.3 x too small, and nearly 0."""
+    counts = [row.main.n for row in found.rows]
+    for factor in (1.3, 1 / 1.3, 1e-6):
+        ratios = [row.main.empirical / (factor * row.main.propagated) for row in found.rows]
+        assert not validate.verdict(ratios, counts).agrees
+
+
+def test_independent_errors_would_be_rejected(found, few):
+    """What the paper assumes: edge points 1 px apart with independent errors. They are correlated over 3.5 px."""
+    correlation_length = 2 * np.sqrt(np.pi) * few.locator.scale_px
+    ratios = [correlation_length * row.main.empirical / row.calibrated for row in found.rows]
+    assert not validate.verdict(ratios, [row.main.n for row in found.rows]).agrees
+
+
+def test_json_document(found):
+    document = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    row = document["settings"][0]
+    assert {"sensor", "light", "paper_ice", "paper_real", "predicted", "empirical", "n", "failed", "ratio"} <= set(row)
+    assert {"ratio_interval", "bound", "status"} <= set(row)
+    assert set(row["predicted"]) == {"paper", "calibrated", "propagated"}
+    assert row["ratio"] == pytest.approx(row["empirical"] / row["predicted"]["propagated"])
+    assert {"scene", "seed", "settings", "correlation", "verdict", "seconds"} <= set(document)
+
+
+def numbers(result):
+    return [[judged.empirical for judged in (row.main, *row.classic)] for row in result.rows]
+
+
+def test_any_number_of_workers_gives_the_same_numbers(few, found, tmp_path):
+    again = validate.run(few, renders=500, seed=11, out=tmp_path, workers=2)
+    assert numbers(again) == numbers(found)
+
+
+def test_another_seed_gives_other_numbers(few, found, tmp_path):
+    one = few.model_copy(update={"settings": few.settings[:1]})
+    other = validate.run(one, renders=50, seed=12, out=tmp_path, workers=1)
+    assert other.rows[0].main.empirical != found.rows[0].main.empirical
+
+
+def test_interrupted_run_continues_with_the_same_numbers(few, found, tmp_path):
+    class Stop(Exception):
+        pass
+
+    def stop_midway(_what, done, total):
+        if done > total / 3:
+            raise Stop
+
+    with pytest.raises(Stop):
+        validate.run(few, renders=500, seed=11, out=tmp_path, workers=1, progress=stop_midway)
+    before = RunFile.reopen(tmp_path)
+    assert 0 < len(before.chunks()) < 8
+    before.close()
+    assert numbers(validate.run(few, renders=500, seed=11, out=tmp_path, workers=1)) == numbers(found)
+
+
+def test_directory_of_another_run_is_refused(few, tmp_path):
+    one = few.model_copy(update={"settings": few.settings[:1]})
+    validate.run(one, renders=20, seed=1, out=tmp_path, workers=1)
+    with pytest.raises(
+        InvalidInput, match=r"--out must be a new directory or hold this run, got .*, whose seed differ"
+    ):
+        validate.run(one, renders=20, seed=2, out=tmp_path, workers=1)
+    assert validate.run(one, renders=20, seed=2, out=tmp_path, workers=1, fresh=True).seed == 2
+
+
+def test_every_failed_measurement_is_a_row(task1, tmp_path):
+    """Exposure so low that canny's gradient threshold is reached only now and then."""
+    dim = task1.model_copy(update={
+        "camera": task1.camera.model_copy(update={"exposure": 40.0}), "settings": task1.settings[4:5], "same_scale": ()
+    })  # fmt: skip
+    result = validate.run(dim, renders=100, seed=3, out=tmp_path, workers=1)
+    strict, loose = result.rows[0].classic
+    assert strict.failed > 0
+    assert strict.failed >= loose.failed
+    db = sqlite3.connect(tmp_path / "run.sqlite")
+    stored = db.execute("SELECT COUNT(*) FROM failure WHERE method = ?", (strict.method,)).fetchone()[0]
+    db.close()
+    assert stored == strict.failed == sum(strict.failures.values())
+
+
+def test_partial_noise_gives_the_numbers_of_full_frames(few):
+    """The batch draws noise only where it is looked at; full frames measured directly give the same distances."""
+    setting = few.settings[0]
+    image = render.image(few, setting.sensor, setting.light)
+    chunk = measure_chunk(few, 0, image, 11, 0, 20)
+    rng = np.random.default_rng(np.random.SeedSequence(11, spawn_key=(0, 0, 0)))
+    full = measure.distance(render.expose(image, few.noise, rng, 20), few, setting.sensor)
+    assert (chunk.distances["gradient"] == full.value_px).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"renders": 1}, "renders must be at least 2, got 1"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
+        ({"workers": 0}, "workers must be at least 1, got 0"),
+    ],
+)
+def test_bad_arguments(few, tmp_path, arguments, line):
+    with pytest.raises(InvalidInput, match=line):
+        validate.run(few, out=tmp_path, **arguments)
+
+
+def test_scene_without_settings(tmp_path):
+    empty = scenes.load("task1").model_copy(update={"settings": ()})
+    with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
+        validate.run(empty, out=tmp_path)

@@ -1,0 +1,63 @@
+"""The choice of the renderer's variant, with libraries that are missing or broken."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from render import variant
+from scenes import InvalidInput
+
+
+@pytest.fixture(autouse=True)
+def _fresh(monkeypatch):
+    monkeypatch.delenv(variant.OVERRIDE, raising=False)
+    variant.choose.cache_clear()
+    yield
+    variant.choose.cache_clear()
+
+
+def test_missing_library_means_scalar(monkeypatch, tmp_path):
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "none.so"))
+    assert variant.choose() == variant.SCALAR
+
+
+def test_file_that_is_no_library_means_scalar(monkeypatch, tmp_path):
+    (tmp_path / "libLLVM.so").write_bytes(b"not a library")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM.so"))
+    assert variant.choose() == variant.SCALAR
+
+
+def test_library_that_aborts_the_process_means_scalar(monkeypatch):
+    """What LLVM 15 does: the probing process dies by a signal, and nothing of it reaches this one."""
+    monkeypatch.setattr(variant, "_PROBE", "import os; os.abort()")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/any")
+    assert variant.choose() == variant.SCALAR
+
+
+def test_newest_library_that_works_is_taken(monkeypatch):
+    monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+    monkeypatch.setattr(variant, "_candidates", lambda: ["/llvm/20", "/llvm/19", "/llvm/18"])
+    monkeypatch.setattr(variant, "_works", lambda library: library != "/llvm/20")
+    assert variant.choose() == variant.LLVM
+    assert os.environ.pop("DRJIT_LIBLLVM_PATH") == "/llvm/19"
+
+
+def test_releases_are_compared_as_numbers():
+    paths = ["/usr/lib/libLLVM-9.so.1", "/usr/lib/libLLVM.so.19.1", "/usr/lib/libLLVM-14.so"]
+    assert max(paths, key=variant._release) == "/usr/lib/libLLVM.so.19.1"
+
+
+def test_override(monkeypatch):
+    monkeypatch.setenv(variant.OVERRIDE, "anything")
+    assert variant.choose() == "anything"
+    with pytest.raises(InvalidInput, match=r"ICE_VARIANT must be one of scalar_rgb, .*, got 'anything'"):
+        variant.use("anything")
+
+
+def test_planner_and_measure_load_without_the_renderer():
+    code = "import sys, planner, measure; sys.exit('mitsuba' in sys.modules or 'drjit' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+    code = "import sys, planner; sys.exit('cv2' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -1,0 +1,37 @@
+"""Projection against an explicit pinhole, and poses at the poles."""
+
+import numpy as np
+import pytest
+
+from planner.view import depth, direction, facing, frame, project
+
+
+@pytest.mark.parametrize("pose", [(0, 0), (0, 130), (30, 90), (90, 200), (180, 45), (1e-9, 12)])
+def test_frame_is_orthonormal_and_right_handed(pose):
+    axes = np.stack(frame(np.array(pose, float)))
+    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_vertical_is_up_in_the_image(task1):
+    foot, head = project(np.array([[0.0, 0, 0], [0, 0, 1]]), np.array([60.0, 20.0]), task1.camera)
+    assert head[1] < foot[1]
+    assert head[0] == pytest.approx(foot[0])
+
+
+def test_projection_against_similar_triangles(task1):
+    """Sensor on the x axis, 100 cm away: a point at depth 90 cm, 2 cm to the right (y) and 3 cm up."""
+    (image,) = project(np.array([[10.0, 2.0, 3.0]]), np.array([90.0, 0.0]), task1.camera)
+    assert image == pytest.approx([127.5 + 800 * 2 / 90, 119.5 - 800 * 3 / 90])
+
+
+def test_behind_the_sensor_is_nan(task1):
+    assert np.isnan(project(np.array([[150.0, 0, 0]]), np.array([90.0, 0.0]), task1.camera)).all()
+
+
+def test_depth_and_facing(task1):
+    pose = np.array([30.0, 90.0])
+    assert depth(np.zeros((1, 3)), pose, task1.camera) == pytest.approx(100.0)
+    seen = facing(task1.solid, 100 * direction(pose))
+    names = ("top", "bottom", "front", "back", "left", "right")
+    assert [name for name, s in zip(names, seen, strict=True) if s] == ["top", "back"]
