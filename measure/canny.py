@@ -156,8 +156,11 @@ def _corners_of(x, y):
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - x0, y - y0
     return [
-    """Shift of the gradient's maximum along itself, px, its derivatives by three magnitudes, and the gradient."""
-    ]  # fmt: skip
+        (y0, x0, (1 - fy) * (1 - fx)),
+        (y0, x0 + 1, (1 - fy) * fx),
+        (y0 + 1, x0, fy * (1 - fx)),
+        (y0 + 1, x0 + 1, fy * fx),
+    ]
 
 
 def _bilinear(stack, which, x, y):
