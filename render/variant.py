@@ -11,6 +11,8 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from scenes import InvalidInput
@@ -60,18 +62,34 @@ def use(name: str):
     InvalidInput
         If this build of Mitsuba lacks the variant, or it cannot be activated here.
     """
-    import mitsuba
+    with _silent():
+        import mitsuba
 
     if name not in mitsuba.variants():
         raise InvalidInput(f"{OVERRIDE} must be one of {', '.join(mitsuba.variants())}, got {name!r}")
     try:
-        mitsuba.set_variant(name)
+        with _silent():
+            mitsuba.set_variant(name)
     except ImportError as error:
         raise InvalidInput(
             f"{OVERRIDE} must be a variant that works here, got {name!r} ({str(error).splitlines()[0]})"
         ) from None
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep the native libraries' remarks about a missing libLLVM off standard error; errors are raised all the same."""
+    sys.stderr.flush()
+    saved = os.dup(2)
+    with Path(os.devnull).open("wb") as sink:
+        os.dup2(sink.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
 
 
 def _candidates() -> list[str]:
