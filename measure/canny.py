@@ -9,9 +9,10 @@ import numpy as np
 from scipy import sparse
 
 from measure.frames import EdgeFrame
+from measure.layout import Optics
+from measure.lines import unit_covariance
 from measure.points import EdgePoints
-from planner.locator import edge_blur
-from scenes import Scene
+from planner.locator import edge_blur, kappa2
 
 _FIXED_POINT = 64  # Canny takes gradients as 16-bit integers: 1/64 grey level a pixel
 _TRUNCATE = 4
@@ -24,6 +25,10 @@ class CannyLocator:
     Attributes
     ----------
     frame : EdgeFrame
+    shape : tuple of int
+        Of the image.
+    scale, blur : float
+        Smoothing scale and the lens' blur, px.
     threshold : float
         Smallest gradient of an edge pixel, grey levels a pixel (no hysteresis: one threshold, as in the paper).
     rows, columns : slice
@@ -37,6 +42,9 @@ class CannyLocator:
     """
 
     frame: EdgeFrame
+    shape: tuple[int, int]
+    scale: float
+    blur: float
     threshold: float
     rows: slice
     columns: slice
@@ -46,9 +54,9 @@ class CannyLocator:
     gradient_to_contrast: float
 
     @classmethod
-    def of(cls, scene: Scene, frame: EdgeFrame, threshold: float) -> CannyLocator:
+    def of(cls, optics: Optics, frame: EdgeFrame, threshold: float) -> CannyLocator:
         """Prepare the locator of one edge."""
-        scale, window = scene.locator.scale_px, scene.locator.window_px
+        scale, window = optics.scale_px, optics.window_px
         x = np.arange(-int(np.ceil(_TRUNCATE * scale)), int(np.ceil(_TRUNCATE * scale)) + 1)
         gauss = np.exp(-(x**2) / (2 * scale**2))
         gauss /= gauss.sum()
@@ -56,13 +64,25 @@ class CannyLocator:
         margin = window + _TRUNCATE * scale + 2
         ends = frame.at(frame.stations[[0, -1]], np.zeros(2))
         low = np.maximum(np.floor(ends.min(0) - margin), 0).astype(int)
-        high = np.minimum(np.ceil(ends.max(0) + margin) + 1, [scene.camera.width, scene.camera.height]).astype(int)
+        high = np.minimum(np.ceil(ends.max(0) + margin) + 1, optics.shape[::-1]).astype(int)
         rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
         y, x = np.mgrid[rows, columns]
         along, offset = frame.coordinates(np.stack([x, y], -1))
         near = (np.abs(offset) <= window) & (along >= frame.stations[0] - 0.5) & (along <= frame.stations[-1] + 0.5)
-        total = np.hypot(scale, edge_blur(scene.camera.blur_px))
-        return cls(frame, threshold, rows, columns, near, gauss, derive, float(np.sqrt(2 * np.pi) * total))
+        total = np.hypot(scale, edge_blur(optics.blur_px))
+        return cls(
+            frame,
+            optics.shape,
+            scale,
+            optics.blur_px,
+            threshold,
+            rows,
+            columns,
+            near,
+            gauss,
+            derive,
+            float(np.sqrt(2 * np.pi) * total),
+        )
 
     def locate(self, images: np.ndarray, chosen: np.ndarray | None = None) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width).
@@ -82,7 +102,24 @@ class CannyLocator:
         along[which, slot], offset[which, slot] = self.frame.coordinates(points + [self.columns.start, self.rows.start])
         strength[which, slot], valid[which, slot] = peak, good
         contrast = self.gradient_to_contrast * (strength * valid).sum(1) / np.maximum(valid.sum(1), 1)
-        return EdgePoints(along, offset, valid, contrast)
+        rise = np.zeros(along.shape)
+        rise[which, slot] = np.sign(gx[which, y, x] * self.frame.normal[0] + gy[which, y, x] * self.frame.normal[1])
+        late = along > self.frame.stations.mean()
+        first, second = ((rise * valid * half).sum(1) for half in (~late, late))
+        return EdgePoints(along, offset, valid, contrast, first * second < 0)
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """Flat indices of the pixels that can change the result: the kernel, and what thinning and parabola look at."""
+        radius = len(self.smooth) // 2 + 2
+        around = cv2.dilate(np.pad(self.near, radius).astype(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8))
+        used = np.zeros(self.shape, bool)
+        used[self.rows, self.columns] = around[radius:-radius, radius:-radius]
+        return np.flatnonzero(used)
+
+    def unit_covariance(self) -> np.ndarray:
+        """Covariance of (mean offset, slope) for unit noise and unit contrast, (2, 2): the closed form of eq. 7."""
+        return kappa2(self.scale, self.blur) * unit_covariance(self.frame.stations, self.scale)
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width).

@@ -1,17 +1,21 @@
-"""Corners where two lines cross, the distance between them, and the derivatives of both."""
+"""Corners where two lines cross, and the derivative of a corner by its lines."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from measure.frames import EdgeFrame
-from measure.lines import Lines
 
 
-def line_equation(frame: EdgeFrame, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals (n, 2) and a point (n, 2) of lines, in image coordinates."""
-    sine, cosine = np.sin(lines.tilt)[:, None], np.cos(lines.tilt)[:, None]
-    return cosine * frame.normal - sine * frame.direction, frame.at(lines.mean_along, lines.mean_offset)
+def line_equations(
+    frames: tuple[EdgeFrame, ...], level: np.ndarray, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals and a point of each line, in image coordinates, both (n, E, 2)."""
+    normals, directions, origins = (
+        np.stack([getattr(f, name) for f in frames]) for name in ("normal", "direction", "origin")
+    )
+    tilted = normals - slope[..., None] * directions
+    return tilted / np.hypot(1, slope)[..., None], origins + level[..., None] * normals
 
 
 def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -25,9 +29,9 @@ def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.n
     Returns
     -------
     corner : ndarray, shape (n, 2)
-        Relative to the first point the system is solved, so a corner far from the image's origin loses no digits.
+        Solved relative to the first point, so a corner far from the image's origin loses no digits; NaN for parallels.
     sine : ndarray, shape (n,)
-        Sine of the angle between the lines; 0 for parallel ones, whose corner is NaN.
+        Sine of the angle between the lines, 0 to 1.
     """
     (a1, b1), (a2, b2) = np.moveaxis(normals[:, 0], -1, 0), np.moveaxis(normals[:, 1], -1, 0)
     sine = a1 * b2 - a2 * b1
@@ -37,15 +41,18 @@ def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.n
     return points[:, 0] + step[:, None] * np.stack([-b1, a1], -1), np.abs(sine)
 
 
-def corner_response(frames: tuple[EdgeFrame, EdgeFrame], alongs: np.ndarray, corner: np.ndarray) -> np.ndarray:
-    """Derivative of the corner by (mean offset, slope) of its first line, then of its second, shape (2, 4).
+def corner_response(frames: tuple[EdgeFrame, ...], pair: tuple[int, int]) -> np.ndarray:
+    """Derivative of the expected corner of two edges by (level, slope) of all E edges, shape (2, 2 E).
 
-    Parameters
-    ----------
-    alongs : ndarray, shape (2,)
-        Mean place of the points along each edge.
-    corner : ndarray, shape (2,)
+    Infinite if the two expected edges are parallel.
     """
-    inverse = np.linalg.inv(np.stack([frame.normal for frame in frames]))
-    levers = [frame.coordinates(corner)[0] - along for frame, along in zip(frames, alongs, strict=True)]
-    return np.stack([inverse[:, 0], inverse[:, 0] * levers[0], inverse[:, 1], inverse[:, 1] * levers[1]], -1)
+    first, second = frames[pair[0]], frames[pair[1]]
+    whole = np.zeros((2, 2 * len(frames)))
+    (corner,), (sine,) = intersect(np.stack([[first.normal, second.normal]]), np.stack([[first.origin, second.origin]]))
+    if sine < 1e-9:
+        return np.full(whole.shape, np.inf)
+    inverse = np.linalg.inv(np.stack([first.normal, second.normal]))
+    for row, e in enumerate(pair):
+        whole[:, 2 * e] = inverse[:, row]
+        whole[:, 2 * e + 1] = inverse[:, row] * frames[e].coordinates(corner)[0]
+    return whole

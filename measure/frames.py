@@ -1,4 +1,4 @@
-"""Where each required edge is expected in the image, and where along it edge points are sought."""
+"""Coordinates along and across one expected edge, and the part of it where edge points are sought."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure import status
-from planner.locator import reach
-from planner.outline import Outline, outline
-from planner.view import direction, facing, project
-from scenes import Pose, Scene
+from measure.layout import Layout
 
-_MIN_POINTS = 3
+MIN_STATIONS = 3
 
 
 @dataclass(frozen=True)
@@ -26,9 +23,11 @@ class EdgeFrame:
     name : str
     origin, direction : ndarray, shape (2,)
         Start of the edge's image, px, and its unit direction t.
+    length : float
+        Length of the edge's image, px.
     stations : ndarray, shape (m,)
-        Places along the edge, 1 px apart, where an edge point is sought; the trimmed corners and what lies outside
-        the image are left out.
+        Places along the edge, 1 px apart, where it can be measured: the trimmed corners and what lies outside the
+        image are left out.
     status : str
         ``ok``, ``clutter``, ``short`` or ``not_visible``, as far as geometry alone tells.
     """
@@ -36,6 +35,7 @@ class EdgeFrame:
     name: str
     origin: np.ndarray
     direction: np.ndarray
+    length: float
     stations: np.ndarray
     status: str
 
@@ -53,54 +53,56 @@ class EdgeFrame:
         return away @ self.direction, away @ self.normal
 
 
-def edge_frames(scene: Scene, sensor: Pose) -> tuple[EdgeFrame, ...]:
-    """A frame for each of the task's edges, in the order of `Task.edges`."""
-    view = outline(scene, np.array(list(sensor)))
-    return tuple(_frame(scene, sensor, view, i) for i in range(len(view.names)))
+def edge_frames(layout: Layout, clear: float, margin: float) -> tuple[EdgeFrame, ...]:
+    """A frame for each edge of a layout.
+
+    Parameters
+    ----------
+    layout : Layout
+    clear : float
+        How far every other edge must be from the part that is used, px.
+    margin : float
+        How far from the image's border a station must be, px.
+    """
+    return tuple(_frame(layout, i, clear, margin) for i in range(len(layout.names)))
 
 
-def _frame(scene: Scene, sensor: Pose, view: Outline, i: int) -> EdgeFrame:
-    start, stop = view.ends[i]
-    length = float(view.lengths[i])
-    if not view.visible[i] or not length > 0:
-        return EdgeFrame(view.names[i], np.zeros(2), np.array([1.0, 0.0]), np.empty(0), status.NOT_VISIBLE)
+def _frame(layout: Layout, i: int, clear: float, margin: float) -> EdgeFrame:
+    start, stop = layout.ends[i]
+    length = float(np.linalg.norm(stop - start))
+    if not layout.visible[i] or not length > 0:
+        return EdgeFrame(layout.names[i], np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0), status.NOT_VISIBLE)
     along = (stop - start) / length
-    first, last = view.trims[i, 0], length - view.trims[i, 1]
+    first = trim(along, layout.beside[i][0], clear)
+    last = length - trim(-along, layout.beside[i][1], clear)
     stations = first + (last - first) % 1 / 2 + np.arange(int(last - first) + 1) if last > first else np.empty(0)
-    inside = _inside(scene, start + stations[:, None] * along)
-    if stations.size >= _MIN_POINTS and inside.sum() < _MIN_POINTS:
-        state = status.NOT_VISIBLE
-    elif stations.size < _MIN_POINTS:
+    places = start + stations[:, None] * along
+    size = np.array(layout.optics.shape[::-1])
+    inside = ((places >= margin) & (places <= size - 1 - margin)).all(-1)
+    if stations.size < MIN_STATIONS:
         state = status.SHORT
+    elif inside.sum() < MIN_STATIONS:
+        state = status.NOT_VISIBLE
     else:
-        state = status.CLUTTER if _crowded(scene, sensor, view.names[i], start, stop, view.trims[i]) else status.OK
-    return EdgeFrame(view.names[i], start, along, stations[inside], state)
+        crowded = any(distance_to_segment(places[inside], *other).min() < clear for other in layout.apart[i])
+        state = status.CLUTTER if crowded else status.OK
+    return EdgeFrame(layout.names[i], start, along, length, stations[inside], state)
 
 
-def _inside(scene: Scene, points: np.ndarray) -> np.ndarray:
-    """Which points have their whole search window and smoothing kernel within the image."""
-    margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
-    size = np.array([scene.camera.width, scene.camera.height])
-    return ((points >= margin) & (points <= size - 1 - margin)).all(-1)
+def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:
+    """Length to leave out at an edge's end so that every edge that starts there is ``clear`` px away.
+
+    clear / sin(angle) for an edge that turns towards this one, ``clear`` itself for one that turns away.
+    """
+    cosine, sine = beside @ along, np.abs(beside @ np.array([-along[1], along[0]]))
+    towards = cosine > 0
+    if not towards.any():
+        return clear
+    return float(np.max(clear / np.maximum(sine[towards], 1e-12)))
 
 
-def _crowded(scene: Scene, sensor: Pose, name: str, start: np.ndarray, stop: np.ndarray, trims: np.ndarray) -> bool:
-    """Whether another visible edge that does not share a corner comes too near to the part that is used."""
-    solid, pose = scene.solid, np.array(list(sensor))
-    seen = facing(solid, scene.camera.distance * direction(pose))
-    corners = project(solid.vertices, pose, scene.camera)
-    edge = solid.edge(name)
-    length = np.linalg.norm(stop - start)
-    used = start + np.linspace(trims[0], length - trims[1], 33)[:, None] * (stop - start) / length
-    limit = reach(scene.locator.scale_px, scene.camera.blur_px)
-    return any(
-        _distance_to_segment(used, *corners[list(other.ends)]).min() < limit
-        for other in solid.edges
-        if not set(other.ends) & set(edge.ends) and seen[list(other.faces)].any()
-    )
-
-
-def _distance_to_segment(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+def distance_to_segment(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """Distance of points (..., 2) from a segment, px."""
     along = stop - start
     fraction = np.clip((points - start) @ along / max(float(along @ along), np.finfo(float).tiny), 0, 1)
-    return np.linalg.norm(points - start - fraction[:, None] * along, axis=1)
+    return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)

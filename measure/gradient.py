@@ -12,9 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from measure.frames import EdgeFrame
+from measure.layout import Optics
+from measure.lines import regression
 from measure.points import EdgePoints
 from planner.locator import edge_blur
-from scenes import Scene
 
 STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the kernel ends
@@ -44,19 +45,21 @@ class GradientLocator:
     slope_to_contrast: float
 
     @classmethod
-    def of(cls, scene: Scene, frame: EdgeFrame) -> GradientLocator:
+    def of(cls, optics: Optics, frame: EdgeFrame) -> GradientLocator:
         """Prepare the locator of one edge."""
-        scale, half = scene.locator.scale_px, int(np.ceil(scene.locator.window_px / STEP))
+        scale, half = optics.scale_px, int(np.ceil(optics.window_px / STEP))
         offsets = STEP * np.arange(-half, half + 1)
         places = frame.at(np.repeat(frame.stations, offsets.size), np.tile(offsets, frame.stations.size))
-        kernel = second_derivative(places, frame.normal, scale, (scene.camera.height, scene.camera.width))
+        kernel = second_derivative(places, frame.normal, scale, optics.shape)
         pixels = np.unique(kernel.indices)
-        total = np.hypot(scale, edge_blur(scene.camera.blur_px))
+        total = np.hypot(scale, edge_blur(optics.blur_px))
         return cls(frame, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
 
     def locate(self, images: np.ndarray) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width)."""
         profiles = self._profiles(images)
+        turned = _reversed(profiles)
+        profiles *= _polarity(profiles)
         crossing, start, found = _bracket(profiles)
         offset, slope = _refine(profiles, crossing, start)
         valid = found & (np.abs(offset - start) < 1)
@@ -64,17 +67,28 @@ class GradientLocator:
         slope = np.where(valid, -slope / STEP, 0.0)
         contrast = self.slope_to_contrast * slope.sum(0) / np.maximum(valid.sum(0), 1)
         along = np.broadcast_to(self.frame.stations, (images.shape[0], self.frame.stations.size))
-        return EdgePoints(along, offset.T, valid.T, contrast)
+        return EdgePoints(along, offset.T, valid.T, contrast, turned)
+
+    def unit_covariance(self) -> np.ndarray:
+        """Covariance of (mean offset, slope) for unit noise and unit contrast, (2, 2).
+
+        The offsets are the second derivative's noise at the crossing over its slope; neighbours share pixels.
+        """
+        centre = self.kernel[self.offsets.size // 2 :: self.offsets.size]
+        response = self.slope_to_contrast * (centre.T @ regression(self.frame.stations).T)
+        return response.T @ response
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
         profiles = self._profiles(clean[None])
+        polarity = _polarity(profiles)
+        profiles *= polarity
         crossing, start, _ = _bracket(profiles)
         root, slope = _refine(profiles, crossing, start)
         weights = _cubic_weights(root - crossing)
         rows = np.arange(crossing.shape[0])[:, None]
         columns = rows * self.offsets.size + crossing[:, :1] + np.arange(-1, 3)
-        values = -STEP * weights[:, 0] / slope[:, :1] * _polarity(profiles)[0]
+        values = -STEP * weights[:, 0] / slope[:, :1] * polarity[0]
         pick = sparse.csr_array(
             (values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0])
         )
@@ -110,15 +124,27 @@ def second_derivative(places: np.ndarray, normal: np.ndarray, scale: float, shap
 
 def _polarity(profiles: np.ndarray) -> np.ndarray:
     """+1 where the image brightens along the normal, else -1; one sign an image, shape (n,)."""
+    return np.where(_rise(profiles).sum(0) >= 0, 1.0, -1.0)
+
+
+def _rise(profiles: np.ndarray) -> np.ndarray:
+    """How much the image brightens along the normal at each station, (m, n)."""
     half = profiles.shape[1] // 2
-    return np.where(profiles[:, :half].sum((0, 1)) >= profiles[:, half + 1 :].sum((0, 1)), 1.0, -1.0)
+    return profiles[:, :half].sum(1) - profiles[:, half + 1 :].sum(1)
 
 
-def _bracket(profiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _reversed(profiles: np.ndarray) -> np.ndarray:
+    """Whether the two halves of the edge brighten in opposite directions, each as clearly as the other, (n,)."""
+    rise = _rise(profiles)
+    first, second = (part.mean(0) for part in np.array_split(rise, 2))
+    noise = np.abs(np.diff(rise, axis=0)).mean(0)
+    return (first * second < 0) & (np.minimum(np.abs(first), np.abs(second)) > 2 * noise)
+
+
+def _bracket(signed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Steepest descent through zero: left index, first estimate (in steps) and whether there is one; shape (m, n)."""
-    signed = profiles * _polarity(profiles)
     left, right = signed[:, 1:-2], signed[:, 2:-1]
-    fall = np.where((left >= 0) & (right < 0), left - right, 0.0)
+    fall = (left - right) * ((left >= 0) & (right < 0))
     best = fall.argmax(1)
     here = np.take_along_axis(left, best[:, None], 1)[:, 0]
     drop = np.take_along_axis(fall, best[:, None], 1)[:, 0]
@@ -126,9 +152,8 @@ def _bracket(profiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return best + 1, best + 1 + np.where(found, here / np.where(found, drop, 1), 0), found
 
 
-def _refine(profiles: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _refine(signed: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root (in steps) of the cubic through the four values around the crossing, and its slope there; shape (m, n)."""
-    signed = profiles * _polarity(profiles)
     values = np.stack([np.take_along_axis(signed, crossing[:, None] + k, 1)[:, 0] for k in (-1, 0, 1, 2)])
     c0 = values[1]
     c1 = -values[0] / 3 - values[1] / 2 + values[2] - values[3] / 6

@@ -18,9 +18,12 @@ class EdgePoints(NamedTuple):
         Which of them were found.
     contrast : ndarray, shape (n,)
         Mean contrast of the edge as the locator saw it, grey levels.
+    reversed : ndarray of bool, shape (n,)
+        Whether the contrast of the edge's second half has the other sign than that of its first.
     """
 
     along: np.ndarray
     offset: np.ndarray
     valid: np.ndarray
     contrast: np.ndarray
+    reversed: np.ndarray

@@ -1,4 +1,4 @@
-"""The sharpest prediction: the locator's linear response on the noise-free image."""
+"""The sharpest prediction: the estimator's linear response on the noise-free image."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from measure import status
 from measure.corners import corner_response
-from measure.distance import distance, prepare
-from measure.lines import regression
+from measure.distance import distance, separation
+from measure.layout import layout_of
+from measure.shape import prepared
 from scenes import Scene
 
 
@@ -44,47 +44,35 @@ def propagate(
     scene: Scene,
     sensor: Any,
     light: Any = None,
-    locator: str = "gradient",
+    estimator: str = "gradient",
     threshold: float | None = None,
 ) -> Propagated:
-    """Propagate pixel noise through edge points, lines and corners to the distance.
+    """Propagate pixel noise through lines and corners to the distance.
 
-    On the noise-free image the offset of each edge point is linear in small noise, and so is all that follows. With g
-    the derivative of the distance by the pixels, its variance is the noise variance times the sum of g^2; neighbouring
-    points share pixels, and so their correlation is in g.
+    On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of the
+    distance by the pixels, its variance is the noise variance times the sum of g^2; neighbouring edge points share
+    pixels, and so their correlation is in g.
 
     Parameters
     ----------
     clean : ndarray, shape (height, width)
         Noise-free image, grey levels.
-    scene, sensor, light, locator, threshold
+    scene, sensor, light, estimator, threshold
         As for `measure.distance`.
     """
     clean = np.asarray(clean, float)
-    found = distance(clean, scene, sensor, light, locator, threshold)
+    found = distance(clean, scene, sensor, light, estimator, threshold)
     if str(found.status) not in status.MEASURED:
-        shape = np.full((4, 4), np.inf), np.zeros(clean.shape)
-        return Propagated(float("nan"), float("inf"), *shape, str(found.status))
-    edges = prepare(scene, scene.check_pose("sensor", sensor), locator, threshold)
-    responses, alongs = zip(*(_line_response(edge[1], clean) for edge in edges), strict=True)
-    corners = [
-        corner_response((edges[k][0], edges[k + 1][0]), np.array(alongs[k : k + 2]), found.corners[k // 2])
-        @ np.vstack(responses[k : k + 2])
-        for k in (0, 2)
-    ]
-    ends = np.vstack(corners)
-    unit = (found.corners[1] - found.corners[0]) / float(found.value_px)
-    g = np.concatenate([-unit, unit]) @ ends
+        nothing = np.full((4, 4), np.inf), np.zeros(clean.shape)
+        return Propagated(float("nan"), float("inf"), *nothing, str(found.status))
+    light = None if light is None else scene.check_pose("light", light)
+    layout = layout_of(scene, scene.check_pose("sensor", sensor), light)
+    tool = prepared(layout, estimator, scene.locator.thresholds[0] if threshold is None else threshold)
+    response = np.concatenate([corner_response(tool.frames, pair) for pair in layout.corners])
+    ends = response @ tool.respond(clean).lines
+    _, gradient = separation(found.corners[None])
+    g = gradient[0] @ ends
     noise = scene.noise.variance
     return Propagated(
         float(found.value_px), float(noise * (g @ g)), noise * ends @ ends.T, g.reshape(clean.shape), str(found.status)
     )
-
-
-def _line_response(locator, clean: np.ndarray) -> tuple[np.ndarray, float]:
-    """Derivative of (mean offset, slope) by the pixels, (2, pixels), and the points' mean place along the edge."""
-    points, response = locator.linear_response(clean)
-    keep = points.valid[0]
-    along = points.along[0][: response.shape[0]][keep[: response.shape[0]]]
-    response = sparse.csr_array(response)[np.flatnonzero(keep[: response.shape[0]])]
-    return (response.T @ regression(along).T).T, float(along.mean())

@@ -3,12 +3,13 @@
 OK = "ok"
 CLUTTER = "clutter"  # a second edge is too near: the value may be biased
 SHORT = "short"  # too little of an edge is left to fit a line
-LOW_CONTRAST = "low_contrast"  # too few edge points stand out of the noise
+LOW_CONTRAST = "low_contrast"  # too little of the edge stands out of the noise
+SIGN_CHANGE = "sign_change"  # the contrast changes sign along the edge
 NOT_VISIBLE = "not_visible"  # hidden, or outside the image
 ILL_CONDITIONED = "ill_conditioned"  # the lines of a corner are nearly parallel
 
 MEASURED = (OK, CLUTTER)
-_WORST_FIRST = (NOT_VISIBLE, SHORT, LOW_CONTRAST, ILL_CONDITIONED, CLUTTER, OK)
+_WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, CLUTTER, OK)
 
 
 def worst(*statuses: str) -> str:

@@ -6,9 +6,11 @@ import pytest
 import measure
 import scenes
 from measure import status
-from measure.distance import prepare
+from measure.corners import intersect, line_equations
+from measure.layout import layout_of
 from measure.lines import fit_lines, regression
 from measure.points import EdgePoints
+from measure.shape import prepared
 from planner.view import project
 from scenes import InvalidInput, Noise
 from tests.oracle import polygon_image
@@ -29,34 +31,36 @@ def true_distance(corners):
 
 
 @pytest.mark.parametrize("sensor", [(20, 100), (31.3, 137.1), (45, 222.2), (12, 10), (52, 300), (0, 0)])
-@pytest.mark.parametrize(("locator", "tolerance"), [("gradient", 0.006), ("canny", 0.05)])
-def test_distance_at_subpixel_positions(task1, sensor, locator, tolerance):
+@pytest.mark.parametrize(
+    ("estimator", "tolerance"), [("gradient", 0.006), ("canny", 0.05), ("strip", 1e-3), ("polygon", 1e-3)]
+)
+def test_distance_at_subpixel_positions(task1, sensor, estimator, tolerance):
     """Noise-free error of the distance at edge positions and angles that fall anywhere between pixels."""
     image, corners = picture(task1, sensor)
-    found = measure.distance(image, task1, sensor, locator=locator)
+    found = measure.distance(image, task1, sensor, estimator=estimator)
     assert found.status in status.MEASURED
     assert abs(found.value_px - true_distance(corners)) < tolerance
     assert np.abs(found.corners - corners[[1, 3]]).max() < tolerance
 
 
-@pytest.mark.parametrize(("locator", "tolerance"), [("gradient", 2e-3), ("canny", 5e-2)])
-def test_linear_response_against_central_differences(task1, locator, tolerance):
+@pytest.mark.parametrize(("estimator", "tolerance"), [("gradient", 2e-3), ("canny", 5e-2)])
+def test_linear_response_against_central_differences(task1, estimator, tolerance):
     """d(distance)/d(pixel) at the 12 pixels where it is largest; for canny the turn of the gradient is left out."""
     image, _ = picture(task1, (31.3, 137.1))
-    response = measure.propagate(image, task1, (31.3, 137.1), locator=locator).response
+    response = measure.propagate(image, task1, (31.3, 137.1), estimator=estimator).response
     for index in np.argsort(-np.abs(response), axis=None)[:12]:
         changed = np.stack([image, image])
         changed.reshape(2, -1)[:, index] += 0.05, -0.05
-        up, down = measure.distance(changed, task1, (31.3, 137.1), locator=locator).value_px
+        up, down = measure.distance(changed, task1, (31.3, 137.1), estimator=estimator).value_px
         assert (up - down) / 0.1 == pytest.approx(response.flat[index], rel=tolerance)
 
 
-def sample_variance(scene, image, sensor, locator, rng, count=2000):
+def sample_variance(scene, image, sensor, estimator, rng, count=2000):
     """Sample variance of the distance, batch by batch; the mean variance that the images themselves tell."""
     values, told = [], []
     for _ in range(count // 50):
         noisy = image + scene.noise.sigma * rng.standard_normal((50, *image.shape))
-        found = measure.distance(noisy, scene, sensor, locator=locator)
+        found = measure.distance(noisy, scene, sensor, estimator=estimator)
         values.append(found.value_px)
         told.append(found.variance_px2)
     return np.concatenate(values).var(ddof=1), np.concatenate(told).mean()
@@ -89,27 +93,26 @@ def test_canny_deviates_because_it_chooses_pixels(quiet, rng):
     Sensor (30, 135), where the table shows the largest deviation. 2000 images, standard error 3.2 %.
     """
     image, _ = picture(quiet, SENSOR)
-    predicted = measure.propagate(image, quiet, SENSOR, locator="canny").variance_px2
+    predicted = measure.propagate(image, quiet, SENSOR, estimator="canny").variance_px2
     free, _ = sample_variance(quiet, image, SENSOR, "canny", np.random.default_rng(5))
     frozen = []
-    edges = prepare(quiet, scenes.Pose(*SENSOR), "canny", None)
-    masks = [edge.edge_pixels(*edge.gradient(image)) for _, edge in edges]
+    tool = prepared(layout_of(quiet, scenes.Pose(*SENSOR)), "canny", 12.0)
+    canny = [part.locator for part in tool.parts]
+    masks = [edge.edge_pixels(*edge.gradient(image)) for edge in canny]
     for _ in range(40):
         noisy = image + quiet.noise.sigma * rng.standard_normal((50, *image.shape))
-        lines = [fit_lines(edge.locate(noisy, mask)) for (_, edge), mask in zip(edges, masks, strict=True)]
-        frozen.append(_distances([frame for frame, _ in edges], lines))
+        lines = [fit_lines(edge.locate(noisy, mask)) for edge, mask in zip(canny, masks, strict=True)]
+        frozen.append(_distances(tool.frames, lines))
     ratio = np.concatenate(frozen).var(ddof=1) / predicted
     assert abs(ratio - 1) < 4 * np.sqrt(2 / 1999)
     assert free / predicted > 1 + 4 * np.sqrt(2 / 1999)
 
 
 def _distances(frames, lines):
-    from measure.corners import intersect, line_equation
-
-    ends = []
-    for k in (0, 2):
-        equations = [line_equation(*pair) for pair in zip(frames[k : k + 2], lines[k : k + 2], strict=True)]
-        ends.append(intersect(*(np.stack([e[i] for e in equations], 1) for i in (0, 1)))[0])
+    slope = np.stack([np.tan(line.tilt) for line in lines], 1)
+    level = np.stack([line.mean_offset for line in lines], 1) - slope * np.stack([line.mean_along for line in lines], 1)
+    normals, points = line_equations(frames, level, slope)
+    ends = [intersect(normals[:, k : k + 2], points[:, k : k + 2])[0] for k in (0, 2)]
     return np.linalg.norm(ends[1] - ends[0], axis=-1)
 
 
@@ -123,19 +126,20 @@ def test_stack_and_single_image_agree(task1):
 
 
 def test_footprint_holds_every_pixel_that_matters(task1, rng):
-    """Changing all other pixels changes nothing, for both locators."""
+    """Changing all other pixels changes nothing, for every estimator."""
     image, _ = picture(task1, SENSOR)
     image = image + rng.standard_normal(image.shape)
-    outside = np.where(measure.footprint(task1, SENSOR), 0, 40 * rng.standard_normal(image.shape))
-    for locator in measure.LOCATORS:
-        assert measure.distance(image + outside, task1, SENSOR, locator=locator).value_px == pytest.approx(
-            float(measure.distance(image, task1, SENSOR, locator=locator).value_px), abs=1e-9
+    looked_at = measure.footprint(task1, SENSOR, None, measure.ESTIMATORS)
+    outside = np.where(looked_at, 0, 40 * rng.standard_normal(image.shape))
+    for estimator in measure.ESTIMATORS:
+        assert measure.distance(image + outside, task1, SENSOR, estimator=estimator).value_px == pytest.approx(
+            float(measure.distance(image, task1, SENSOR, estimator=estimator).value_px), abs=1e-9
         )
 
 
-@pytest.mark.parametrize("locator", ["gradient", "canny"])
-def test_black_image_is_low_contrast(task1, locator):
-    found = measure.distance(np.zeros((240, 256)), task1, SENSOR, locator=locator)
+@pytest.mark.parametrize("estimator", measure.ESTIMATORS)
+def test_black_image_is_low_contrast(task1, estimator):
+    found = measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator=estimator)
     assert found.status == status.LOW_CONTRAST
     assert np.isnan(found.value_px)
     assert np.isinf(found.variance_px2)
@@ -167,15 +171,15 @@ def test_bad_image(task1, image, line):
 
 
 def test_bad_locator(task1):
-    with pytest.raises(InvalidInput, match="locator must be one of gradient, canny, got 'sobel'"):
-        measure.distance(np.zeros((240, 256)), task1, SENSOR, locator="sobel")
+    with pytest.raises(InvalidInput, match="estimator must be one of canny, gradient, strip, polygon, got 'sobel'"):
+        measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="sobel")
     with pytest.raises(InvalidInput, match="threshold must be greater than 0, got -1"):
-        measure.distance(np.zeros((240, 256)), task1, SENSOR, locator="canny", threshold=-1)
+        measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="canny", threshold=-1)
 
 
 def test_lines_of_exact_points():
     along = np.linspace(0, 30, 31)[None]
-    points = EdgePoints(along, 0.3 + 0.02 * along, np.ones((1, 31), bool), np.ones(1))
+    points = EdgePoints(along, 0.3 + 0.02 * along, np.ones((1, 31), bool), np.ones(1), np.zeros(1, bool))
     lines = fit_lines(points)
     assert np.tan(lines.tilt) == pytest.approx(0.02)
     assert regression(along[0]) @ points.offset[0] == pytest.approx([float(lines.mean_offset[0]), 0.02])

@@ -50,14 +50,14 @@ def measure_command(
     scene: SceneName,
     sensor: Sensor,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; not needed to measure.")] = None,
-    locator: Annotated[str, typer.Option(help=" or ".join(measure.LOCATORS))] = "gradient",
+    estimator: Annotated[str, typer.Option(help=" or ".join(measure.ESTIMATORS))] = "gradient",
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure the scene's distance in an image. Exit status 1 if it cannot be measured."""
     loaded = scenes.load(scene)
     poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
-    found = measure.distance(picture_file.read(file), loaded, *poses, locator, threshold)
+    found = measure.distance(picture_file.read(file), loaded, *poses, estimator, threshold)
     good = bool(np.isfinite(found.value_px))
     facts = {
         "file": str(file),
@@ -69,7 +69,7 @@ def measure_command(
             {
                 "name": name,
                 "status": str(found.edge_status[i]),
-                "points": int(found.edge_points[i]),
+                "points": int(found.used[i]),
                 "contrast": float(found.edge_contrast[i]),
             }
             for i, name in enumerate(found.edge_names)

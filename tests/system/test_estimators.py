@@ -1,0 +1,170 @@
+"""The estimators against the Cramer-Rao bound, their own prediction, a wrong pose, and the hard cases."""
+
+import numpy as np
+import pytest
+
+import measure
+from measure import status
+from measure.estimators import ESTIMATORS
+from measure.layout import Optics, layout_of, polygon_layout
+from measure.shape import find_shape, prepared
+from scenes import Pose
+from tests.benchmarks.estimators import SHAPE, random_block, rectangle, trial, worst_bias
+from tests.oracle import polygon_image
+
+
+@pytest.mark.parametrize(
+    ("size", "ratio", "limit"),
+    [((100, 60), 5, 1.10), ((100, 60), 20, 1.10), ((100, 60), 200, 1.10), ((40, 40), 20, 1.25), ((15, 15), 20, 1.25)],
+)
+def test_polygon_reaches_the_bound(rng, size, ratio, limit):
+    """Predicted and empirical variance over the bound; 1500 images, standard error 3.7 %."""
+    done = trial(rectangle(*size, 22), "polygon", ratio, 1500, rng)
+    within = 4 * np.sqrt(2 / 1499)
+    assert done.failed == 0
+    assert 0.98 < done.predicted / done.bound < limit
+    assert abs(done.empirical / done.predicted - 1) < within
+    assert abs(1.3 * done.empirical / done.predicted - 1) > within
+    assert done.empirical / done.bound > 1 - within
+
+
+@pytest.mark.parametrize("degrees", [0, 22, 45])
+def test_strip_comes_within_1_6_of_the_bound(rng, degrees):
+    done = trial(rectangle(100, 60, degrees), "strip", 20, 1000, rng)
+    assert 1 < done.predicted / done.bound < 1.6
+    assert abs(done.empirical / done.predicted - 1) < 4 * np.sqrt(2 / 999)
+
+
+@pytest.mark.parametrize(("estimator", "limit"), [("strip", 1e-3), ("polygon", 1e-3), ("gradient", 0.02)])
+def test_noise_free_bias(estimator, limit):
+    assert worst_bias(estimator, 2) < limit
+
+
+@pytest.mark.parametrize("estimator", ["gradient", "strip", "polygon"])
+def test_prediction_holds_on_random_perspective_blocks(rng, estimator):
+    """10 blocks, blurs 0.5 to 1 px, contrast/noise 10 to 100; 400 images each: standard error of the mean 2.2 %."""
+    ratios = []
+    for _ in range(10):
+        done = trial(random_block(rng), estimator, rng.uniform(10, 100), 400, rng, rng.uniform(0.5, 1.0))
+        ratios.append(done.empirical / done.predicted)
+    assert abs(np.mean(ratios) - 1) < 0.05 + 2 * np.sqrt(2 / 399 / 10)
+    assert np.std(ratios) < 2 * np.sqrt(2 / 399)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(("shift", "turn"), [((3, 0), 0), ((-2.1, 1.7), 1), ((0.5, 0.5), -1), ((0, -3), 0)])
+def test_wrong_pose_is_absorbed(task1, estimator, shift, turn):
+    """Edges sought up to 3 px and 1 degree away from where they are: the same corners to a hundredth of a pixel."""
+    layout = layout_of(task1, Pose(31.3, 137.1), Pose(15, 315))
+    corners = np.array([layout.ends[0, 1], layout.ends[0, 0], layout.ends[1, 1], layout.ends[2, 0]])
+    image = polygon_image(corners, layout.optics.shape, 0.6, 150.0)[None]
+    here, there = (find_shape(image, where, estimator) for where in (layout, layout.moved(shift, np.radians(turn))))
+    assert there.status[0] in status.MEASURED
+    assert np.abs(there.corners - here.corners).max() < (0.001 if estimator in ("strip", "polygon") else 0.01)
+
+
+def test_each_image_is_measured_by_itself(rng):
+    """A stack in which every image is shifted otherwise gives what each image gives alone."""
+    corners = rectangle(100, 60, 22)
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    images = np.stack([polygon_image(corners + rng.uniform(-2.5, 2.5, 2), SHAPE, 0.7, 80.0) for _ in range(8)])
+    images += 2 * rng.standard_normal(images.shape)
+    for estimator in ESTIMATORS:
+        together = find_shape(images, layout, estimator).corners
+        alone = np.concatenate([find_shape(image[None], layout, estimator).corners for image in images])
+        assert together == pytest.approx(alone, abs=1e-9, nan_ok=True)
+        assert np.isfinite(together).all()
+
+
+@pytest.mark.parametrize(("degrees", "limit"), [(30, 0.005), (20, 0.01), (10, 0.05)])
+def test_sharp_corner_is_trimmed_by_its_angle(degrees, limit):
+    """Noise-free error: `gradient` trims 3.5 sigma / sin(angle), `polygon` models the corner itself."""
+    a = np.radians(degrees)
+    corners = np.array([[15.3, 20.2], [135.0, 20.2], [15.3 + 118 * np.cos(a), 20.2 + 118 * np.sin(a)]])
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
+    assert np.abs(find_shape(image, layout, "gradient").corners[0, 0] - corners[0]).max() < limit
+    assert np.abs(find_shape(image, layout, "polygon").corners[0, 0] - corners[0]).max() < 1e-3
+
+
+def test_flat_corner_is_ill_conditioned():
+    """Edges that meet at 179 degrees: the corner cannot be told along them."""
+    bend = 50 * np.sin(np.radians(0.5))
+    corners = np.array([[20.0, 30.0], [70.0, 30.0 - bend], [120.0, 30.0], [120.0, 80.0], [20.0, 80.0]])
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
+    for estimator in ESTIMATORS:
+        found = find_shape(image, layout, estimator)
+        assert found.status[0] == status.ILL_CONDITIONED
+        assert np.isnan(found.corners).all()
+
+
+@pytest.mark.parametrize("length", [4, 6, 8])
+def test_very_short_edge(length):
+    """Too short for points on edges; the likelihood of the whole outline has no bias down to 4 px."""
+    corners = rectangle(60, length, 12)
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
+    assert find_shape(image, layout, "gradient").status[0] == status.SHORT
+    found = find_shape(image, layout, "polygon")
+    assert found.status[0] in status.MEASURED
+    assert np.abs(found.corners[0] - corners).max() < 0.02
+
+
+def ramped(start, stop, corners):
+    """A face whose contrast changes linearly from left to right across the polygon."""
+    covered = polygon_image(corners, SHAPE, 0.7, 1.0)
+    x = np.arange(SHAPE[1])
+    level = np.interp(x, [corners[:, 0].min(), corners[:, 0].max()], [start, stop])
+    return 100 + covered * level
+
+
+@pytest.mark.parametrize(("estimator", "limit"), [("gradient", 0.06), ("strip", 0.01), ("polygon", 0.005)])
+def test_contrast_that_varies_along_the_edge(estimator, limit):
+    """Contrast 30 to 100 over 100 px; the zero crossing is moved by the slope of 0.7 grey levels a px, the fits are not."""
+    corners = rectangle(100, 60, 3)
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    found = find_shape(ramped(30.0, 100.0, corners)[None], layout, estimator)
+    assert found.status[0] == status.OK
+    assert np.abs(found.corners[0] - corners).max() < limit
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_contrast_that_changes_sign(estimator):
+    corners = rectangle(100, 60, 3)
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    found = find_shape(ramped(-80.0, 80.0, corners)[None], layout, estimator)
+    assert found.status[0] == status.SIGN_CHANGE
+    assert (found.edge_status[0] == status.SIGN_CHANGE).sum() == 2
+    assert np.isnan(found.corners).all()
+
+
+@pytest.mark.parametrize(("estimator", "limit"), [("gradient", 0.02), ("strip", 1e-3), ("polygon", 1e-3)])
+def test_edge_that_leaves_the_image(estimator, limit):
+    """Two edges cut by the border: what is visible gives their lines, and the corner outside follows from them."""
+    corners = rectangle(100, 60, 8, centre=(110.3, 55.7))
+    layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
+    image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
+    assert (corners[:, 0] > SHAPE[1]).sum() == 2
+    found = find_shape(image, layout, estimator)
+    assert found.edge_status[0, 1] == status.NOT_VISIBLE
+    normals, points = found.normals[0], found.points[0]
+    seen = [0, 2, 3]
+    away = np.einsum("ei,ei->e", normals[seen], corners[seen] - points[seen])
+    assert np.abs(away).max() < limit
+
+
+def test_second_edge_too_near_is_clutter(task1):
+    """Sensor (12, 45): the side faces are thin slivers along two of the required edges."""
+    found = measure.distance(np.zeros((240, 256)), task1, (12, 225))
+    frames = prepared(layout_of(task1, Pose(12, 225)), "gradient", 12.0).frames
+    assert status.CLUTTER in {frame.status for frame in frames}
+    assert found.status == status.LOW_CONTRAST
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+def test_any_kind_of_number(task1, kind):
+    layout = layout_of(task1, Pose(31, 137))
+    corners = np.array([layout.ends[0, 1], layout.ends[0, 0], layout.ends[1, 1], layout.ends[2, 0]])
+    image = np.rint(polygon_image(corners, layout.optics.shape, 0.6, 150.0)).astype(kind)
+    assert measure.distance(image, task1, (31, 137), estimator="polygon").status == status.OK
