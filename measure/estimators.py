@@ -70,7 +70,7 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
 
 
 def _thinned(frame: EdgeFrame, scale: float) -> EdgeFrame:
-    """Stations at most 2 scales apart, at least three: points in between add nothing (their errors' spectrum ends there)."""
+    """Stations at most 2 scales apart, at least three: points in between add nothing (their errors are smooth)."""
     if frame.stations.size < 3:
         return frame
     first, last = frame.stations[[0, -1]]

@@ -23,11 +23,12 @@ _TRUNCATE = 4  # standard deviations at which the kernel ends
 
 @dataclass(frozen=True)
 class GradientLocator:
-    """Zero-crossing locator for one edge.
+    """Zero-crossing locator for one edge, straight or curved.
 
     Attributes
     ----------
-    frame : EdgeFrame
+    stations : ndarray, shape (m,)
+        Places along the edge, px (or any other parameter of a curve).
     offsets : ndarray, shape (T,)
         Places across the edge, px.
     pixels : ndarray of int
@@ -38,7 +39,7 @@ class GradientLocator:
         Contrast of a straight blurred edge whose second derivative has slope 1 at the crossing.
     """
 
-    frame: EdgeFrame
+    stations: np.ndarray
     offsets: np.ndarray
     pixels: np.ndarray
     kernel: sparse.csr_array
@@ -46,14 +47,22 @@ class GradientLocator:
 
     @classmethod
     def of(cls, optics: Optics, frame: EdgeFrame) -> GradientLocator:
-        """Prepare the locator of one edge."""
-        scale, half = optics.scale_px, int(np.ceil(optics.window_px / STEP))
+        """Prepare the locator of a straight edge."""
+        places = frame.at(frame.stations, np.zeros(1))
+        return cls.along_curve(optics, frame.stations, places, np.broadcast_to(frame.normal, places.shape))
+
+    @classmethod
+    def along_curve(
+        cls, optics: Optics, stations: np.ndarray, places: np.ndarray, normals: np.ndarray
+    ) -> GradientLocator:
+        """Prepare the locator of a curve given by places (m, 2) on it and unit normals (m, 2) there."""
+        half = int(np.ceil(optics.window_px / STEP))
         offsets = STEP * np.arange(-half, half + 1)
-        places = frame.at(np.repeat(frame.stations, offsets.size), np.tile(offsets, frame.stations.size))
-        kernel = second_derivative(places, frame.normal, scale, optics.shape)
+        across = (places[:, None] + offsets[:, None] * normals[:, None]).reshape(-1, 2)
+        kernel = second_derivative(across, np.repeat(normals, offsets.size, 0), optics.scale_px, optics.shape)
         pixels = np.unique(kernel.indices)
-        total = np.hypot(scale, edge_blur(optics.blur_px))
-        return cls(frame, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
+        total = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
+        return cls(stations, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
 
     def locate(self, images: np.ndarray) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width)."""
@@ -66,7 +75,7 @@ class GradientLocator:
         offset = np.where(valid, self.offsets[0] + STEP * offset, 0.0)
         slope = np.where(valid, -slope / STEP, 0.0)
         contrast = self.slope_to_contrast * slope.sum(0) / np.maximum(valid.sum(0), 1)
-        along = np.broadcast_to(self.frame.stations, (images.shape[0], self.frame.stations.size))
+        along = np.broadcast_to(self.stations, (len(images), self.stations.size))
         return EdgePoints(along, offset.T, valid.T, contrast, turned)
 
     def unit_covariance(self) -> np.ndarray:
@@ -74,9 +83,12 @@ class GradientLocator:
 
         The offsets are the second derivative's noise at the crossing over its slope; neighbours share pixels.
         """
-        centre = self.kernel[self.offsets.size // 2 :: self.offsets.size]
-        response = self.slope_to_contrast * (centre.T @ regression(self.frame.stations).T)
-        return response.T @ response
+        response = regression(self.stations) @ self.unit_noise()
+        return response @ response.T
+
+    def unit_noise(self) -> sparse.csr_array:
+        """Derivative of the offsets by the pixels on an edge of unit contrast, shape (m, len(pixels))."""
+        return self.slope_to_contrast * self.kernel[self.offsets.size // 2 :: self.offsets.size]
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
@@ -100,11 +112,13 @@ class GradientLocator:
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """Second derivative at all places, shape (m, T, n)."""
         used = np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T)
-        return (self.kernel @ used).reshape(self.frame.stations.size, self.offsets.size, len(images))
+        return (self.kernel @ used).reshape(self.stations.size, self.offsets.size, len(images))
 
 
-def second_derivative(places: np.ndarray, normal: np.ndarray, scale: float, shape: tuple[int, int]) -> sparse.csr_array:
-    """Rows that take the Gaussian second derivative along ``normal`` of an image at places (M, 2), px.
+def second_derivative(
+    places: np.ndarray, normals: np.ndarray, scale: float, shape: tuple[int, int]
+) -> sparse.csr_array:
+    """Rows that take the Gaussian second derivative of an image at places (M, 2) along unit normals (M, 2), px.
 
     The sampled kernel is corrected to sum to exactly zero, so that a constant image gives 0.
     """
@@ -114,7 +128,7 @@ def second_derivative(places: np.ndarray, normal: np.ndarray, scale: float, shap
     dx = (nearest - places)[:, 0, None, None] + grid
     dy = (nearest - places)[:, 1, None, None] + grid[:, None]
     gauss = np.exp(-(dx**2 + dy**2) / (2 * scale**2)) / (2 * np.pi * scale**2)
-    across = dx * normal[0] + dy * normal[1]
+    across = dx * normals[:, 0, None, None] + dy * normals[:, 1, None, None]
     values = gauss * (across**2 / scale**2 - 1) / scale**2
     values -= gauss * (values.sum((1, 2)) / gauss.sum((1, 2)))[:, None, None]
     columns = (nearest[:, 1, None, None] + grid[:, None]) * shape[1] + nearest[:, 0, None, None] + grid

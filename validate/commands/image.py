@@ -11,6 +11,7 @@ import typer
 import measure
 import render
 import scenes
+from scenes import InvalidInput
 from validate import picture_file
 from validate.commands.common import Json, LightPose, SceneName, Sensor, app, parse_pose, say
 
@@ -46,21 +47,40 @@ def render_command(
 
 @app.command("measure")
 def measure_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Image of the camera's size.")],
-    scene: SceneName,
-    sensor: Sensor,
-    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; not needed to measure.")] = None,
-    estimator: Annotated[str, typer.Option(help=" or ".join(measure.ESTIMATORS))] = "gradient",
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="PNG, TIFF, JPEG or .npy, 8 or 16 bit or float.")],
+    scene: Annotated[
+        str | None, typer.Argument(metavar="[SCENE]", help="Scene that the image shows, if known.")
+    ] = None,
+    sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None,
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; helps strip and polygon.")] = None,
+    estimator: Annotated[str | None, typer.Option(help=" or ".join(measure.ESTIMATORS))] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
+    lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure the scene's distance in an image. Exit status 1 if it cannot be measured."""
-    loaded = scenes.load(scene)
+    """Measure an image: the distance of a known scene, or else the quadrilateral that it shows.
+
+    Exit status 1 if it cannot be measured.
+    """
+    picture = picture_file.read(file)
+    if scene is None:
+        found = measure.measure_quadrilateral(picture, estimator or "strip", lens and measure.load_lens(lens))
+        say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
+        raise typer.Exit(0 if found.quantities else 1)
+    if sensor is None:
+        raise InvalidInput("--sensor must be given with a scene, got nothing")
+    if lens is not None:
+        raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
-    found = measure.distance(picture_file.read(file), loaded, *poses, estimator, threshold)
+    distance = measure.distance(picture, scenes.load(scene), *poses, estimator or "gradient", threshold)
+    facts = {"file": str(file), **_distance_facts(distance)}
+    say(facts, as_json, _distance_text(distance, facts["edges"]))
+    raise typer.Exit(0 if np.isfinite(distance.value_px) else 1)
+
+
+def _distance_facts(found: measure.Measurement) -> dict:
     good = bool(np.isfinite(found.value_px))
-    facts = {
-        "file": str(file),
+    return {
         "value_px": float(found.value_px) if good else None,
         "variance_px2": float(found.variance_px2) if good else None,
         "status": str(found.status),
@@ -69,16 +89,37 @@ def measure_command(
             {
                 "name": name,
                 "status": str(found.edge_status[i]),
-                "points": int(found.used[i]),
+                "used": int(found.used[i]),
+                "rejected": int(found.rejected[i]),
                 "contrast": float(found.edge_contrast[i]),
             }
             for i, name in enumerate(found.edge_names)
         ],
     }
-    edges = ", ".join(
-        f"{edge['name']} {edge['status']} ({edge['points']} points, contrast {edge['contrast']:.0f})"
-        for edge in facts["edges"]
-    )
+
+
+def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
+    good = np.isfinite(found.value_px)
     value = f"{found.value_px:.4f} +- {np.sqrt(found.variance_px2):.4f} px (1 sigma)" if good else "not measured"
-    say(facts, as_json, f"{value}, {found.status}\nedges: {edges}")
-    raise typer.Exit(0 if good else 1)
+    told = ", ".join(f"{e['name']} {e['status']} ({e['used']} used, contrast {e['contrast']:.0f})" for e in edges)
+    return f"{value}, {found.status}\nedges: {told}"
+
+
+def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
+    return {
+        "status": found.status,
+        "corners": found.corners.tolist() if found.quantities else None,
+        "noise": found.noise,
+        "blur_px": found.blur_px,
+        "quantities": [vars(quantity) for quantity in found.quantities],
+    }
+
+
+def _quadrilateral_text(found: measure.Quadrilateral) -> str:
+    lines = [f"quadrilateral: {found.status}; noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px"]
+    if found.quantities:
+        sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
+        for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):
+            lines.append(f"corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
+    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.quantities]
+    return "\n".join([*lines, "(1 sigma)"])

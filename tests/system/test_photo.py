@@ -1,0 +1,89 @@
+"""A quadrilateral in a photograph, without a pose: found, measured, with and without lens distortion."""
+
+import numpy as np
+import pytest
+
+import measure
+from measure.find import edge_sigma, find_quadrilateral, noise_sigma
+from measure.lens import Lens
+from scenes import InvalidInput
+from tests.benchmarks.estimators import random_block
+from tests.oracle import polygon_image
+
+SHAPE = (240, 320)
+LENS = Lens(fx=400.0, fy=400.0, cx=160.0, cy=120.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
+
+
+def ring(corners):
+    """The corners in the order that `find_quadrilateral` promises."""
+    return np.roll(corners, -int(np.argmin(corners.sum(1))), axis=0)
+
+
+def matched(found, true):
+    """Largest distance of the corners, whichever way round they are given."""
+    return min(np.abs(found - np.roll(way, k, 0)).max() for way in (true, true[::-1]) for k in range(4))
+
+
+@pytest.fixture
+def corners(rng):
+    return random_block(rng) * 1.7 + 25
+
+
+@pytest.mark.parametrize(("contrast", "background"), [(120.0, 20.0), (-90.0, 200.0)])
+@pytest.mark.parametrize("blur", [0.6, 1.5])
+def test_found_and_measured(corners, rng, contrast, background, blur):
+    """Bright on dark and dark on bright; corners within 4 standard deviations, blur and noise to 25 % and 5 %."""
+    image = polygon_image(corners, SHAPE, blur, contrast, background) + 2 * rng.standard_normal(SHAPE)
+    assert matched(find_quadrilateral(image), corners) < 4
+    assert noise_sigma(image) == pytest.approx(2, rel=0.05)
+    assert edge_sigma(image, corners) == pytest.approx(blur, rel=0.25)
+    for estimator in measure.ESTIMATORS:
+        found = measure.measure_quadrilateral(image, estimator)
+        assert found.status == "ok"
+        assert matched(found.corners, corners) < 4.5 * np.sqrt(np.diag(found.covariance).max()) + 0.02
+
+
+def test_quantities_and_their_errors(corners, rng):
+    """Sides, diagonals and angles of 100 photographs: standard deviation as told (standard error 7 %)."""
+    clean = polygon_image(corners, SHAPE, 0.7, 100.0, 20.0)
+    runs = [measure.measure_quadrilateral(clean + 2 * rng.standard_normal(SHAPE), "gradient") for _ in range(100)]
+    values = np.array([[quantity.value for quantity in run.quantities] for run in runs])
+    told = np.array([[quantity.sigma for quantity in run.quantities] for run in runs]).mean(0)
+    assert [quantity.unit for quantity in runs[0].quantities] == ["px"] * 6 + ["deg"] * 4
+    assert values[:, 6:].sum(1) == pytest.approx(np.full(100, 360.0))
+    ratio = values.std(0, ddof=1) / told
+    assert np.abs(ratio - 1).max() < 4 / np.sqrt(2 * 99)
+    assert np.abs(ratio / 1.5 - 1).max() > 4 / np.sqrt(2 * 99)
+
+
+def distorted(corners):
+    """The polygon as a barrel lens shows it: every side bows outwards, drawn with 200 corners a side."""
+    steps = np.linspace(0, 1, 200, endpoint=False)[:, None]
+    sides = [a + steps * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)]
+    return polygon_image(LENS.distort(np.concatenate(sides)), SHAPE, 0.7, 100.0, 20.0)
+
+
+def test_distortion_is_undone_on_the_points(corners, rng):
+    """With the lens known the corners are those of the straight polygon; without it off by more than half a pixel."""
+    image = distorted(corners) + rng.standard_normal(SHAPE)
+    with_lens = measure.measure_quadrilateral(image, lens=LENS)
+    without = measure.measure_quadrilateral(image, "gradient")
+    assert matched(with_lens.corners, corners) < 4.5 * np.sqrt(np.diag(with_lens.covariance).max()) + 0.005
+    assert matched(without.corners, corners) > 0.5
+
+
+def test_straighten_is_the_inverse_of_distort(rng):
+    points = rng.uniform([20, 20], [300, 220], (50, 2))
+    assert LENS.straighten(LENS.distort(points)) == pytest.approx(points, abs=1e-6)
+
+
+def test_nothing_to_be_found(rng):
+    with pytest.raises(InvalidInput, match="image must show a convex quadrilateral, got none"):
+        measure.measure_quadrilateral(np.full(SHAPE, 7.0))
+
+
+def test_bad_lens(tmp_path):
+    path = tmp_path / "lens.toml"
+    path.write_text("fx = -1.0\nfy = 1.0\ncx = 0.0\ncy = 0.0\n")
+    with pytest.raises(InvalidInput, match=r"lens\.toml: fx must be greater than 0, got -1\.0"):
+        measure.load_lens(path)
