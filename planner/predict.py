@@ -116,7 +116,7 @@ def variances(
     9.0
     """
     priced = evaluator(price)(scene, sensors, lights)
-    return _in_units(scene, priced.variance if check_objective(objective) == "image" else priced.variance_object, 2)
+    return in_units(scene, priced.variance if check_objective(objective) == "image" else priced.variance_object, 2)
 
 
 def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") -> Prediction:
@@ -160,10 +160,10 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     return Prediction(
         price=price,
         kind=scene.task.kind,
-        value_image=float(_in_units(scene, known.value, 1)),
-        value_object=float(_in_units(scene, known.value_object, 1)),
-        variance_image=float(_in_units(scene, priced.variance, 2)),
-        variance_object=float(_in_units(scene, priced.variance_object, 2)),
+        value_image=float(in_units(scene, known.value, 1)),
+        value_object=float(in_units(scene, known.value_object, 1)),
+        variance_image=float(in_units(scene, priced.variance, 2)),
+        variance_object=float(in_units(scene, priced.variance_object, 2)),
         corners=known.points,
         covariances=_covariances(scene, priced),
         edges=edges,
@@ -191,7 +191,7 @@ def check_objective(objective: str) -> str:
     return objective
 
 
-def _in_units(scene: Scene, value, power: int):
+def in_units(scene: Scene, value, power: int):
     """Angles in degrees."""
     return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
 

@@ -14,6 +14,7 @@ import numpy as np
 from planner.circles import calibrated_centre, fisher_centre, rim
 from planner.contrast import squared_contrast
 from planner.locator import MIN_CONTRAST, MIN_USABLE, correlation, information_bound, kappa2, reach
+from planner.moments import moments
 from planner.outline import cut, end_depths, image_fractions
 from planner.quantity import Quantity, quantity
 from planner.view import direction
@@ -64,21 +65,10 @@ def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     """
     sensors, lights = np.asarray(sensors, float), np.asarray(lights, float)
     known = quantity(scene, sensors)
-    names, lengths = known.view.names, known.view.lengths
-    fractions = np.linspace(0, 1, PAPER_POINTS)
-    squared = squared_contrast(scene, names, fractions, sensors, lights, fall_off=False)
-    per_point = PAPER_KAPPA2 * scene.noise.sigma**2
-    u = image_fractions(scene, names, sensors, fractions)
+    lengths, per_point = known.view.lengths, PAPER_KAPPA2 * scene.noise.sigma**2
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        total = squared.sum(-1)
-        mean = _sum(squared, u) / total
-        spread = (_sum(squared, u * u) / total - mean**2) * lengths**2
-        if scene.solid.is_convex and scene.material.is_diffuse:
-            count = PAPER_POINTS
-        else:  # weights may crowd at one end of the edge: take the moment about the mean
-            count = np.count_nonzero(squared, axis=-1)
-            spread = (squared * (u - mean[..., None]) ** 2).sum(-1) / total * lengths**2
-        mean, weight = mean * lengths, total / per_point
+        total, mean, spread, count = moments(scene, known.view.names, sensors, lights, PAPER_POINTS)
+        mean, spread, weight = mean * lengths, spread * lengths**2, total / per_point
         tilt = (spread + (count - 1) / weight) / (weight * spread**2)  # eq. 4 with sigma^2 = I / (I - 1) spread
 
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -87,7 +77,7 @@ def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     def centre(circle) -> np.ndarray:
         return fisher_centre(circle, circle.squared / per_point, circle.counted)
 
-    return _priced(scene, sensors, lights, known, line_variance, squared, centre, fall_off=False)
+    return _priced(scene, sensors, lights, known, line_variance, total / PAPER_POINTS, centre, fall_off=False)
 
 
 def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
@@ -112,16 +102,19 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
             slope2 = (12 * lever / length**3) ** 2 * per_point / along.squared
             inside = integral(g2 - scale**2 * slope2, length)
             variance = 2 * np.sqrt(np.pi) * scale * inside - 2 * scale**2 * (g2[..., 0] + g2[..., -1])
-            short = length[..., 0] < 10 * scale
+            short = np.broadcast_to(length[..., 0] < 10 * scale, variance.shape)
             if short.any():
-                g = weight * np.sqrt(per_point / along.squared)
-                variance = np.where(short, _double_integral(g, along.t, length, scale), variance)
+                g, t, whole = (
+                    np.broadcast_to(v, (*short.shape, v.shape[-1]))[short]
+                    for v in (weight * np.sqrt(per_point / along.squared), along.t, length)
+                )
+                variance[short] = _double_integral(g, t, whole, scale)
         return np.where(weak, np.inf, variance)
 
     def centre(circle) -> np.ndarray:
         return calibrated_centre(circle, per_point, 2 * np.sqrt(np.pi) * scale, MIN_CONTRAST**2 * noise)
 
-    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared, centre, fall_off=True)
+    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared.mean(-1), centre, fall_off=True)
 
 
 def bound(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
@@ -143,7 +136,7 @@ def bound(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     def centre(circle) -> np.ndarray:
         return fisher_centre(circle, information_bound(np.sqrt(circle.squared), noise, blur) * circle.arc, None)
 
-    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared, centre, fall_off=True)
+    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared.mean(-1), centre, fall_off=True)
 
 
 @dataclass(frozen=True)
@@ -203,12 +196,7 @@ def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: fl
     return np.einsum("...i,...ij,...j->...", weighted, kernel, weighted)
 
 
-def _sum(weights: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Sum of weights (..., E, n) times values (..., E, n)."""
-    return np.einsum("...n,...n->...", weights, values)
-
-
-def _priced(scene, sensors, lights, known: Quantity, line_variance, squared, centre_covariance, *, fall_off) -> Priced:
+def _priced(scene, sensors, lights, known: Quantity, line_variance, mean_square, centre_covariance, *, fall_off) -> Priced:
     """From the lines' and the centres' errors to the quantity's."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         parts = line_variance(known.offset, known.tilt)
@@ -225,5 +213,4 @@ def _priced(scene, sensors, lights, known: Quantity, line_variance, squared, cen
         variance = np.where(np.isfinite(variance) & np.isfinite(known.value), variance, np.inf)
         in_object = variance / known.scale**2
     in_object = np.where(np.isfinite(in_object), in_object, np.inf)
-    contrast = np.sqrt(squared.mean(-1))
-    return Priced(known, variance, in_object, line_variance, contrast, tuple(centres))
+    return Priced(known, variance, in_object, line_variance, np.sqrt(mean_square), tuple(centres))
