@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.contrast import behind
 from planner.rays import first_face
 from planner.reflectance import reflected
 from planner.view import direction, frame, project
 from scenes import Circle, Scene
 
-RIM_POINTS = 96
+RIM_POINTS = 64
 
 
 @dataclass(frozen=True)
@@ -119,15 +120,18 @@ def _squared_contrast(scene, circle, points, radial, sensors, lights, fall_off) 
     probe = circle.centre + chord * (points - circle.centre)
     visible = _free(scene, circle, probe, sensor_at)
     lit = _free(scene, circle, probe, light_at)
-    levels = []
+    sides = []
     for normal in (np.broadcast_to(circle.axis, points.shape), wall):
-        own = np.where(lit, _level(scene, points, normal, sensor_at, light_at, fall_off), 0.0)
+        level = np.where(lit, _level(scene, points, normal, sensor_at, light_at, fall_off), 0.0)
         turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
-        levels.append((turned, own))
-    past = _past(scene, circle, probe, sensor_at, light_at, fall_off)
-    sides = [np.where(turned, own, past) for turned, own in levels]
-    seen = visible & (levels[0][0] | levels[1][0])
-    return np.where(seen, (sides[0] - sides[1]) ** 2, 0.0)
+        sides.append((turned, np.where(turned, level, 0.0)))
+    seen = visible & (sides[0][0] | sides[1][0])
+    levels = []
+    for turned, level in sides:
+        wanted = seen & ~turned
+        past = behind(scene, probe, sensor_at[..., 0, :], light_at[..., 0, :], wanted, (circle.face,), fall_off)
+        levels.append(np.where(wanted, past, level))
+    return np.where(seen, (levels[0] - levels[1]) ** 2, 0.0)
 
 
 def _free(scene, circle, probe, position) -> np.ndarray:
@@ -137,23 +141,6 @@ def _free(scene, circle, probe, position) -> np.ndarray:
     vectors = probe - position
     _, t = first_face(scene.solid, np.broadcast_to(position, vectors.shape), vectors, ())
     return t > 1 - 1e-6
-
-
-def _past(scene, circle, probe, sensor_at, light_at, fall_off) -> np.ndarray:
-    """Level of the face that is seen just past the rim."""
-    solid = scene.solid
-    vectors = probe - sensor_at
-    face, t = first_face(solid, np.broadcast_to(probe, vectors.shape), vectors, (circle.face,))
-    hit = probe + np.where(np.isfinite(t), t, 0.0)[..., None] * vectors
-    level = np.where(face >= 0, _level(scene, hit, solid.normals[face], sensor_at, light_at, fall_off), 0.0)
-    target = hit + 1e-6 * np.ptp(solid.vertices) * solid.normals[face]
-    target = np.broadcast_to(target, (*level.shape, 3))
-    vectors = target - light_at
-    bright = level > 0
-    if bright.any():
-        start = np.broadcast_to(light_at, target.shape)[bright]
-        bright[bright] = first_face(solid, start, target[bright] - start, ())[1] > 1 - 1e-6
-    return np.where(bright, level, 0.0)
 
 
 def _level(scene, points, normal, sensor_at, light_at, fall_off) -> np.ndarray:

@@ -117,7 +117,8 @@ def _clearance(scene: Scene, view) -> np.ndarray:
     for i, one in enumerate(edges):
         for j, other in enumerate(edges):
             if i != j and not set(one.ends) & set(other.ends):
-                points = view.ends[..., i, None, 0, :] + fractions * (view.ends[..., i, 1:, :] - view.ends[..., i, :1, :])
+                start, stop = view.ends[..., i, :1, :], view.ends[..., i, 1:, :]
+                points = start + fractions * (stop - start)
                 least = np.minimum(least, _to_segment(points, view.ends[..., j, :, :]).min(-1))
     return least
 

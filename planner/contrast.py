@@ -58,8 +58,8 @@ def squared_contrast(
 ) -> np.ndarray:  # fmt: skip
     """Squared contrast at fractions (n,) or (..., E, n) of each edge's length in space, shape (..., E, n).
 
-    On a plane, diffuse face N.(l - p) is the same for all points p, so with r = \\|l - p\\| the level is a constant over
-    r (or over r^3 with fall-off). For a convex diffuse solid the contrast is therefore one number an edge over r.
+    On a plane, diffuse face N.(l - p) is the same for all points p, so with r the distance |l - p| the level is a
+    constant over r (or r^3 with fall-off): on a convex diffuse solid the contrast is one number an edge over r.
     """
     if not (scene.solid.is_convex and scene.material.is_diffuse):
         points = edge_points(scene.solid, edges, fractions)
@@ -110,24 +110,49 @@ def _beside(scene, name, points, level, sensor_at, light_at, fall_off) -> np.nda
     lit = turned(solid, edge, light_at)[..., None] & seen(solid, edge, light_at, fractions)[..., None, :]
     looked_at = turned(solid, edge, sensor_at)[..., None]
     visible = (looked_at.any(-2) & seen(solid, edge, sensor_at, fractions))[..., None, :]
-    behind = _behind(scene, edge, points, sensor_at, light_at, fall_off)[..., None, :]
-    return np.where(visible, np.where(looked_at, np.where(lit, level, 0.0), behind), 0.0)
+    found = np.where(visible & looked_at & lit, level, 0.0)
+    for side, face in enumerate(edge.faces):
+        # past an outer face that is turned away there is nothing, for the ray leaves the convex hull
+        wanted = visible[..., 0, :] & ~looked_at[..., side, :]
+        if not solid.outer[face] and wanted.any():
+            past = behind(scene, points, sensor_at, light_at, wanted, edge.faces, fall_off)
+            found[..., side, :] = np.where(wanted, past, found[..., side, :])
+    return found
 
 
-def _behind(scene, edge, points, sensor_at, light_at, fall_off) -> np.ndarray:
-    """Grey level of what the sensor sees just past the edge's points, shape (..., n)."""
-    solid = scene.solid
-    vectors = points - sensor_at[..., None, :]
-    face, t = first_face(solid, np.broadcast_to(points, vectors.shape), vectors, edge.faces)
-    hit = np.where((face >= 0)[..., None], points + np.where(np.isfinite(t), t, 0.0)[..., None] * vectors, points)
-    spot, normals = hit[..., None, None, :, :], solid.normals[face][..., None, None, :, :]
-    level = _level(scene, spot, normals, sensor_at, light_at, fall_off)[..., 0, 0, :]
-    face = np.broadcast_to(face, level.shape)
-    bright = (face >= 0) & (level > 0)
-    if bright.any():
-        where = np.broadcast_to(light_at[..., None, :], (*level.shape, 3))
-        bright[bright] = reaches(solid, np.broadcast_to(hit, where.shape)[bright], face[bright], where[bright])
-    return np.where(bright, level, 0.0)
+def behind(scene: Scene, points, sensor_at, light_at, wanted, own: tuple[int, ...], fall_off: bool) -> np.ndarray:
+    """Grey level of what the sensor sees just past points of an edge.
+
+    Parameters
+    ----------
+    points : ndarray, shape (..., n, 3)
+        cm.
+    sensor_at, light_at : ndarray, shape (..., 3)
+        Positions, cm.
+    wanted : ndarray of bool, shape (..., n)
+        For which points; the others get 0.
+    own : tuple of int
+        Faces that meet in the edge.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        0 where the ray meets nothing, or what it meets is dark.
+    """
+    solid, sensor_at, light_at = scene.solid, sensor_at[..., None, :], light_at[..., None, :]
+    vectors = points - sensor_at
+    asked = np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, vectors.shape[:-1]))
+    asked = asked.any(tuple(i for i, size in enumerate(vectors.shape[:-1]) if size < asked.shape[i]), keepdims=True)
+    face, t = np.full(vectors.shape[:-1], -1), np.zeros(vectors.shape[:-1])
+    face[asked], t[asked] = first_face(solid, np.broadcast_to(points, vectors.shape)[asked], vectors[asked], own)
+    hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
+    to_light, distance = _towards(hit, light_at)
+    normals = solid.normals[face]
+    level = scene.camera.exposure * reflected(scene.material, normals, to_light, _towards(hit, sensor_at)[0])
+    bright = wanted & (face >= 0) & (level > 0)
+    places = [np.broadcast_to(place, (*bright.shape, 3))[bright] for place in (hit, light_at)]
+    bright[bright] = reaches(solid, places[0], np.broadcast_to(face, bright.shape)[bright], places[1])
+    return np.where(bright, level * (scene.light.distance / distance) ** 2 if fall_off else level, 0.0)
 
 
 def _fractions(solid: Solid, edge, points: np.ndarray) -> np.ndarray:

@@ -100,8 +100,9 @@ def _by_bound(scene, sensors, lights, price, objective, constraints, report) -> 
     for rows, which, bound in _blocks(table, scene, sensors, lights, constraints, wanted):
         hit = np.argwhere(bound <= state.variance)
         for at in range(0, len(hit), _PAIRS):
-            s, l = table.sensors[rows[hit[at : at + _PAIRS, 0]]], which[hit[at : at + _PAIRS, 1]]
-            state = state.better(s, l, price_pairs(scene, sensors[s], lights[l], price, objective))
+            some = hit[at : at + _PAIRS]
+            s, k = table.sensors[rows[some[:, 0]]], which[some[:, 1]]
+            state = state.better(s, k, price_pairs(scene, sensors[s], lights[k], price, objective))
         priced += len(hit)
         done += len(rows)
         report("exact", done, 2 * len(table.sensors))

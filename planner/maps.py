@@ -49,7 +49,7 @@ def variance_map(
     >>> import scenes
     >>> values = variance_map(scenes.load("task1"), sensor=(30, 135), space=ViewingSpace(10))
     >>> values.shape, int(np.isfinite(values).sum()) > 100
-    ((417,), True)
+    ((425,), True)
     """
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")

@@ -76,16 +76,18 @@ def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = N
     edges = [solid.edge(name) for name in names]
     needed, clear = _near(solid.edges, edges), reach(scene.locator.scale_px, scene.camera.blur_px)
     corners = dict(zip(needed, np.moveaxis(project(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True))
-    trims = _stack([_stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges], -2)
-    ends = _stack([np.stack([corners[end] for end in edge.ends], -2) for edge in edges], -3)
-    shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, edge, positions) for edge in edges], -2))
+    trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
+    trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
+    shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
+    if not solid.is_convex:
+        trims = cut(trims, shown, np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), clear)
     return Outline(
         names=names,
         ends=ends,
-        trims=trims if solid.is_convex else cut(trims, shown, np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), clear),
+        trims=trims,
         shown=shown,
         visible=_stack([turned(solid, edge, positions).any(-1) for edge in edges], -1) & (shown[..., 1] > 0),
-    )  # fmt: skip
+    )
 
 
 def cut(trims: np.ndarray, shown: np.ndarray, lengths: np.ndarray, clear: float) -> np.ndarray:

@@ -18,7 +18,7 @@ from planner.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
 
 Search = Literal["exhaustive", "alternating"]
-COARSE_STEP = 6.0  # degrees; where every pair has to be priced
+COARSE_STEP = 8.0  # degrees; where every pair has to be priced
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
 
@@ -118,7 +118,7 @@ def plan(
         The scene's required edges, or the best of all sets that measure the same (the paper's required edge list).
     step_deg : float, optional
         Grid step. By default 1 where a bound makes the exhaustive search fast (convex, diffuse, straight edges), else
-        6 degrees with refinement from the ten best settings.
+        8 degrees with refinement from the three best settings.
     constraints : Constraints, optional
         By default the upper hemisphere.
     sensor, light : Pose or pair, optional
@@ -230,7 +230,8 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
     if refined and option.free:
         starts = [(sensor, light)]
         if found is None or not is_separable(scene, option.price):
-            starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in candidates[1:4] if c.edges == scene.task.edges]
+            others = [c for c in candidates[1:3] if c.edges == scene.task.edges]
+            starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
         descents = [refine(scene, *at, option.price, objective, option.step_deg, option.constraints) for at in starts]
         sensor, light, variance = min(descents, key=lambda descent: descent[2])
     return Plan(
@@ -272,7 +273,8 @@ def _candidates(options: list[_Option], results: list[_Result], objective: str, 
         order = order[np.isfinite(result.found.least[order])]
         picked = _spread(direction(options[k].sensors[order]), count)
         for s in order[picked]:
-            rows.append((result.found.least[s], k, options[k].sensors[s], options[k].lights[result.found.best_light[s]]))
+            light = options[k].lights[result.found.best_light[s]]
+            rows.append((result.found.least[s], k, options[k].sensors[s], light))
         rows.append((result.variance, k, result.sensor, result.light))
     rows.sort(key=lambda row: row[0])
     chosen: list[tuple] = []

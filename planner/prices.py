@@ -87,11 +87,14 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     exp(-d^2 / (4 s^2)). With f(t) the weight that the least-squares line gives to an error at t in A d + B theta,
     the variance is the double integral of f f' sigma sigma' correlation: to second order
     2 sqrt(pi) s (integral of g^2 - s^2 integral of g'^2) - 2 s^2 (g^2 at both ends), g = f sigma; on an edge of less
-    than 10 s the double integral itself. Infinite where an edge has too little contrast or length to be measured.
+    than 10 s the double integral itself. Where the contrast changes by more than a factor 2 along an edge (gloss, or
+    another part of the object behind it), points below `MIN_CONTRAST` are dropped and the first order alone is taken.
+    Infinite where an edge has too little contrast or length to be measured.
     """
     scale, noise = scene.locator.scale_px, scene.noise.variance
     per_point = kappa2(scale, scene.camera.blur_px) * noise
     along = _Along.of(scene, sensors, lights, trimmed=True)
+    uniform = scene.solid.is_convex and scene.material.is_diffuse
     weak = (along.squared.mean(-1) < MIN_CONTRAST**2 * noise) | (along.length[..., 0] < MIN_USABLE)
 
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -109,6 +112,10 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
                     for v in (weight * np.sqrt(per_point / along.squared), along.t, length)
                 )
                 variance[short] = _double_integral(g, t, whole, scale)
+            if not uniform:
+                rough = along.squared.max(-1) > 4 * along.squared.min(-1)
+                first_order = _first_order(along, a, lever, per_point, MIN_CONTRAST**2 * noise)
+                variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)
         return np.where(weak, np.inf, variance)
 
     def centre(circle) -> np.ndarray:
@@ -189,6 +196,18 @@ def integral(values: np.ndarray, length: np.ndarray) -> np.ndarray:
     return values[..., 1:-1] @ NODE_WEIGHTS * length[..., 0] / 2
 
 
+def _first_order(along: _Along, a: np.ndarray, lever: np.ndarray, per_point: float, weakest: float) -> np.ndarray:
+    """Integral of g^2 for the least-squares line through the points of enough squared contrast only."""
+    t, squared = along.t[..., 1:-1], along.squared[..., 1:-1]
+    kept = np.where(squared >= weakest, NODE_WEIGHTS * along.length / 2, 0.0)
+    total = kept.sum(-1, keepdims=True)
+    mean = (kept * t).sum(-1, keepdims=True) / total
+    spread = (kept * (t - mean) ** 2).sum(-1, keepdims=True)
+    weight = a / total + (lever - a * mean) * (t - mean) / spread
+    variance = (kept * weight**2 * per_point / np.where(squared > 0, squared, np.inf)).sum(-1)
+    return np.where((total[..., 0] >= MIN_USABLE) & (spread[..., 0] > 0), variance, np.inf)
+
+
 def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: float) -> np.ndarray:
     """Integral of g(t) g(t') correlation(t - t') over both; never negative."""
     weighted, inner = g[..., 1:-1] * NODE_WEIGHTS * length / 2, t[..., 1:-1]
@@ -196,7 +215,9 @@ def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: fl
     return np.einsum("...i,...ij,...j->...", weighted, kernel, weighted)
 
 
-def _priced(scene, sensors, lights, known: Quantity, line_variance, mean_square, centre_covariance, *, fall_off) -> Priced:
+def _priced(
+    scene, sensors, lights, known: Quantity, line_variance, mean_square, centre_covariance, *, fall_off
+) -> Priced:
     """From the lines' and the centres' errors to the quantity's."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         parts = line_variance(known.offset, known.tilt)

@@ -35,14 +35,14 @@ def refine(
     constraints = constraints or Constraints()
     if value is None:
 
-        def value(s, l):
-            return float(price_pairs(scene, s[None], l[None], price, objective)[0])
+        def value(s, k):
+            return float(price_pairs(scene, s[None], k[None], price, objective)[0])
 
     def cost(x: np.ndarray) -> float:
-        s, l = (shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4))))
+        s, k = (shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4))))
         if constraints.same_mount:
-            l = s
-        return value(s, l) if constraints.allows(scene, s, l) else np.inf
+            k = s
+        return value(s, k) if constraints.allows(scene, s, k) else np.inf
 
     simplex = np.vstack([np.zeros(4), 0.7 * np.eye(4)])
     unit = cost(np.zeros(4))
@@ -51,7 +51,7 @@ def refine(
     big = np.finfo(float).max
     found = minimize(
         lambda x: min(cost(x) / unit, big), np.zeros(4), method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-9, "maxfev": 600},
+        options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-7, "maxfev": 250},
     )  # fmt: skip
     x = found.x if found.fun < 1 else np.zeros(4)
     best = [shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4)))]

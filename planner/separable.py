@@ -138,7 +138,8 @@ def _influence(u: np.ndarray, known: Quantity, s: slice, points: np.ndarray | No
 
 def _calibrated(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of r^6 at the interpolation's nodes; the first takes the square of the range of r^3."""
-    scale, per_point = scene.locator.scale_px, kappa2(scene.locator.scale_px, scene.camera.blur_px) * scene.noise.variance
+    scale = scene.locator.scale_px
+    per_point = kappa2(scale, scene.camera.blur_px) * scene.noise.variance
     whole, trims = known.view.lengths[..., None], known.view.trims
     length = whole - trims.sum(-1, keepdims=True)
     good = (length[..., 0] >= MIN_USABLE).all(-1)
@@ -158,7 +159,7 @@ def _calibrated(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.
     extra = np.zeros_like(length)
     short = good & np.isfinite(length[..., 0]).all(-1) & (length[..., 0] < 10 * scale).any(-1)
     crowd, spare = _short(weight[short] * inside[short], t[short], scale)
-    is_short = (length[short] < 10 * scale)
+    is_short = length[short] < 10 * scale
     factor[short] = np.where(is_short, crowd, factor[short])
     extra[short] = np.where(is_short, -spare, 0.0)
     values = np.einsum("...j,...jk->...k", factor, _lagrange(spatial))

@@ -104,10 +104,15 @@ class Solid:
         return np.einsum("fi,fi->f", self.normals, anchors)
 
     @cached_property
-    def is_convex(self) -> bool:
-        """Whether no vertex stands over any face: nothing then hides or shadows another part."""
+    def outer(self) -> np.ndarray:
+        """Which faces lie on the convex hull, so that no vertex stands over them; bool, shape (F,)."""
         over = self.vertices @ self.normals.T - self.offsets
-        return bool(over.max() <= _FLAT * np.ptp(self.vertices))
+        return over.max(0) <= _FLAT * np.ptp(self.vertices)
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether all faces are outer ones: nothing then hides or shadows another part."""
+        return bool(self.outer.all())
 
     @cached_property
     def _hull(self) -> tuple[np.ndarray, np.ndarray]:
