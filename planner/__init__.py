@@ -8,9 +8,11 @@ from planner.outline import outline
 from planner.plan import Candidate, Plan, plan
 from planner.predict import EdgePrediction, Prediction, predict, variances
 from planner.quantity import required_edges
+from planner.robust import Robust, Tolerances, robust
 from planner.viewing import ViewingSpace, local_minima
 
 __all__ = [
-    "Candidate", "Constraints", "EdgePrediction", "Plan", "Prediction", "ViewingSpace", "alternate", "exhaustive",
-    "local_minima", "outline", "plan", "predict", "required_edges", "variance_map", "variances",
+    "Candidate", "Constraints", "EdgePrediction", "Plan", "Prediction", "Robust", "Tolerances", "ViewingSpace",
+    "alternate", "exhaustive", "local_minima", "outline", "plan", "predict", "required_edges", "robust",
+    "variance_map", "variances",
 ]  # fmt: skip

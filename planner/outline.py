@@ -28,7 +28,8 @@ class Outline:
     ends : ndarray, shape (..., E, 2, 2)
         The two end points (x, y), px.
     trims : ndarray, shape (..., E, 2)
-        Length to leave out at each end, px: what is hidden, and what a neighbouring edge disturbs.
+        Length to leave out at each end, px: what is hidden, what a neighbouring edge disturbs, and what lies outside
+        the image or too near to its border for the locator's window.
     shown : ndarray, shape (..., E, 2)
         The longest piece of each edge that the sensor sees, as fractions (from, to) of the image's length; (0, 0)
         where it sees nothing of it. `visibility.visible_spans` gives all pieces.
@@ -79,8 +80,10 @@ def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = N
     trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
     trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
     shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
+    lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    trims = cut(trims, within_image(scene, ends), lengths, 0.0)
     if not solid.is_convex:
-        trims = cut(trims, shown, np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1), clear)
+        trims = cut(trims, shown, lengths, clear)
     return Outline(
         names=names,
         ends=ends,
@@ -94,6 +97,24 @@ def cut(trims: np.ndarray, shown: np.ndarray, lengths: np.ndarray, clear: float)
     """Trims (..., 2) enlarged so that only the shown fractions of the image's length, less ``clear`` px, are left."""
     hidden = np.stack([shown[..., 0], 1 - shown[..., 1]], -1)
     return np.where(hidden > 0, np.maximum(trims, hidden * lengths[..., None] + clear), trims)
+
+
+def within_image(scene: Scene, ends: np.ndarray) -> np.ndarray:
+    """Part of each edge's image, ends (..., E, 2, 2), where the locator's window fits into the image.
+
+    Fractions (from, to) of the length, shape (..., E, 2); (1, 0) where none is left.
+    """
+    margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
+    size = np.array([scene.camera.width, scene.camera.height])
+    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = (margin - start) / along, (size - 1 - margin - start) / along
+    inside = (start >= margin) & (start <= size - 1 - margin)
+    still = along == 0
+    enter = np.where(still, np.where(inside, 0.0, 1.0), np.minimum(low, high)).max(-1)
+    leave = np.where(still, np.where(inside, 1.0, 0.0), np.maximum(low, high)).min(-1)
+    found = np.stack([np.clip(enter, 0, 1), np.clip(leave, 0, 1)], -1)
+    return np.where(found[..., :1] < found[..., 1:], found, np.array([1.0, 0.0]))
 
 
 def image_fractions(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, spatial: np.ndarray) -> np.ndarray:

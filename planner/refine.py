@@ -44,18 +44,20 @@ def refine(
             k = s
         return value(s, k) if constraints.allows(scene, s, k) else np.inf
 
-    simplex = np.vstack([np.zeros(4), 0.7 * np.eye(4)])
     unit = cost(np.zeros(4))
     if not np.isfinite(unit):
         raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
-    big = np.finfo(float).max
-    found = minimize(
-        lambda x: min(cost(x) / unit, big), np.zeros(4), method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-7, "maxfev": 250},
-    )  # fmt: skip
-    x = found.x if found.fun < 1 else np.zeros(4)
+    x, least = np.zeros(4), 1.0
+    for size in (0.7, 0.1):  # again from a fresh simplex, for the first may have collapsed at a border
+        found = minimize(
+            lambda x: min(cost(x) / unit, np.finfo(float).max), x, method="Nelder-Mead",
+            options={"initial_simplex": x + size * np.vstack([np.zeros(4), np.eye(4)]), "xatol": 1e-3, "fatol": 1e-7,
+                     "maxfev": 250},
+        )  # fmt: skip
+        if found.fun < least:
+            x, least = found.x, found.fun
     best = [shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4)))]
-    return best[0], best[0] if constraints.same_mount else best[1], float(min(found.fun, 1.0) * unit)
+    return best[0], best[0] if constraints.same_mount else best[1], float(least * unit)
 
 
 def shifted(pose: np.ndarray, by_deg: np.ndarray) -> np.ndarray:

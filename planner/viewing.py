@@ -88,7 +88,11 @@ class ViewingSpace:
 
     def nearest(self, pose: np.ndarray) -> int:
         """Index of the direction nearest to a pose (polar, azimuth)."""
-        return int(self._tree.query(direction(np.asarray(pose, float)))[1])
+        return int(self.nearest_direction(direction(np.asarray(pose, float))))
+
+    def nearest_direction(self, vectors: np.ndarray) -> np.ndarray:
+        """Indices of the directions nearest to unit vectors (..., 3)."""
+        return self._tree.query(vectors)[1]
 
 
 def local_minima(space: ViewingSpace, values: np.ndarray) -> np.ndarray:

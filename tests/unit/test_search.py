@@ -89,12 +89,21 @@ def test_alternating_search_stops_where_no_neighbour_is_better():
 
 
 def test_first_row_of_table_1():
-    """Sensor at (40, 41): the paper finds the light at (4, 27), the printed set's direction there is (4, 28.7)."""
+    """Sensor at (40, 41): the paper finds the light at (4, 27); nothing on our map is more than 5 % better."""
     part1, space = scenes.load("task1_part1"), ViewingSpace()
     values = planner.variance_map(part1, sensor=(40, 41), space=space, price="paper", objective="image")
     best = space.poses[values.argmin()]
-    assert abs(best[0] - 4) <= 1
-    assert values.min() == pytest.approx(planner.predict(part1, (40, 41), (4, 27), "paper").variance_px2, rel=0.003)
+    assert best[0] <= 4
+    there = planner.predict(part1, (40, 41), (4, 27), "paper").variance_px2
+    assert 0.95 * there < values.min() <= there
+
+
+def test_the_search_space_has_more_than_one_minimum(task1):
+    """The paper claims that either map is convex with one minimum; over its own grid both have several."""
+    space = ViewingSpace(2, (0, 90))
+    for fixed in ({"sensor": (40, 41)}, {"light": (4, 27)}):
+        values = planner.variance_map(task1, **fixed, space=space, price="paper", objective="image")
+        assert len(local_minima(space, values)) >= 3
 
 
 def test_local_minima_of_a_map_with_two(task1):
