@@ -28,8 +28,9 @@ class Outline:
     ends : ndarray, shape (..., E, 2, 2)
         The two end points (x, y), px.
     trims : ndarray, shape (..., E, 2)
-        Length to leave out at each end, px: what is hidden, what a neighbouring edge disturbs, and what lies outside
-        the image or too near to its border for the locator's window.
+        Length to leave out at each end, px: what is hidden, and what a neighbouring edge disturbs.
+    framed : ndarray, shape (..., E, 2)
+        The same, and what lies outside the image or too near to its border for the locator's window.
     shown : ndarray, shape (..., E, 2)
         The longest piece of each edge that the sensor sees, as fractions (from, to) of the image's length; (0, 0)
         where it sees nothing of it. `visibility.visible_spans` gives all pieces.
@@ -40,6 +41,7 @@ class Outline:
     names: tuple[str, ...]
     ends: np.ndarray
     trims: np.ndarray
+    framed: np.ndarray
     shown: np.ndarray
     visible: np.ndarray
 
@@ -50,8 +52,8 @@ class Outline:
 
     @property
     def usable(self) -> np.ndarray:
-        """Length that is left after trimming, px, shape (..., E); not positive where nothing is left."""
-        return self.lengths - self.trims.sum(-1)
+        """Length that is left within the image after trimming, px, shape (..., E); not positive where nothing is."""
+        return self.lengths - self.framed.sum(-1)
 
 
 def straight(scene: Scene) -> tuple[str, ...]:
@@ -81,13 +83,13 @@ def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = N
     trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
     shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
     lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
-    trims = cut(trims, within_image(scene, ends), lengths, 0.0)
     if not solid.is_convex:
         trims = cut(trims, shown, lengths, clear)
     return Outline(
         names=names,
         ends=ends,
         trims=trims,
+        framed=cut(trims, within_image(scene, ends), lengths, 0.0),
         shown=shown,
         visible=_stack([turned(solid, edge, positions).any(-1) for edge in edges], -1) & (shown[..., 1] > 0),
     )

@@ -147,10 +147,11 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     priced = evaluator(price)(scene, list(sensor), list(light))
     known = priced.quantity
     edges = tuple(
-        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, usable, step))
-        for name, length, usable, step, seen in zip(
+        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, whole, usable, step))
+        for name, length, whole, usable, step, seen in zip(
             known.view.names,
             known.view.lengths,
+            known.view.lengths - known.view.trims.sum(-1),
             known.view.usable,
             priced.contrast,
             known.view.visible,
@@ -215,8 +216,8 @@ def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
     return np.stack(found)
 
 
-def _edge_status(scene: Scene, visible: bool, usable: float, step: float) -> str:
-    if not visible or not np.isfinite(usable):
+def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step: float) -> str:
+    if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
         return "not_visible"
     if not step > MIN_CONTRAST * np.sqrt(scene.noise.variance):
         return "low_contrast"

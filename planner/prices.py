@@ -180,15 +180,13 @@ class _Along:
 
 def used_trims(scene: Scene, view, sensors: np.ndarray, lights: np.ndarray, *, trimmed: bool) -> np.ndarray:
     """Lengths left out at both ends of each edge, px, shape (..., E, 2): trims, and what is hidden or in shadow."""
-    if scene.solid.is_convex:
-        return view.trims if trimmed else np.zeros_like(view.trims)
+    trims = view.framed if trimmed else np.zeros_like(view.trims)
+    if scene.solid.is_convex or not view.names:
+        return trims
     positions = scene.camera.distance * direction(sensors), scene.light.distance * direction(lights)
     spans = [longest_span(scene.solid, scene.solid.edge(name), *positions) for name in view.names]
-    if not spans:
-        return view.trims
     shown = image_fractions(scene, view.names, sensors, np.stack(spans, -2))
-    clear = reach(scene.locator.scale_px, scene.camera.blur_px) if trimmed else 0.0
-    return cut(view.trims if trimmed else np.zeros_like(view.trims), shown, view.lengths, clear)
+    return cut(trims, shown, view.lengths, reach(scene.locator.scale_px, scene.camera.blur_px) if trimmed else 0.0)
 
 
 def integral(values: np.ndarray, length: np.ndarray) -> np.ndarray:

@@ -140,7 +140,7 @@ def _calibrated(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.
     """Coefficients of r^6 at the interpolation's nodes; the first takes the square of the range of r^3."""
     scale = scene.locator.scale_px
     per_point = kappa2(scale, scene.camera.blur_px) * scene.noise.variance
-    whole, trims = known.view.lengths[..., None], known.view.trims
+    whole, trims = known.view.lengths[..., None], known.view.framed
     length = whole - trims.sum(-1, keepdims=True)
     good = (length[..., 0] >= MIN_USABLE).all(-1)
     length = np.where(length > 0, length, np.nan)
