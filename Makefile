@@ -3,13 +3,16 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test lint clean
+.PHONY: validate test lint bench-planner clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
 
 test: lint
 	$(BIN)/pytest -n 2
+
+bench-planner: $(VENV)/.installed
+	$(BIN)/python -m planner.benchmark
 
 lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .

@@ -83,9 +83,8 @@ def table_1(scene: scenes.Scene, part1: scenes.Scene) -> None:
     print("\nTable 1: the paper's search and its price by ours (one free factor, from Table 3)")
     for sensor, light, printed in TABLE_1:
         value = scale * planner.predict(part1, sensor, light, "paper").variance_px2
-        print(
-            f"  sensor {_pose(sensor)}, light {_pose(light)}: {printed:.4f}, ours {value:.4f} ({value / printed - 1:+.1%})"
-        )
+        off = value / printed - 1
+        print(f"  sensor {_pose(sensor)}, light {_pose(light)}: {printed:.4f}, ours {value:.4f} ({off:+.1%})")
     space = ViewingSpace(1.0, (0, 90))
     found = planner.alternate(part1, space, space, np.array([40.0, 41.0]), "paper", "image")
     print("Our alternating search from the same sensor")

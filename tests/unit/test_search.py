@@ -128,15 +128,18 @@ def test_best_edges_are_at_least_as_good(task1):
     assert best.pairs == 9 * given.pairs
 
 
-@pytest.mark.parametrize("name", ["bracket", "plate"])
-def test_plans_of_hollow_and_round_objects(name):
+@pytest.mark.parametrize(("name", "step"), [("bracket", 22.5), ("plate", 30)])
+def test_plans_of_hollow_and_round_objects(name, step, rng):
+    """The plan measures, its value is that of its own prediction, and no random pair of the grid is better."""
     scene = scenes.load(name)
-    found = planner.plan(scene, step_deg=22.5, refined=name == "bracket")
+    found = planner.plan(scene, step_deg=step, refined=False)
     assert found.prediction.status == "ok"
-    assert 0 < found.variance < np.inf
-    coarse = ViewingSpace(22.5, (0, 90)).poses
-    exact = price_pairs(scene, *(a.reshape(-1, 2) for a in grid(coarse)), "calibrated", "object")
-    assert found.grid_variance == pytest.approx(exact.min(), rel=1e-9)
+    assert found.prediction.variance_cm2 == pytest.approx(found.grid_variance, rel=1e-9)
+    poses = ViewingSpace(step, (0, 90)).poses
+    pairs = poses[rng.integers(len(poses), size=(2, 60))]
+    exact = price_pairs(scene, *pairs, "calibrated", "object")
+    assert np.isfinite(exact).any()
+    assert exact.min() >= found.grid_variance > 0
 
 
 def test_constraints(task1):
@@ -144,11 +147,11 @@ def test_constraints(task1):
         sensor_polar_deg=(20, 60), light_polar_deg=(30, 80), forbidden_sensor=((30, 20, 25),), min_edge_px=30,
         min_clearance_px=20, min_separation_deg=40, light_out_of_view=True,
     )  # fmt: skip
-    free, bound = planner.plan(task1, step_deg=5), planner.plan(task1, step_deg=5, constraints=limits)
+    free, bound = planner.plan(task1, step_deg=8), planner.plan(task1, step_deg=8, constraints=limits)
     assert bound.variance > free.variance
     assert limits.allows(task1, np.array(list(bound.sensor)), np.array(list(bound.light)))
     assert not limits.allows(task1, np.array(list(free.sensor)), np.array(list(free.light)))
-    mounted = planner.plan(task1, step_deg=5, constraints=planner.Constraints(same_mount=True))
+    mounted = planner.plan(task1, step_deg=8, constraints=planner.Constraints(same_mount=True))
     assert mounted.sensor == mounted.light
     with pytest.raises(InvalidInput, match="min_edge_px must be at least 0, got -1"):
         planner.Constraints(min_edge_px=-1)
