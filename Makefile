@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test lint bench-measure clean
+.PHONY: validate test lint bench-measure bench-planner clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -14,6 +14,9 @@ test: lint
 # How near the estimators come to the Cramer-Rao bound, and how fast they are (10 minutes).
 bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
+
+bench-planner: $(VENV)/.installed
+	$(BIN)/python -m planner.benchmark
 
 lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .

@@ -9,9 +9,12 @@ import numpy as np
 
 from planner import prices
 from planner.locator import MIN_CONTRAST, MIN_USABLE
-from scenes import InvalidInput, Scene
+from planner.propagation import corner_covariance
+from planner.quantity import normals
+from scenes import Corner, InvalidInput, Scene
 
 Price = Literal["paper", "calibrated", "bound"]
+Objective = Literal["object", "image"]
 _PRICES = {"paper": prices.paper, "calibrated": prices.calibrated, "bound": prices.bound}
 _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
@@ -28,38 +31,66 @@ class EdgePrediction:
 
 @dataclass(frozen=True)
 class Prediction:
-    """How precisely one setting will let the distance be measured.
+    """How precisely one setting will let the distance or the angle be measured.
 
     Attributes
     ----------
     price : str
         ``paper``, ``calibrated`` or ``bound``.
-    value_px : float
-        The distance itself, as the model projects it, px.
-    variance_px2 : float
-        Variance (not sigma) of the measured distance, px^2; infinite, with the reason in `status`, where it
+    kind : str
+        ``distance`` or ``angle``.
+    value_image, value_object : float
+        The quantity itself, as the model projects it and in the object: px and cm, or degrees.
+    variance_image, variance_object : float
+        Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
         cannot be measured. The ``paper`` price is right only up to one factor common to all settings, and infinite
         only where an edge is hidden or without any contrast.
     corners : ndarray, shape (2, 2)
-        Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
+        Start and end feature (x, y), px; (0, 0) is the centre of the first pixel. For an angle, a point on each line.
     covariances : ndarray, shape (2, 2, 2)
-        Covariance of each corner, px^2.
+        Covariance of each feature, px^2; NaN for an angle, which needs no corners.
     edges : tuple of EdgePrediction
+        The straight edges.
     status : str
         ``ok``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``.
     """
 
     price: str
-    value_px: float
-    variance_px2: float
+    kind: str
+    value_image: float
+    value_object: float
+    variance_image: float
+    variance_object: float
     corners: np.ndarray
     covariances: np.ndarray
     edges: tuple[EdgePrediction, ...]
     status: str
 
+    @property
+    def value_px(self) -> float:
+        """The distance in the image, px."""
+        return self._of_a_distance("value_px", self.value_image)
 
-def variances(scene: Scene, sensors: Any, lights: Any, price: Price = "calibrated") -> np.ndarray:
-    """Variance of the measured distance for arrays of settings, px^2.
+    @property
+    def variance_px2(self) -> float:
+        """Its variance, px^2."""
+        return self._of_a_distance("variance_px2", self.variance_image)
+
+    @property
+    def variance_cm2(self) -> float:
+        """Variance of the physical length, cm^2."""
+        return self._of_a_distance("variance_cm2", self.variance_object)
+
+    def _of_a_distance(self, name: str, value: float) -> float:
+        if self.kind != "distance":
+            raise InvalidInput(f"task.kind must be distance for {name}, got {self.kind!r}")
+        return value
+
+
+def variances(
+    scene: Scene, sensors: Any, lights: Any, price: Price = "calibrated", objective: Objective = "image"
+) -> np.ndarray:
+    """Variance of the measured quantity for arrays of settings.
 
     Parameters
     ----------
@@ -67,11 +98,14 @@ def variances(scene: Scene, sensors: Any, lights: Any, price: Price = "calibrate
     sensors, lights : array_like, shape (..., 2)
         Poses (polar, azimuth) in degrees, broadcast against each other.
     price : {"calibrated", "paper", "bound"}
+    objective : {"image", "object"}
+        In the image (px^2) or in the object (cm^2: px^2 over the squared derivative of the image's distance by the
+        object's, both ends moving apart alike); degrees^2 for an angle.
 
     Returns
     -------
     ndarray, shape (...)
-        Infinite where the distance cannot be measured.
+        Infinite where it cannot be measured.
 
     Examples
     --------
@@ -81,7 +115,8 @@ def variances(scene: Scene, sensors: Any, lights: Any, price: Price = "calibrate
     >>> round(float(v[1] / v[0]), 1)  # the paper's Table 3: 0.595 / 0.070 = 8.5
     9.0
     """
-    return _evaluate(scene, price)(scene, sensors, lights).variance
+    priced = evaluator(price)(scene, sensors, lights)
+    return in_units(scene, priced.variance if check_objective(objective) == "image" else priced.variance_object, 2)
 
 
 def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") -> Prediction:
@@ -109,48 +144,93 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     ('ok', 100.8, True)
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
-    priced = _evaluate(scene, price)(scene, list(sensor), list(light))
+    priced = evaluator(price)(scene, list(sensor), list(light))
+    known = priced.quantity
     edges = tuple(
-        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, usable, step))
-        for name, length, usable, step, seen in zip(
-            priced.view.names,
-            priced.view.lengths,
-            priced.view.usable,
+        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, whole, usable, step))
+        for name, length, whole, usable, step, seen in zip(
+            known.view.names,
+            known.view.lengths,
+            known.view.lengths - known.view.trims.sum(-1),
+            known.view.usable,
             priced.contrast,
-            priced.view.visible,
+            known.view.visible,
             strict=True,
         )
     )
     return Prediction(
         price=price,
-        value_px=float(np.linalg.norm(priced.ends[1] - priced.ends[0])),
-        variance_px2=float(priced.variance),
-        corners=priced.ends,
-        covariances=priced.covariances,
+        kind=scene.task.kind,
+        value_image=float(in_units(scene, known.value, 1)),
+        value_object=float(in_units(scene, known.value_object, 1)),
+        variance_image=float(in_units(scene, priced.variance, 2)),
+        variance_object=float(in_units(scene, priced.variance_object, 2)),
+        corners=known.points,
+        covariances=_covariances(scene, priced),
         edges=edges,
-        status=_status(priced, edges),
+        status=_status(scene, priced, edges),
     )
 
 
-def _evaluate(scene: Scene, price: str):
+def evaluator(price: str):
+    """The function that prices arrays of settings.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such price.
+    """
     if price not in _PRICES:
         raise InvalidInput(f"price must be one of {', '.join(get_args(Price))}, got {price!r}")
     return _PRICES[price]
 
 
-def _edge_status(scene: Scene, visible: bool, usable: float, step: float) -> str:
-    if not visible or not np.isfinite(usable):
+def check_objective(objective: str) -> str:
+    """The objective, once it is known to be one."""
+    if objective not in get_args(Objective):
+        raise InvalidInput(f"objective must be one of {', '.join(get_args(Objective))}, got {objective!r}")
+    return objective
+
+
+def in_units(scene: Scene, value, power: int):
+    """Angles in degrees."""
+    return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
+
+
+def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
+    """Covariances of the two features, px^2."""
+    if not scene.task.corners:
+        return np.full((2, 2, 2), np.nan)
+    view, centres, found = priced.quantity.view, iter(priced.centres), []
+    for feature in scene.task.corners:
+        if not isinstance(feature, Corner):
+            found.append(next(centres))
+            continue
+        index = [view.names.index(name) for name in feature.edges]
+        vertex = scene.solid.vertex_names.index(feature.vertex)
+        last = np.array([scene.solid.edge(name).ends[1] == vertex for name in view.names])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            offsets = priced.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
+        offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
+        found.append(corner_covariance(normals(view)[index], offsets[index]))
+    return np.stack(found)
+
+
+def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step: float) -> str:
+    if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
         return "not_visible"
     if not step > MIN_CONTRAST * np.sqrt(scene.noise.variance):
         return "low_contrast"
     return "short" if usable < MIN_USABLE else "ok"
 
 
-def _status(priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:
+def _status(scene: Scene, priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:
     for worst in ("not_visible", "short", "low_contrast"):
         if any(edge.status == worst for edge in edges):
             return worst
-    ends = priced.view.ends
-    along = (ends[:, 1] - ends[:, 0]) / priced.view.lengths[:, None]
-    sines = [abs(np.linalg.det(along[pair])) for pair in (slice(0, 2), slice(2, 4))]
-    return "ill_conditioned" if min(sines) < _MIN_SINE else "ok"
+    directions = dict(zip(priced.quantity.view.names, normals(priced.quantity.view), strict=True))
+    corners = [feature for feature in scene.task.corners if isinstance(feature, Corner)]
+    sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
+    if min(sines, default=1.0) < _MIN_SINE:
+        return "ill_conditioned"
+    return "ok" if np.isfinite(priced.variance) else "not_visible"

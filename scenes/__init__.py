@@ -2,11 +2,25 @@
 
 from scenes.errors import InvalidInput
 from scenes.load import load, names
-from scenes.model import Block, Camera, Corner, Light, Locator, Material, Noise, Scene, Setting, Task
+from scenes.model import (
+    Block,
+    Camera,
+    Centre,
+    Corner,
+    Light,
+    Locator,
+    Material,
+    Mesh,
+    Noise,
+    Scene,
+    Setting,
+    Task,
+)
 from scenes.pose import Pose
-from scenes.solid import Edge, Solid, block
+from scenes.solid import Circle, Edge, Solid, block
 
 __all__ = [
-    "Block", "Camera", "Corner", "Edge", "InvalidInput", "Light", "Locator", "Material", "Noise", "Pose",
+    "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "InvalidInput", "Light", "Locator", "Material", "Mesh",
+    "Noise", "Pose",
     "Scene", "Setting", "Solid", "Task", "block", "load", "names",
 ]  # fmt: skip

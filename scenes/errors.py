@@ -30,7 +30,11 @@ _KINDS = {
     "model_type": "a table of keys",
     "model_attributes_type": "a table of keys",
     "dict_type": "a table of keys",
+    "union_tag_invalid": "a known kind (block, mesh)",
 }
+
+
+_TAGS = ("block", "mesh", "corner", "centre")  # alternatives of the model, no keys of the file
 
 
 class InvalidInput(ValueError):
@@ -49,7 +53,7 @@ def describe(error: ValidationError) -> str:
 def _key(location: tuple[int | str, ...]) -> str:
     """("settings", 3, "light") becomes settings[3].light."""
     key = ""
-    for part in location:
+    for part in (part for part in location if part not in _TAGS):
         key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
     return key or "the scene"
 

@@ -45,9 +45,11 @@ def load(source: str | Path) -> Scene:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
     try:
-        return Scene.model_validate({"name": path.stem, **document})
+        return Scene.model_validate({"name": path.stem, **document}, context={"directory": path.parent})
     except ValidationError as error:
         raise InvalidInput(f"{path}: {describe(error)}") from None
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from None
 
 
 def _find(source: str | Path) -> Path:

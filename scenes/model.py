@@ -6,11 +6,13 @@ Lengths in space are cm, lengths in the image px, brightness is in grey levels.
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
+from scenes import mesh
 from scenes.errors import InvalidInput
 from scenes.pose import Pose, PoseField
 from scenes.solid import Solid, block
@@ -36,6 +38,35 @@ class Block(Model):
     def solid(self) -> Solid:
         """Vertices, faces and edges, named as in the paper's Fig. 6."""
         return block(self.size)
+
+
+class Mesh(Model):
+    """A polyhedron from a mesh file (STL, PLY or OBJ, lengths in cm).
+
+    ``file`` is relative to the scene's file. Vertices, edges and circles get the names that `scenes.mesh.solid` gives;
+    ``names`` may give vertices (by their position, cm) other ones.
+    """
+
+    kind: Literal["mesh"]
+    file: Path
+    names: dict[str, tuple[float, float, float]] = {}
+
+    @field_validator("file")
+    @classmethod
+    def _beside_the_scene(cls, file: Path, info: ValidationInfo) -> Path:
+        return (info.context or {}).get("directory", Path()) / file
+
+    @cached_property
+    def solid(self) -> Solid:
+        """Vertices, faces, edges and circles of the mesh."""
+        return mesh.renamed(mesh.read(self.file), self.names)
+
+
+def _tag_of_object(value: Any) -> str:
+    return value.get("kind", "block") if isinstance(value, dict) else getattr(value, "kind", "block")
+
+
+Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")], Discriminator(_tag_of_object)]
 
 
 class Material(Model):
@@ -103,21 +134,54 @@ class Corner(Model):
     edges: tuple[str, str]
 
 
-class Task(Model):
-    """What to measure: the distance in the image between two corners."""
+class Centre(Model):
+    """The centre of a circular edge, found by fitting the ellipse that is its image."""
 
-    kind: Literal["distance"] = "distance"
-    start: Corner
-    end: Corner
-
-    @property
-    def corners(self) -> tuple[Corner, Corner]:
-        return self.start, self.end
+    circle: str
 
     @property
     def edges(self) -> tuple[str, ...]:
-        """The required edges: the two of the start corner, then the two of the end corner."""
-        return self.start.edges + self.end.edges
+        """The circle's own name, for it is the one edge that is needed."""
+        return (self.circle,)
+
+
+def _tag_of_feature(value: Any) -> str:
+    return "centre" if isinstance(value, Centre) or (isinstance(value, dict) and "circle" in value) else "corner"
+
+
+Feature = Annotated[Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")], Discriminator(_tag_of_feature)]
+
+
+class Task(Model):
+    """What to measure: the distance in the image between two features, or the angle between two edges.
+
+    A distance needs ``start`` and ``end``, an angle ``lines``, the names of its two edges.
+    """
+
+    kind: Literal["distance", "angle"] = "distance"
+    start: Feature | None = None
+    end: Feature | None = None
+    lines: tuple[str, str] | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Task:
+        wanted = ("start", "end") if self.kind == "distance" else ("lines",)
+        for key in ("start", "end", "lines"):
+            value = getattr(self, key)
+            if (value is None) == (key in wanted):
+                got = "nothing" if value is None else repr(value)
+                raise ValueError(f"task.{key} must be {'given' if key in wanted else 'left out'}, got {got}")
+        return self
+
+    @property
+    def corners(self) -> tuple[Corner | Centre, ...]:
+        """The two features of a distance; none for an angle."""
+        return () if self.start is None or self.end is None else (self.start, self.end)
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """The required edges: those of the start feature, then those of the end feature; or the two lines."""
+        return self.lines or sum((feature.edges for feature in self.corners), ())
 
 
 class Locator(Model):
@@ -155,7 +219,7 @@ class Scene(Model):
 
     name: str
     title: str = ""
-    object: Block
+    object: Object
     material: Material
     camera: Camera
     light: Light
@@ -195,16 +259,35 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        for end in ("start", "end"):
-            self._check_corner(f"task.{end}", getattr(self.task, end))
-        if self.task.start.vertex == self.task.end.vertex:
-            raise ValueError(
-                f"task.end.vertex must be another vertex than task.start.vertex, got {self.task.end.vertex!r}"
-            )
+        self._check_task()
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
         return self
+
+    def _check_task(self) -> None:
+        for end, feature in zip(("start", "end"), self.task.corners, strict=False):
+            check = self._check_corner if isinstance(feature, Corner) else self._check_centre
+            check(f"task.{end}", feature)
+        if self.task.kind == "angle":
+            known = [edge.name for edge in self.solid.edges]
+            for name in self.task.lines:
+                if name not in known:
+                    raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")
+            if self.task.lines[0] == self.task.lines[1]:
+                raise ValueError(f"task.lines must be two different edges, got {list(self.task.lines)}")
+        elif self.task.start == self.task.end or (
+            getattr(self.task.start, "vertex", 0) == getattr(self.task.end, "vertex", 1)
+        ):
+            key = "vertex" if isinstance(self.task.end, Corner) else "circle"
+            raise ValueError(
+                f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(self.task.end, key)!r}"
+            )
+
+    def _check_centre(self, key: str, centre: Centre) -> None:
+        known = [circle.name for circle in self.solid.circles]
+        if centre.circle not in known:
+            raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
 
     def _check_corner(self, key: str, corner: Corner) -> None:
         if corner.vertex not in self.solid.vertex_names:

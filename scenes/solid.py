@@ -1,24 +1,62 @@
-"""The geometry of an object: vertices, plane faces, and the edges where two faces meet."""
+"""The geometry of an object: vertices, plane faces, the edges where two faces meet, and circular edges."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull
+
+_FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A straight edge: its two end vertices and the two faces that meet in it (indices)."""
+    """A straight edge: its two end vertices and the two faces that meet in it (indices).
+
+    ``convex`` is False for an inner edge, where the two faces look at each other.
+    """
 
     name: str
     ends: tuple[int, int]
     faces: tuple[int, int]
+    convex: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """A circular edge: the rim of a hole, or the end of a cylinder.
+
+    Attributes
+    ----------
+    name : str
+    centre, axis : ndarray, shape (3,)
+        Centre, cm, and unit normal of the plane face that it bounds, outwards.
+    radius : float
+        cm.
+    face : int
+        The plane face.
+    edges : tuple of str
+        The straight edges that stand for it in the mesh.
+    hole : bool
+        Whether the wall looks towards the axis.
+    """
+
+    name: str
+    centre: np.ndarray
+    axis: np.ndarray
+    radius: float
+    face: int
+    edges: tuple[str, ...]
+    hole: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A convex solid with plane faces, in object coordinates (cm).
+    """A polyhedron, in object coordinates (cm); it may be hollow, not convex, or in several pieces.
 
     Attributes
     ----------
@@ -27,44 +65,93 @@ class Solid:
     vertices : ndarray, shape (V, 3)
         Positions, cm.
     faces : tuple of tuple of int
-        Vertex indices of each face, counter-clockwise seen from outside.
+        Vertex indices of each face's outer boundary, counter-clockwise seen from outside.
     edges : tuple of Edge
+    triangles : ndarray, shape (T, 3, 3), optional
+        Corners of triangles that cover the faces exactly, holes left out; fans of the boundaries when not given.
+    triangle_faces : ndarray of int, shape (T,), optional
+        The face of each triangle.
+    circles : tuple of Circle
     """
 
     vertex_names: tuple[str, ...]
     vertices: np.ndarray
     faces: tuple[tuple[int, ...], ...]
     edges: tuple[Edge, ...]
+    triangles: np.ndarray | None = None
+    triangle_faces: np.ndarray | None = None
+    circles: tuple[Circle, ...] = ()
 
-    @property
+    def __post_init__(self) -> None:
+        if self.triangles is None:
+            fans = np.array([(f, face[0], *pair) for f, face in enumerate(self.faces) for pair in pairwise(face[1:])])
+            object.__setattr__(self, "triangles", self.vertices[fans[:, 1:]])
+            object.__setattr__(self, "triangle_faces", fans[:, 0])
+
+    @cached_property
     def normals(self) -> np.ndarray:
         """Outward unit normal of each face, shape (F, 3)."""
-        corners = np.array([[self.vertices[i] for i in face[:3]] for face in self.faces])
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+        corners = self.triangles
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
+        normal = np.zeros((len(self.faces), 3))
+        np.add.at(normal, self.triangle_faces, areas)
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
-    @property
+    @cached_property
     def offsets(self) -> np.ndarray:
         """Distance of each face's plane from the origin along its normal, cm, shape (F,)."""
         anchors = self.vertices[[face[0] for face in self.faces]]
         return np.einsum("fi,fi->f", self.normals, anchors)
 
+    @cached_property
+    def outer(self) -> np.ndarray:
+        """Which faces lie on the convex hull, so that no vertex stands over them; bool, shape (F,)."""
+        over = self.vertices @ self.normals.T - self.offsets
+        return over.max(0) <= _FLAT * np.ptp(self.vertices)
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether all faces are outer ones: nothing then hides or shadows another part."""
+        return bool(self.outer.all())
+
+    @cached_property
+    def _hull(self) -> tuple[np.ndarray, np.ndarray]:
+        """Planes (normals, offsets) of the convex hull."""
+        if self.is_convex:
+            return self.normals, self.offsets
+        planes = ConvexHull(self.vertices).equations
+        return planes[:, :3], -planes[:, 3]
+
     def height_above(self, point: np.ndarray) -> float:
-        """How far a point lies outside the solid's nearest plane, cm; zero or less inside or on it."""
-        return float(np.max(self.normals @ point - self.offsets))
+        """How far a point lies outside the nearest plane of the convex hull, cm; zero or less in or on it."""
+        normals, offsets = self._hull
+        return float(np.max(normals @ point - offsets))
 
     def vertex(self, name: str) -> np.ndarray:
         """Position of the named vertex, cm, shape (3,)."""
         return self.vertices[self.vertex_names.index(name)]
 
+    @cached_property
+    def _edge_of_name(self) -> dict[str, Edge]:
+        return {edge.name: edge for edge in self.edges}
+
     def edge(self, name: str) -> Edge:
         """The named edge."""
-        return next(edge for edge in self.edges if edge.name == name)
+        return self._edge_of_name[name]
 
     def edges_at(self, vertex: str) -> tuple[Edge, ...]:
         """All edges that end in the named vertex."""
         index = self.vertex_names.index(vertex)
         return tuple(edge for edge in self.edges if index in edge.ends)
+
+    def circle(self, name: str) -> Circle:
+        """The named circular edge."""
+        return next(circle for circle in self.circles if circle.name == name)
+
+    def mesh(self) -> trimesh.Trimesh:
+        """The surface as triangles, vertices merged, normals outwards."""
+        flat = self.triangles.reshape(-1, 3)
+        return trimesh.Trimesh(flat, np.arange(len(flat)).reshape(-1, 3), process=True)
 
 
 # Fig. 6 of the paper: v3 and v6 are opposite corners of the top face, e4 e9 e7 e11 its sides,

@@ -1,0 +1,64 @@
+"""The variance over the viewing space with the sensor or the light held fixed: the paper's search space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planner.predict import Objective, Price, check_objective, evaluator, in_units
+from planner.viewing import ViewingSpace
+from scenes import InvalidInput, Scene
+
+_CHUNK = 4096  # directions at a time, which bounds the memory
+
+
+def variance_map(
+    scene: Scene,
+    sensor: Any = None,
+    light: Any = None,
+    *,
+    space: ViewingSpace | None = None,
+    price: Price = "calibrated",
+    objective: Objective = "object",
+) -> np.ndarray:
+    """Variance for every direction of the viewing space, one of sensor and light being held fixed.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor, light : Pose or pair of float, optional
+        Exactly one: the one that is held fixed. Degrees.
+    space : ViewingSpace, optional
+        Where the other one may stand; the paper's 41 347 directions when not given.
+    price : {"calibrated", "paper", "bound"}
+    objective : {"object", "image"}
+
+    Returns
+    -------
+    ndarray, shape (len(space),)
+        cm^2 or px^2 (degrees^2 for an angle); infinite where it cannot be measured.
+
+    Raises
+    ------
+    InvalidInput
+        If both or neither of sensor and light are given.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> values = variance_map(scenes.load("task1"), sensor=(30, 135), space=ViewingSpace(10))
+    >>> values.shape, int(np.isfinite(values).sum()) > 100
+    ((425,), True)
+    """
+    if (sensor is None) == (light is None):
+        raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
+    space = ViewingSpace() if space is None else space
+    fixed = np.array(list(scene.check_pose("sensor" if light is None else "light", sensor if light is None else light)))
+    evaluate, field = evaluator(price), "variance" if check_objective(objective) == "image" else "variance_object"
+    values = np.empty(len(space))
+    for at in range(0, len(space), _CHUNK):
+        part = slice(at, at + _CHUNK)
+        poses = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
+        values[part] = getattr(evaluate(scene, *poses), field)
+    return in_units(scene, values, 2)

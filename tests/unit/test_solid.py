@@ -1,0 +1,137 @@
+"""Solids from mesh files, and which parts of their edges a position sees."""
+
+import re
+
+import numpy as np
+import pytest
+import trimesh
+
+import planner
+import scenes
+from planner.view import direction
+from planner.visibility import seen, turned, visible_spans
+from scenes import InvalidInput, mesh
+
+BLOCK = scenes.block((12.5, 7.5, 2.5))
+
+
+def as_mesh_scene(task1, path):
+    """Task1 with its block read from a file: the same vertices and edges by other names."""
+    names = {name: tuple(BLOCK.vertex(name)) for name in ("v3", "v6")}
+    body = scenes.Mesh(kind="mesh", file=path, names={f"p{n}": at for n, at in names.items()})
+    ends = {frozenset(map(tuple, BLOCK.vertices[list(edge.ends)].round(6).tolist())): edge.name for edge in BLOCK.edges}
+    read = body.solid
+    same = {ends[frozenset(map(tuple, read.vertices[list(e.ends)].round(6).tolist()))]: e.name for e in read.edges}
+
+    def corner(old):
+        return scenes.Corner(vertex=f"p{old.vertex}", edges=tuple(same[name] for name in old.edges))
+
+    task = scenes.Task(start=corner(task1.task.start), end=corner(task1.task.end))
+    return task1.model_copy(update={"object": body, "task": task})
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_the_block_from_a_file_gives_the_boxs_numbers(task1, tmp_path, suffix):
+    path = tmp_path / f"block.{suffix}"
+    BLOCK.mesh().export(path)
+    read = as_mesh_scene(task1, path)
+    for setting in task1.settings:
+        for price in ("paper", "calibrated", "bound"):
+            ours, theirs = (planner.predict(s, setting.sensor, setting.light, price) for s in (read, task1))
+            assert ours.variance_px2 == pytest.approx(theirs.variance_px2, rel=1e-9)
+            assert ours.variance_cm2 == pytest.approx(theirs.variance_cm2, rel=1e-9)
+            assert ours.status == theirs.status
+
+
+def test_faces_edges_and_names_of_a_box():
+    box = mesh.solid(trimesh.creation.box((2, 2, 2)).subdivide().subdivide())
+    assert (len(box.vertices), len(box.faces), len(box.edges), box.is_convex) == (8, 6, 12, True)
+    assert all(len(face) == 4 for face in box.faces)
+    assert box.mesh().volume == pytest.approx(8)
+    assert box.vertex("v1").tolist() == [-1, -1, -1]
+
+
+def test_bundled_bodies():
+    wedge, bracket, plate = (scenes.load(name).solid for name in ("wedge", "bracket", "plate"))
+    assert (len(wedge.faces), len(wedge.edges), wedge.is_convex) == (5, 9, True)
+    assert (len(bracket.faces), len(bracket.edges), bracket.is_convex) == (8, 18, False)
+    assert [edge.name for edge in bracket.edges if not edge.convex] == ["e10"]
+    assert [(c.name, c.hole, len(c.edges)) for c in plate.circles] == [("c1", True, 64), ("c2", True, 64)]
+    assert plate.circle("c2").centre == pytest.approx([5, 4, 1], abs=1e-6)
+    assert plate.circle("c2").radius == pytest.approx(2, abs=1e-6)
+
+
+def test_height_above_is_that_of_the_convex_hull():
+    bracket = scenes.load("bracket").solid
+    assert bracket.height_above(np.array([5.0, 2.0, 3.0])) < 0  # under the brace, outside the metal
+    assert bracket.height_above(np.array([5.0, 2.0, 9.0])) > 0
+    assert BLOCK.height_above(np.array([1.0, 1.0, 4.5])) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [(b"solid x\nendsolid x\n", "must "), (b"no mesh at all", "must "), (None, "must be a readable mesh")],
+)
+def test_bad_mesh_file(tmp_path, content, line):
+    path = tmp_path / "bad.stl"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=line):
+        mesh.read(path)
+
+
+def test_open_mesh_is_refused(tmp_path):
+    shape = trimesh.creation.box((1, 1, 1))
+    shape.update_faces(np.arange(len(shape.faces)) > 0)
+    with pytest.raises(InvalidInput, match=r"object\.file must be a closed surface"):
+        mesh.solid(shape)
+
+
+def test_scene_names_the_key_of_a_bad_mesh(tmp_path):
+    text = (scenes.load.__globals__["BUNDLED"] / "wedge.toml").read_text()
+    path = tmp_path / "s.toml"
+    path.write_text(text)  # the mesh is not beside it
+    with pytest.raises(InvalidInput, match=re.escape("object.file must be a readable mesh")):
+        scenes.load(path)
+
+
+def blocked(point, position, solid, own):
+    """Moeller-Trumbore against every triangle outside the edge's own faces."""
+    corners = solid.triangles[~np.isin(solid.triangle_faces, own)]
+    ray, one, two = position - point, corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    h = np.cross(ray, two)
+    a = (one * h).sum(1)
+    ok = np.abs(a) > 1e-12
+    f = 1 / np.where(ok, a, 1)
+    s = point - corners[:, 0]
+    q = np.cross(s, one)
+    u, v, t = f * (s * h).sum(1), f * (q @ ray), f * (two * q).sum(1)
+    return bool((ok & (u > 0) & (v > 0) & (u + v < 1) & (t > 1e-9)).any())
+
+
+def test_visible_points_against_rays(rng):
+    """Exact hidden intervals of the bracket's edges against a ray for every point."""
+    solid = scenes.load("bracket").solid
+    positions = 100 * direction(np.column_stack([rng.uniform(0, 180, 30), rng.uniform(0, 360, 30)]))
+    fractions = np.linspace(0.013, 0.987, 23)
+    hidden = 0
+    for edge in solid.edges:
+        start, stop = solid.vertices[list(edge.ends)]
+        ours = seen(solid, edge, positions, fractions)
+        for i, position in enumerate(positions):
+            expected = [not blocked(start + f * (stop - start), position, solid, edge.faces) for f in fractions]
+            assert ours[i].tolist() == expected
+            hidden += expected.count(False)
+    assert hidden > 500
+
+
+def test_half_hidden_edge():
+    """From low over the short leg the upright hides part of the edge behind it; the span says which part."""
+    solid = scenes.load("bracket").solid
+    edge = solid.edge("e14")  # from (1.5, 5, 1.5) along the base
+    position = np.array([-60.0, 3.0, 40.0])  # beyond the upright, whose top is at 6
+    ((start, stop),) = visible_spans(solid, edge, position)
+    shadow = 1.5 + (6 - 1.5) / (40 - 6) * 61.5  # similar triangles through the upright's inner top edge
+    assert stop == 1
+    assert 1.5 + start * 8.5 == pytest.approx(shadow, rel=1e-9)
+    assert turned(solid, solid.edge("e10"), np.array([50.0, 2.5, -3.0])).tolist() == [False, False]
