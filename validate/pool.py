@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -95,6 +96,9 @@ def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
         from distributed import Client
     except ImportError:
         raise InvalidInput("--dask must be used with the extra 'dask' installed, got no package distributed") from None
+    log = logging.getLogger("distributed")
+    former = log.level
+    log.setLevel(logging.CRITICAL)  # its reports of a lost scheduler are pages long; ours is one line
     try:
         client = Client(address, timeout=patience, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
@@ -107,8 +111,9 @@ def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
             executor, lambda: max(1, sum(client.nthreads().values())), lambda error: _check(client, address, error)
         )
     finally:
-        executor.shutdown(wait=False, cancel_futures=True)
+        executor.shutdown(wait=False)  # which cancels
         client.close(timeout=2)
+        log.setLevel(former)
 
 
 def _check(client, address: str, error: Exception | None) -> None:

@@ -63,10 +63,10 @@ def _variances(found: Validation) -> Table:
     for row in found.rows:
         real = row.paper_real or (None, None)
         table.add_row(
-            _pose(row.sensor), _pose(row.light), _number(row.paper_ice), _number(row.paper),
-            _number(row.paper / row.paper_ice if row.paper_ice else None), *map(_number, real),
-            _small(row.calibrated), _small(row.main.propagated), _small(row.main.empirical),
-            *(_small(judged.empirical) for judged in row.classic), _small(row.bound),
+            pose(row.sensor), pose(row.light), number(row.paper_ice), number(row.paper),
+            number(row.paper / row.paper_ice if row.paper_ice else None), *map(number, real),
+            small(row.calibrated), small(row.main.propagated), small(row.main.empirical),
+            *(small(judged.empirical) for judged in row.classic), small(row.bound),
         )  # fmt: skip
     return table
 
@@ -84,7 +84,7 @@ def _ratios(found: Validation) -> Table:
     for row in found.rows:
         methods = [row.main, *row.classic]
         table.add_row(
-            _pose(row.sensor), _pose(row.light), *map(_ratio, methods), str(row.main.n), _failed(row),
+            pose(row.sensor), pose(row.light), *map(ratio, methods), str(row.main.n), failed(row),
             "-" if row.main.bias is None else f"{row.main.bias:+.4f}", row.main.status,
         )  # fmt: skip
     return table
@@ -96,11 +96,11 @@ def _search(found: Validation) -> Table:
     )
     for _, sensor, light, theirs, ours in found.search:
         table.add_row(
-            _pose(sensor),
-            _pose(light),
-            _number(theirs, 4),
-            _number(ours, 4),
-            _number(ours / theirs if theirs else None),
+            pose(sensor),
+            pose(light),
+            number(theirs, 4),
+            number(ours, 4),
+            number(ours / theirs if theirs else None),
         )
     return table
 
@@ -136,24 +136,24 @@ def _time(found: Validation) -> Text:
     return Text(f"\nTime: {wall:.1f} s with {workers} workers on {found.variant}. Working seconds: {parts}.")
 
 
-def _pose(pose: tuple[float, float]) -> str:
+def pose(pose: tuple[float, float]) -> str:
     return f"({pose[0]:g}, {pose[1]:g})"
 
 
-def _number(value: float | None, digits: int = 3) -> str:
+def number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else "inf" if math.isinf(value) else f"{value:.{digits}f}"
 
 
-def _small(value: float | None) -> str:
+def small(value: float | None) -> str:
     return "-" if value is None or math.isnan(value) else "inf" if math.isinf(value) else f"{value / _UNIT:#.3g}"
 
 
-def _ratio(judged: Judged) -> str:
+def ratio(judged: Judged) -> str:
     if judged.ratio is None:
         return f"- ({judged.status})"
     low, high = judged.ratio_interval
     return f"{judged.ratio:.3f} [{low:.3f}, {high:.3f}]{' ' if low <= 1 <= high else '*'}"
 
 
-def _failed(row: Row) -> str:
+def failed(row: Row) -> str:
     return " ".join(str(judged.failed) for judged in (row.main, *row.classic))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 import time
 import zlib
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from validate.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time
+_RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
 
 
 @dataclass(frozen=True)
@@ -105,9 +107,13 @@ class Found:
 
 def perform(task: Task) -> Found:
     """Render, unless the image came with the task, then measure."""
-    variants.use(task.variant)  # what the machine cannot do is not the setting's fault
+    with _RENDERER:
+        variants.use(task.variant)  # what the machine cannot do is not the setting's fault
     try:
-        clean = None if task.picture else render_setting(task.case, task.variant)
+        clean = None
+        if task.picture is None:
+            with _RENDERER:
+                clean = render_setting(task.case, task.variant)
         image = (task.picture or clean.picture).array()
         return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, count) for k, count in task.chunks})
     except InvalidInput as error:
