@@ -66,7 +66,7 @@ def draw_residuals(found: Validation, path: Path) -> Path:
     for level, style, label in ((stats.norm.isf(0.025), ":", "95 %, one row"), (limit, "--", "verdict, whole table")):
         axis.axhline(level, color="0.4", ls=style, lw=1, label=label)
         axis.axhline(-level, color="0.4", ls=style, lw=1)
-    reach = 1.15 * max(limit, np.abs(values).max(initial=0))
+    reach = 1.4 * max(limit, np.abs(values).max(initial=0))
     axis.set(xlabel="setting", ylabel="residual, standard errors", ylim=(-reach, reach))
     axis.legend(frameon=False, ncols=2, loc="upper right", fontsize=9)
     return save(figure, path)
@@ -83,7 +83,7 @@ def draw_distribution(distances: Distances, path: Path) -> Path:
     left.set(xlim=(-4.5, 4.5), xlabel="(distance - mean) / predicted sigma", ylabel="density")
     left.legend(frameon=False, fontsize=9)
     below = np.cumsum(distances.counts)[:-1] / max(distances.total, 1)
-    some = (below > 0) & (below < 1)
+    some = (distances.counts[:-1] > 0) & (below < 1)  # where a value lies, not the gaps of the tails
     right.plot(stats.norm.ppf(below[some]), _EDGES[1:-1][some], ".", ms=2.5, label="measured")
     right.plot([-4.5, 4.5], [-4.5, 4.5], "k-", lw=0.8, label="predicted")
     right.set(xlabel="normal quantile", ylabel="(distance - mean) / predicted sigma")

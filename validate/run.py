@@ -92,6 +92,9 @@ def run(
         )
         store.note("effects", {s.name: work.effects(s) for s in campaign.scenes})
         batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None))
+        log.info(
+            "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
+        )
         before, spent = batch.done, store.fact("wall", 0.0)
         try:
             batch.finish(lambda: _crew(count, executor, dask))
@@ -100,7 +103,9 @@ def run(
                 with suppress(Stopped):
                     store.note("wall", spent + time.perf_counter() - started)
                     store.note("workers", count)
-        return collect(campaign, store)
+        found = collect(campaign, store)
+        log.info("finished", extra={"facts": {"verdict": found.verdict.text, "agrees": found.verdict.agrees}})
+        return found
     finally:
         store.close()
 
@@ -216,7 +221,8 @@ class _Batch:
         images = sum(self._sizes[chunk] for chunk in found.chunks)
         self.done += images
         self.progress("images", self.done, self.total)
-        log.info("committed", extra={"facts": {"setting": index, "images": images, "trouble": found.trouble}})
+        facts = {"setting": index, "images": images, "done": self.done, "total": self.total, "trouble": found.trouble}
+        log.info("committed", extra={"facts": facts})
 
     @cached_property
     def _sizes(self) -> dict[int, int]:
