@@ -11,7 +11,7 @@ import typer
 from scenes import InvalidInput
 from validate.commands import batch, compare, image, report  # noqa: F401
 from validate.commands.common import app
-from validate.stopped import CONTINUE, Stopped, Terminated
+from validate.stopped import CONTINUE, Interrupted, Stopped
 
 _UsageError = typer.BadParameter.__base__  # typer does not export it
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -38,10 +38,9 @@ def main() -> None:
             file=sys.stderr,
         )
         code = 1
-    except (typer.Abort, KeyboardInterrupt) as error:
-        terminated = isinstance(error, Terminated)
-        print(f"stopped: {'terminated' if terminated else 'interrupted'}; {CONTINUE}", file=sys.stderr)
-        code = 143 if terminated else 130
+    except Interrupted as error:
+        print(error, file=sys.stderr)
+        code = error.status
     sys.exit(code)
 
 

@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import jinja2
-import numpy as np
 
 from validate import diagnostics, figures
 from validate.campaign import Campaign
 from validate.result import Row, Validation
 from validate.store import RunFile
-from validate.table import failed, number, pose, ratio, small
+from validate.table import failed, far, names, number, ratio, small
 
-_ROWS = 64  # rows of a table in the page; the rest is in table.csv
+_ROWS = 64  # rows of the table of settings without a result
 
 
 @dataclass(frozen=True)
@@ -89,35 +88,14 @@ def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Sec
     return sections
 
 
-def _shown(found: Validation) -> tuple[list[Row], str]:
-    """Rows for a page, and which they are: all of them, or those that are farthest from their prediction."""
-    if len(found.rows) <= _ROWS:
-        return list(found.rows), ""
-
-    def distance(row: Row) -> float:
-        return abs(np.log(row.main.ratio)) if row.main.ratio else 0.0
-
-    rows = sorted(found.rows, key=distance, reverse=True)[:_ROWS]
-    return rows, f" The {_ROWS} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
-
-
 def _key(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
     """First columns of a table of settings, and their cells by setting."""
-    names = list(dict.fromkeys(name for row in found.rows for name in row.parameters))
-    many = len({row.scene for row in found.rows}) > 1
-    columns = ["setting", *(["scene"] if many else []), *names, "sensor", "light"]
-    cells = {
-        row.index: [
-            str(row.index + 1), *([row.scene] if many else []), *(str(row.parameters.get(name, "")) for name in names),
-            pose(row.sensor), pose(row.light),
-        ]
-        for row in found.rows
-    }  # fmt: skip
-    return columns, cells
+    headings, cells = names(found)
+    return ["setting", *headings], {index: [str(index + 1), *row] for index, row in cells.items()}
 
 
 def _ratios(found: Validation) -> Table:
-    rows, which = _shown(found)
+    rows, which = far(found)
     key, cells = _key(found)
     columns = [*key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px", "status"]
     lines = [
@@ -127,12 +105,12 @@ def _ratios(found: Validation) -> Table:
         ]
         for row in rows
     ]  # fmt: skip
-    note = "* : 1 lies outside the chi-square interval. failed: one number for each estimator." + which
+    note = "* : 1 lies outside the chi-square interval. failed: one number for each estimator. " + which
     return Table("Measured over predicted variance, by setting", columns, lines, note)
 
 
 def _variances(found: Validation) -> Table:
-    rows, which = _shown(found)
+    rows, which = far(found)
     key, cells = _key(found)
     others = list(dict.fromkeys(judged.method for row in found.rows for judged in row.classic))
     columns = [
@@ -151,7 +129,7 @@ def _variances(found: Validation) -> Table:
         "ICE and real: the paper's px^2, our ICE with one free scale if the paper printed any. "
         "calibrated, propagated (predictions), each estimator (measured) and the bound: 1e-4 px^2."
     )
-    return Table("Table 3: variance of the distance, by setting", columns, lines, note + which)
+    return Table("Table 3: variance of the distance, by setting", columns, lines, f"{note} {which}")
 
 
 def _estimators(found: Validation) -> Table:
@@ -167,9 +145,9 @@ def _estimators(found: Validation) -> Table:
 
 def _effects(store: RunFile) -> Table:
     lines = [(scene, effect) for scene, effects in store.fact("effects", {}).items() for effect in effects]
-    names = list(dict.fromkeys(name for _, effect in lines for name in effect))
-    rows = [[scene, *(_word(effect.get(name, "")) for name in names)] for scene, effect in lines]
-    return Table("Effects, on and off", ["scene", *names], rows, words=True)
+    keys = list(dict.fromkeys(key for _, effect in lines for key in effect))
+    rows = [[scene, *(_word(effect.get(key, "")) for key in keys)] for scene, effect in lines]
+    return Table("Effects, on and off", ["scene", *keys], rows, words=True)
 
 
 def _word(value: object) -> str:

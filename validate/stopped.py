@@ -12,5 +12,9 @@ class Stopped(RuntimeError):
         super().__init__(f"stopped: {reason}; {CONTINUE}")
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, handled as Ctrl-C is."""
+class Interrupted(BaseException):
+    """Ctrl-C or SIGTERM. Not a KeyboardInterrupt, which typer swallows."""
+
+    def __init__(self, word: str, status: int) -> None:
+        super().__init__(f"stopped: {word}; {CONTINUE}")
+        self.status = status

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from scenes import InvalidInput, Pose
 from validate.run import Progress as Report
-from validate.stopped import Terminated
+from validate.stopped import Interrupted
 from validate.table import console
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -89,7 +89,7 @@ class _Left(TimeRemainingColumn):
 
 @contextmanager
 def stoppable(log_json: bool) -> Iterator[None]:
-    """SIGTERM ends the work as Ctrl-C does; with ``log_json`` every event is a JSON line on standard error."""
+    """Ctrl-C and SIGTERM raise `Interrupted`; with ``log_json`` every event is a JSON line on standard error."""
     log, shown = logging.getLogger("validate"), logging.StreamHandler()
     if log_json:
         shown.setFormatter(_JsonLine())
@@ -98,13 +98,15 @@ def stoppable(log_json: bool) -> Iterator[None]:
     former = signal.signal(signal.SIGTERM, _terminate)
     try:
         yield
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted", 130) from None
     finally:
         signal.signal(signal.SIGTERM, former)
         log.removeHandler(shown)
 
 
 def _terminate(*_) -> None:
-    raise Terminated
+    raise Interrupted("terminated", 143)
 
 
 class _JsonLine(logging.Formatter):
