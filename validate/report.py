@@ -11,7 +11,7 @@ import jinja2
 
 from validate import diagnostics, figures
 from validate.campaign import Campaign
-from validate.result import Row, Validation
+from validate.result import Validation
 from validate.store import RunFile
 from validate.table import failed, far, names, number, ratio, small
 

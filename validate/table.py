@@ -70,7 +70,8 @@ def names(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
     many = len({row.scene for row in found.rows}) > 1
     cells = {
         row.index: [
-            *([row.scene] if many else []), *(str(row.parameters[key]) for key in swept), pose(row.sensor), pose(row.light)
+            *([row.scene] if many else []), *(str(row.parameters[key]) for key in swept),
+            pose(row.sensor), pose(row.light),
         ]
         for row in found.rows
     }  # fmt: skip

@@ -27,16 +27,19 @@ def kill(
     """Run once unbroken, once killed with SIGKILL at random moments and continued; compare every stored number."""
     directories = out / "unbroken", out / "killed"
     commands = [_command(scene, renders, seed, workers, directory) for directory in directories]
-    first, whole = _unbroken([*commands[0], "--fresh"], directories[0])
+    for file in (file for directory in directories for file in directory.glob("run.*")):
+        file.unlink()
+    first, whole = _unbroken(commands[0], directories[0])
     print(f"unbroken: {whole:.1f} s, first result after {first:.1f} s")
     rng, before, landed = np.random.default_rng(seed), 0, 0
+    quota = _images(directories[0]) / (times + 1)
     for number in range(times):
-        # from before the first result to some results later, so that kills hit both an empty and a filling file
-        delay = first * rng.uniform(0.4, 1.0) + rng.exponential(0.5 * (whole - first) / times)
-        ended = _killed([*commands[1], *(["--fresh"] if number == 0 else [])], delay)
+        # a random moment, or a random number of results if that comes first, so that the run is not over too soon
+        delay, enough = first * rng.uniform(0.5, 2.0), before + quota * rng.uniform()
+        ended, seconds = _killed(commands[1], directories[1], delay, enough)
         images = _images(directories[1])
         print(
-            f"kill {number + 1}: after {delay:.2f} s, {images - before} images committed, {images} in all", flush=True
+            f"kill {number + 1}: after {seconds:.2f} s, {images - before} images committed, {images} in all", flush=True
         )
         before, landed = images, landed + (not ended)
     _run(commands[1])
@@ -98,16 +101,16 @@ def _unbroken(command: list[str], directory: Path) -> tuple[float, float]:
     return first or whole, whole
 
 
-def _killed(command: list[str], delay: float) -> bool:
-    """Start, kill after ``delay`` seconds; whether the process had ended by itself."""
+def _killed(command: list[str], directory: Path, delay: float, enough: float) -> tuple[bool, float]:
+    """Start, kill after ``delay`` seconds or with ``enough`` images; whether it had ended by itself, and when."""
+    started = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        process.wait(delay)
-        return True
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-        return False
+    while process.poll() is None and time.monotonic() < started + delay and _images(directory) <= enough:
+        time.sleep(0.03)
+    ended = process.poll() is not None
+    process.kill()
+    process.wait()
+    return ended, time.monotonic() - started
 
 
 def _run(command: list[str]) -> None:
