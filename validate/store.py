@@ -17,6 +17,7 @@ from validate.stopped import Stopped
 from validate.work import Chunk, Clean, Found, Picture
 
 _SCHEMA = """
+BEGIN IMMEDIATE;
 CREATE TABLE IF NOT EXISTS run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS setting (
     setting INTEGER PRIMARY KEY, height INTEGER, width INTEGER, image BLOB, prices TEXT, seconds TEXT, trouble TEXT);
@@ -29,6 +30,7 @@ CREATE TABLE IF NOT EXISTS distance (
 CREATE TABLE IF NOT EXISTS failure (
     setting INTEGER, chunk INTEGER, method TEXT, image INTEGER, count INTEGER, status TEXT,
     PRIMARY KEY (setting, chunk, method, image));
+COMMIT;
 """
 BUSY_S = 30.0  # how long a lock of another process is waited for
 
