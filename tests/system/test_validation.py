@@ -11,7 +11,7 @@ import render
 import scenes
 import validate
 from scenes import InvalidInput
-from validate.campaign import Campaign
+from validate.campaign import Campaign, Grid
 from validate.store import RunFile
 from validate.work import measure_chunk
 
@@ -150,3 +150,16 @@ def test_scene_without_settings(tmp_path):
     empty = scenes.load("task1").model_copy(update={"settings": ()})
     with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
         validate.run(empty, out=tmp_path)
+
+
+def test_setting_that_cannot_be_is_told_of_and_the_others_are_worked_on(few, tmp_path):
+    """A camera 6 cm from the origin: at one of the two poses it would stand in the block."""
+    grid = Grid(sensor_polar=(25, 80), sensor_azimuth=(45,), light_polar=(15,), light_azimuth=(0,))
+    camera = few.camera.model_copy(update={"distance": 6.0, "focal_px": 20.0})
+    near = few.model_copy(update={"camera": camera, "same_scale": ()})
+    result = validate.run(Campaign(name="near", scenes=(near,), grid=grid), renders=20, seed=1, out=tmp_path, workers=1)
+    assert [row.index for row in result.rows] == [0]
+    assert result.refused == {1: "sensor must be outside the object, got (80, 45) at 6 cm"}
+    only = grid.model_copy(update={"sensor_polar": (80.0,)})
+    with pytest.raises(InvalidInput, match="sensor must be outside the object"):
+        validate.run(Campaign(name="near", scenes=(near,), grid=only), renders=20, out=tmp_path / "only", workers=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import threading
 import time
 from pathlib import Path
@@ -29,16 +30,21 @@ def rate(
     workers, grid = workers or pool.cores(), poses(settings)
     bare = [_bare(grid, renders, sample)]
     with _Memory() as memory:
-        started = time.perf_counter()
+        started, cpu = time.perf_counter(), _cpu()
         found = run(grid, renders, 1, out, workers, fresh=True)
-        wall = time.perf_counter() - started
+        wall, cpu = time.perf_counter() - started, _cpu() - cpu
     bare.append(_bare(grid, renders, sample))  # before and after: the machine may be shared
     working = sum(value for key, value in found.seconds.items() if key not in ("wall", "workers"))
-    images, single = renders * len(grid), float(np.mean(bare))
+    images, single = renders * len(grid), float(np.mean([found[0] for found in bare]))
     print(f"{len(grid)} settings x {renders} images on {found.variant}, {workers} workers: {wall:.1f} s")
-    print(f"rate {images / wall:.0f} images/s; one bare process {bare[0]:.0f} before, {bare[1]:.0f} after")
+    print(f"rate {images / wall:.0f} images/s; one bare process {bare[0][0]:.0f} before, {bare[1][0]:.0f} after")
     print(f"rate / (workers x bare): {images / wall / workers / single:.3f}")
-    print(f"overhead: {workers * wall / working - 1:.1%} of the workers' working time was not work")
+    print(f"overhead: workers were idle or starting for {workers * wall / working - 1:.1%} of their working time")
+    alone = np.mean([found[1] for found in bare])
+    print(
+        f"processor time, which a shared machine changes least: {1e3 * cpu / images:.2f} ms an image, "
+        f"bare {1e3 * alone:.2f}: overhead {cpu / images / alone - 1:.1%}"
+    )
     print(f"peak memory of all processes: {memory.peak / 2**20:.0f} MiB (run file {_size(out) / 2**20:.0f} MiB)")
 
 
@@ -56,16 +62,22 @@ def poses(settings: int) -> Campaign:
     return Campaign(name="rate", scenes=(scenes.load("task1"),), grid=grid)
 
 
-def _bare(campaign: Campaign, renders: int, sample: int) -> float:
-    """Images a second of one process that does the same work and stores nothing."""
+def _cpu() -> float:
+    """Processor seconds of this process and its ended children."""
+    return sum(os.times()[:4])
+
+
+def _bare(campaign: Campaign, renders: int, sample: int) -> tuple[float, float]:
+    """Images a second, and processor seconds an image, of one process that does the same work and stores nothing."""
     chunks = tuple((i, min(CHUNK, renders - first)) for i, first in enumerate(range(0, renders, CHUNK)))
     picked = np.unique(np.linspace(0, len(campaign) - 1, sample).astype(int)).tolist()
     tasks = [Task(campaign.case(i), chunks, 1, variants.choose()) for i in picked]
     work.perform(Task(tasks[0].case, ((0, 1),), 1, variants.choose()))  # loads the renderer
-    started = time.perf_counter()
+    started, cpu = time.perf_counter(), _cpu()
     for task in tasks:
         work.perform(task)
-    return renders * len(tasks) / (time.perf_counter() - started)
+    images = renders * len(tasks)
+    return images / (time.perf_counter() - started), (_cpu() - cpu) / images
 
 
 def _size(directory: Path) -> int:
