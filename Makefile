@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test lint bench-measure bench-planner clean
+.PHONY: validate test lint bench-measure bench-planner reference proof clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -22,6 +22,15 @@ lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
+
+# Store the run that the tests compare with anew, after a change of the measurement that was wanted.
+reference: $(VENV)/.installed
+	$(BIN)/ice validate tests/regression/reference.toml --renders 500 --seed 1 --workers 1 --fresh --out runs/reference
+	cp runs/reference/result.json tests/regression/reference.json
+
+# A run killed 20 times ends with the numbers of an unbroken one.
+proof: $(VENV)/.installed
+	$(BIN)/python -m validate.proof kill --times 20
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

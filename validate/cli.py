@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import sys
 
 import typer
 
 from scenes import InvalidInput
-from validate.commands import batch, image, plan  # noqa: F401
+from validate.commands import batch, compare, image, plan, report  # noqa: F401
 from validate.commands.common import app
+from validate.stopped import CONTINUE, Interrupted, Stopped
 
 _UsageError = typer.BadParameter.__base__  # typer does not export it
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def main() -> None:
@@ -24,9 +27,20 @@ def main() -> None:
     except _UsageError as error:
         print(_usage(error), file=sys.stderr)
         code = 2
-    except (typer.Abort, KeyboardInterrupt):
-        print("stopped; the same command continues the run", file=sys.stderr)
-        code = 130
+    except Stopped as error:
+        print(error, file=sys.stderr)
+        code = 1
+    except OSError as error:
+        if error.errno not in _DISK:
+            raise
+        print(
+            f"stopped: {error.filename or 'a file'} could not be written ({error.strerror}); {CONTINUE}",
+            file=sys.stderr,
+        )
+        code = 1
+    except Interrupted as error:
+        print(error, file=sys.stderr)
+        code = error.status
     sys.exit(code)
 
 

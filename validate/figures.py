@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import cv2
@@ -14,29 +15,47 @@ import matplotlib.pyplot as plt
 import render
 from render.image import window
 from scenes import Pose, Scene
+from validate.campaign import Campaign, Case
 from validate.result import Validation
 from validate.store import RunFile
 
+_SHOWN = 16  # settings whose images are drawn
 
-def draw(scene: Scene, found: Validation, store: RunFile, directory: Path) -> list[Path]:
+
+def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path) -> list[Path]:
     """Write all pictures of a run as PNG; their paths."""
     directory.mkdir(parents=True, exist_ok=True)
     paths = [_agreement(found, directory / "predicted_measured.png")]
-    for sensor in dict.fromkeys(setting.sensor for setting in scene.settings):
-        which = [i for i, setting in enumerate(scene.settings) if setting.sensor == sensor]
-        pictures = [_noisy(scene, store, i, found.seed) for i in which]
-        lights = [scene.settings[i].light for i in which]
-        stem = f"sensor_{sensor.polar_deg:g}_{sensor.azimuth_deg:g}"
+    for stem, cases in _panels(campaign, store).items():
+        pictures = [_noisy(case, store, found.seed) for case in cases]
+        sensor, lights = cases[0].setting.sensor, [case.setting.light for case in cases]
         paths.append(_panel(pictures, sensor, lights, "images", (0, 255), directory / f"{stem}_images.png"))
-        edges = [255 - _edges(scene, picture) for picture in pictures]
+        edges = [255 - _edges(case.scene, picture) for case, picture in zip(cases, pictures, strict=True)]
         paths.append(_panel(edges, sensor, lights, "edge images", (0, 255), directory / f"{stem}_edges.png"))
     return paths
 
 
-def _noisy(scene: Scene, store: RunFile, setting: int, seed: int) -> np.ndarray:
+def _panels(campaign: Campaign, store: RunFile) -> dict[str, list[Case]]:
+    """The first settings that have an image, by sensor and scene, as pictures' names."""
+    panels: dict[str, list[Case]] = {}
+    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.picture(i))
+    for case in map(campaign.case, itertools.islice(shown, _SHOWN)):
+        sensor = case.setting.sensor
+        labels = [case.scene.name] * (len(campaign.scenes) > 1) + [f"{v:g}" for v in _numbers(case.parameters)]
+        stem = "_".join([f"sensor_{sensor.polar_deg:g}_{sensor.azimuth_deg:g}", *labels])
+        panels.setdefault(stem, []).append(case)
+    return panels
+
+
+def _numbers(parameters: dict) -> list[float]:
+    return [float(v) for value in parameters.values() for v in np.atleast_1d(value)]
+
+
+def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
     """One exposure of a setting, the part that the object covers."""
-    picture = render.expose(store.image(setting), scene.noise, np.random.default_rng([seed, setting]), 1)[0]
-    rows, columns = window(scene, scene.settings[setting].sensor)
+    rng = np.random.default_rng([seed, case.index])
+    picture = render.expose(store.image(case.index), case.scene.noise, rng, 1)[0]
+    rows, columns = window(case.scene, case.setting.sensor)
     return picture[max(rows.start - 8, 0) : rows.stop + 8, max(columns.start - 8, 0) : columns.stop + 8]
 
 
@@ -59,7 +78,7 @@ def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[fl
     for axis, picture, light in zip(axes.flat, pictures, lights, strict=False):
         axis.imshow(picture, cmap="gray", vmin=grey[0], vmax=grey[1], interpolation="nearest")
         axis.set_title(f"light {light}", fontsize=10)
-    return _save(figure, path)
+    return save(figure, path)
 
 
 def _agreement(found: Validation, path: Path) -> Path:
@@ -97,10 +116,10 @@ def _agreement(found: Validation, path: Path) -> Path:
     bottom.plot(calibrated, ratio * propagated / np.where(calibrated > 0, calibrated, 1), "x", color="C1")
     bottom.axhline(1, color="k", lw=0.8)
     bottom.set(xlabel="predicted variance, px$^2$", ylabel="measured / predicted")
-    return _save(figure, path)
+    return save(figure, path)
 
 
-def _save(figure, path: Path) -> Path:
+def save(figure, path: Path) -> Path:
     figure.savefig(path, dpi=110)
     plt.close(figure)
     return path

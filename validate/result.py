@@ -10,11 +10,12 @@ import numpy as np
 
 import planner
 import scenes
-from scenes import Scene
+from scenes import InvalidInput
 from validate import statistics
+from validate.campaign import Campaign, Case
 from validate.statistics import Verdict
 from validate.store import RunFile
-from validate.work import Method, methods, predictions
+from validate.work import Method, methods
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,15 @@ class Judged:
 
 @dataclass(frozen=True)
 class Row:
-    """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others."""
+    """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
 
+    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
+    """
+
+    index: int
+    scene: str
+    parameters: dict[str, Any]
+    value_px: float
     sensor: tuple[float, float]
     light: tuple[float, float]
     paper_ice: float | None
@@ -57,7 +65,8 @@ class Validation:
     """The outcome of a run.
 
     ``paper_scale`` is the free scale: the median of paper_ice / our paper price over all rows that have both.
-    ``search`` repeats the paper's Table 1 with the same scale: (scene, sensor, light, paper, ours).
+    ``refused`` tells of each setting without a row why, by its number. ``search`` repeats the paper's Table 1 with the
+    same scale: (scene, sensor, light, paper, ours).
     """
 
     scene: str
@@ -66,6 +75,7 @@ class Validation:
     variant: str
     paper_scale: float | None
     rows: tuple[Row, ...]
+    refused: dict[int, str]
     search: tuple[tuple[str, tuple[float, float], tuple[float, float], float, float], ...]
     correlation: dict[str, Any]
     verdict: Verdict
@@ -81,6 +91,7 @@ class Validation:
                 "variant": self.variant,
                 "paper_scale": self.paper_scale,
                 "settings": [_row_json(row) for row in self.rows],
+                "refused": [{"index": index, "reason": reason} for index, reason in self.refused.items()],
                 "paper_table_1": [
                     {"scene": scene, "sensor": sensor, "light": light, "paper_ice": theirs, "paper": ours}
                     for scene, sensor, light, theirs, ours in self.search
@@ -93,39 +104,67 @@ class Validation:
         )
 
 
-def collect(scene: Scene, seed: int, variant: str, store: RunFile, seconds: dict[str, float]) -> Validation:
-    """Put a finished run's results together."""
-    prices = [predictions(scene, i) for i in range(len(scene.settings))]
-    scale = _free_scale(scene, prices)
-    rows = tuple(_row(scene, i, prices[i], scale, store) for i in range(len(scene.settings)))
-    main = [row.main for row in rows]
+def collect(campaign: Campaign, store: RunFile) -> Validation:
+    """Put a run's results together.
+
+    Raises
+    ------
+    InvalidInput
+        If no setting could be worked on.
+    """
+    identity = store.fact("identity")
+    indices, refused = [], {}
+    for i in range(len(campaign)):
+        if store.prices(i):
+            indices.append(i)
+        else:
+            refused[i] = store.trouble(i) or "not yet worked on"
+    if not indices:
+        raise InvalidInput(next(iter(refused.values())))
+    scale = _free_scale(campaign, indices, store)
+    rows = tuple(_row(campaign.case(i), scale, store) for i in indices)
     return Validation(
-        scene=scene.name,
-        title=scene.title,
-        seed=seed,
-        variant=variant,
+        scene=campaign.name,
+        title=campaign.title,
+        seed=identity["seed"],
+        variant=identity["variant"],
         paper_scale=scale,
         rows=rows,
-        search=_search(scene, scale),
+        refused=refused,
+        search=_search(campaign, scale),
         correlation=_correlations(rows),
-        verdict=_judge(main),
-        classic_verdicts={group[0].method: _judge(group) for group in zip(*(row.classic for row in rows), strict=True)},
-        seconds=seconds,
+        verdict=_judge([row.main for row in rows]),
+        classic_verdicts=_classic_verdicts(rows),
+        seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
 
 
-def _free_scale(scene: Scene, prices: list[dict[str, float]]) -> float | None:
+def _classic_verdicts(rows: tuple[Row, ...]) -> dict[str, Verdict]:
+    """Of each other method, over the settings that have it."""
+    groups: dict[str, list[Judged]] = {}
+    for row in rows:
+        for judged in row.classic:
+            groups.setdefault(judged.method, []).append(judged)
+    return {method: _judge(group) for method, group in groups.items()}
+
+
+def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float | None:
     """The paper prints no unit of intensity; the median is deaf to the rows that do not fit."""
-    known = [(s.paper_ice, p["paper"]) for s, p in zip(scene.settings, prices, strict=True) if s.paper_ice]
-    ratios = [ice / ours for ice, ours in known if math.isfinite(ours)]
+    if campaign.grid or campaign.sweep:
+        return None
+    known = [(campaign.case(i).setting.paper_ice, store.prices(i)["paper"]) for i in indices]
+    ratios = [ice / ours for ice, ours in known if ice and math.isfinite(ours)]
     return float(np.median(ratios)) if ratios else None
 
 
-def _row(scene: Scene, i: int, price: dict[str, float], scale: float | None, store: RunFile) -> Row:
-    setting = scene.settings[i]
-    model_px = planner.predict(scene, setting.sensor, setting.light).value_px
-    main, *classic = (_judged(i, method, model_px, store) for method in methods(scene))
+def _row(case: Case, scale: float | None, store: RunFile) -> Row:
+    setting, price = case.setting, store.prices(case.index)
+    main, *classic = (_judged(case.index, method, price["value_px"], store) for method in methods(case.scene))
     return Row(
+        index=case.index,
+        scene=case.scene.name,
+        parameters=case.parameters,
+        value_px=price["value_px"],
         sensor=tuple(setting.sensor),
         light=tuple(setting.light),
         paper_ice=setting.paper_ice,
@@ -183,11 +222,11 @@ def _correlations(rows: tuple[Row, ...]) -> dict[str, Any]:
     }
 
 
-def _search(scene: Scene, scale: float | None):
+def _search(campaign: Campaign, scale: float | None):
     if scale is None:
         return ()
     found = []
-    for other in map(scenes.load, scene.same_scale):
+    for other in map(scenes.load, campaign.scenes[0].same_scale):
         for setting in other.settings:
             ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_px2 * scale
             found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
@@ -197,8 +236,12 @@ def _search(scene: Scene, scale: float | None):
 def _row_json(row: Row) -> dict[str, Any]:
     main = asdict(row.main)
     return {
+        "index": row.index,
+        "scene": row.scene,
+        "parameters": row.parameters,
         "sensor": row.sensor,
         "light": row.light,
+        "value_px": row.value_px,
         "paper_ice": row.paper_ice,
         "paper_real": row.paper_real,
         "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},

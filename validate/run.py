@@ -2,26 +2,45 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
+import hashlib
+import logging
+import platform
 import time
-from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 
+import measure
+import planner
+import render
+import scenes
 from render import variant as variants
 from scenes import InvalidInput, Scene
+from validate import pool as pools
+from validate import work
+from validate.campaign import Campaign, Case
+from validate.pool import Crew
 from validate.result import Validation, collect
+from validate.stopped import Stopped
 from validate.store import RunFile
-from validate.work import CHUNK, measure_chunk, render_setting
+from validate.work import CHUNK, Found, Picture, Task
 
-_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
+log = logging.getLogger("validate")
+_PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
+_MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
+_PICTURES = 64  # settings whose image is kept for the report
+_BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
+_CHECK_S = 5.0  # between looks at whether the workers are still there
 Progress = Callable[[str, int, int], None]
 
 
 def run(
-    scene: Scene,
+    scene: Scene | Campaign,
     renders: int = 1000,
     seed: int = 1,
     out: str | Path | None = None,
@@ -29,12 +48,13 @@ def run(
     fresh: bool = False,
     progress: Progress | None = None,
     executor: Executor | None = None,
+    dask: str | None = None,
 ) -> Validation:
-    """Validate all settings of a scene.
+    """Validate all settings of a scene or a campaign.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Campaign
         At least one setting.
     renders : int
         Noisy images a setting, at least 2.
@@ -50,87 +70,195 @@ def run(
         Called as progress(what, done, total).
     executor : concurrent.futures.Executor, optional
         Used instead of local processes.
+    dask : str, optional
+        Address of a Dask scheduler, whose workers are used instead.
 
     Raises
     ------
     InvalidInput
-        If a number is out of range, the scene has no settings, or the directory holds another run.
+        If a number is out of range, there are no settings, none of them can be worked on, or the directory holds
+        another run.
+    Stopped
+        If workers keep dying, the scheduler goes away, or the run file cannot be written. The same call continues.
     """
     _check(scene, renders, seed, workers)
     started = time.perf_counter()
-    variant = variants.choose()
-    identity = {
-        "scene": scene.model_dump(mode="json"),
-        "seed": seed,
-        "variant": variant,
-        "chunk": CHUNK,
-        "renders": renders,
-    }
-    store = RunFile(Path(out or Path("runs") / scene.name), identity, fresh)
+    campaign, variant = Campaign.of(scene), variants.choose()
+    count = workers or pools.cores()
+    store = RunFile(Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant), fresh)
     try:
-        store.note("versions", {name: version(name) for name in _PACKAGES})
-        workers = (
-            workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count()
+        store.note(
+            "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
         )
-        pool = executor or _local(workers)
+        store.note("effects", {s.name: work.effects(s) for s in campaign.scenes})
+        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None))
+        log.info(
+            "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
+        )
+        before, spent = batch.done, store.fact("wall", 0.0)
         try:
-            _work(scene, renders, seed, variant, store, pool, progress or (lambda *_: None))
+            batch.finish(lambda: _crew(count, executor, dask))
         finally:
-            if executor is None:
-                pool.shutdown(cancel_futures=True)
-        seconds = {"wall": time.perf_counter() - started, "workers": workers, **store.seconds()}
-        return collect(scene, seed, variant, store, seconds)
+            if batch.done > before:
+                with suppress(Stopped):
+                    store.note("wall", spent + time.perf_counter() - started)
+                    store.note("workers", count)
+        found = collect(campaign, store)
+        log.info("finished", extra={"facts": {"verdict": found.verdict.text, "agrees": found.verdict.agrees}})
+        return found
     finally:
         store.close()
 
 
-def _check(scene: Scene, renders: int, seed: int, workers: int | None) -> None:
+def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None) -> None:
     if renders < 2:
         raise InvalidInput(f"renders must be at least 2, got {renders}")
     if seed < 0:
         raise InvalidInput(f"seed must be at least 0, got {seed}")
     if workers is not None and workers < 1:
         raise InvalidInput(f"workers must be at least 1, got {workers}")
-    if not scene.settings:
+    if isinstance(scene, Scene) and not scene.settings:
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
 
 
-def _local(workers: int) -> Executor:
-    if workers == 1:
-        return ThreadPoolExecutor(1)
-    return ProcessPoolExecutor(
-        workers, mp_context=multiprocessing.get_context("spawn")
-    )  # the renderer's threads do not survive a fork
+def _identity(campaign: Campaign, renders: int, seed: int, variant: str) -> dict:
+    """All that the numbers depend on; a directory that holds other ones is refused."""
+    return {
+        "campaign": campaign.model_dump(mode="json"),
+        "seed": seed,
+        "renders": renders,
+        "chunk": CHUNK,
+        "variant": variant,
+        "versions": {name: version(name) for name in _PACKAGES},
+        "code": _code(),
+    }
 
 
-def _work(
-    scene: Scene, renders: int, seed: int, variant: str, store: RunFile, pool: Executor, progress: Progress
-) -> None:
-    """Submit what is not yet done; each result is committed as it arrives."""
-    sizes = {chunk: min(CHUNK, renders - CHUNK * chunk) for chunk in range(-(-renders // CHUNK))}
-    done = store.chunks()
-    pending: dict[Future, tuple[int, int | None]] = {}
+def _code() -> str:
+    """Digest of the code that makes the numbers."""
+    folders = [Path(package.__file__).parent for package in (scenes, planner, render, measure)]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [Path(work.__file__)]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
-    def submit_chunks(setting: int) -> None:
-        image = store.image(setting)
-        for chunk, size in sizes.items():
-            if (setting, chunk) not in done:
-                pending[pool.submit(measure_chunk, scene, setting, image, seed, chunk, size)] = setting, chunk
 
-    for setting in range(len(scene.settings)):
-        if store.image(setting) is None:
-            pending[pool.submit(render_setting, scene, setting, variant)] = setting, None
-        else:
-            submit_chunks(setting)
-    images, total = sum(done.values()), renders * len(scene.settings)
-    progress("images", images, total)
-    while pending:
-        for future in wait(pending, return_when=FIRST_COMPLETED).done:
-            setting, chunk = pending.pop(future)
-            if chunk is None:
-                store.add_clean(setting, future.result())
-                submit_chunks(setting)
-            else:
-                store.add_chunk(setting, chunk, sizes[chunk], future.result())
-                images += sizes[chunk]
-                progress("images", images, total)
+def _crew(workers: int, executor: Executor | None, dask: str | None) -> AbstractContextManager[Crew]:
+    if executor is not None:
+        return nullcontext(Crew(executor, lambda: workers))
+    return pools.dask(dask) if dask else pools.local(workers)
+
+
+@dataclass
+class _Batch:
+    """The work of a run that is not yet done; each result is committed as it arrives."""
+
+    campaign: Campaign
+    renders: int
+    seed: int
+    variant: str
+    store: RunFile
+    progress: Progress
+
+    def __post_init__(self) -> None:
+        self.total = self.renders * len(self.campaign)
+        self.done = self.store.images()
+
+    def finish(self, open_crew: Callable[[], AbstractContextManager[Crew]]) -> None:
+        """Work until all is done; after the death of a worker begin again with what is left."""
+        self.progress("images", self.done, self.total)
+        deaths = 0
+        while True:
+            before = self.done
+            try:
+                if next(self._settings(), None):  # else do not start workers for nothing
+                    with open_crew() as crew:
+                        self._work(crew)
+                return
+            except (BrokenExecutor, CancelledError) as error:
+                deaths = 1 if self.done > before else deaths + 1
+                log.warning("workers lost", extra={"facts": {"deaths": deaths, "error": str(error)}})
+                if deaths == _BREAKS:
+                    raise Stopped(f"workers died {_BREAKS} times in a row; is there enough memory?") from None
+
+    def _work(self, crew: Crew) -> None:
+        """Keep every worker busy, with no more tasks in flight than that needs: memory does not grow with the run."""
+        pending: dict[Future, _Setting] = {}
+        opened: deque[_Setting] = deque()
+        size = crew.size()
+        group, fresh = self._group(size), self._settings()
+        while True:
+            while len(pending) < size + 2:
+                setting = opened.popleft() if opened else next(fresh, None)
+                if setting is None:
+                    break
+                pending[crew.executor.submit(work.perform, setting.task(group))] = setting
+                if setting.picture and setting.left:
+                    opened.appendleft(setting)
+            if not pending:
+                return
+            done = wait(pending, timeout=_CHECK_S, return_when=FIRST_COMPLETED).done
+            if not done:
+                crew.check(None)
+                size = crew.size()
+            for future in done:
+                setting = pending.pop(future)
+                found = self._result(future, crew)
+                self._commit(setting.case.index, found)
+                if found.clean and setting.left:
+                    setting.picture = found.clean.picture
+                    opened.append(setting)
+
+    def _result(self, future: Future, crew: Crew) -> Found:
+        try:
+            return future.result()
+        except Exception as error:
+            crew.check(error)  # says so if it is the crew that is gone, and not the work that is wrong
+            raise
+
+    def _commit(self, index: int, found: Found) -> None:
+        self.store.add(index, found)
+        if index >= _PICTURES and len(self.store.chunks(index)) == len(self._sizes):
+            self.store.drop_picture(index)
+        images = sum(self._sizes[chunk] for chunk in found.chunks)
+        self.done += images
+        self.progress("images", self.done, self.total)
+        facts = {"setting": index, "images": images, "done": self.done, "total": self.total, "trouble": found.trouble}
+        log.info("committed", extra={"facts": facts})
+
+    @cached_property
+    def _sizes(self) -> dict[int, int]:
+        """Images of each chunk."""
+        return {chunk: min(CHUNK, self.renders - CHUNK * chunk) for chunk in range(-(-self.renders // CHUNK))}
+
+    def _settings(self) -> Iterator[_Setting]:
+        """The settings that have work left, one at a time."""
+        for index in range(len(self.campaign)):
+            done = self.store.chunks(index)
+            left = deque((chunk, size) for chunk, size in self._sizes.items() if chunk not in done)
+            if not left or self.store.trouble(index):
+                continue
+            try:
+                case = self.campaign.case(index)
+            except InvalidInput as error:
+                self._commit(index, Found(None, {}, str(error)))
+                continue
+            yield _Setting(case, left, self.seed, self.variant, self.store.picture(index))
+
+    def _group(self, size: int) -> int:
+        """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
+        return max(1, min(_MAX_CHUNKS, len(self.campaign) * len(self._sizes) // (16 * size)))
+
+
+@dataclass
+class _Setting:
+    """A setting that has chunks left: its first task renders the image, which then goes with the others."""
+
+    case: Case
+    left: deque[tuple[int, int]]
+    seed: int
+    variant: str
+    picture: Picture | None
+
+    def task(self, group: int) -> Task:
+        """The next task."""
+        chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
+        return Task(self.case, chunks, self.seed, self.variant, self.picture)

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from validate.result import Judged, Row, Validation
 
+_ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
 
 
@@ -24,6 +25,9 @@ def report(found: Validation) -> Group:
     parts = [Text(found.title, style="bold"), _variances(found), _ratios(found)]
     if found.search:
         parts.append(_search(found))
+    if found.refused:
+        index, reason = next(iter(found.refused.items()))
+        parts.append(Text(f"\n{len(found.refused)} settings without a result, the first ({index + 1}): {reason}"))
     parts += [
         _correlations(found),
         _time(found),
@@ -48,44 +52,80 @@ def _table(title: str, *columns: str, caption: str | None = None) -> Table:
     return table
 
 
-def _variances(found: Validation) -> Table:
-    classic = [judged.method for judged in found.rows[0].classic]
-    table = _table(
-        "\nTable 3: variance of the distance",
-        "sensor", "light", "paper\nICE", "ours\nICE", "ours/\npaper", "paper real\n12.0", "\n10.0",
-        "predicted\ncalibrated", "\npropagated", "measured\ngradient", *(f"\n{name}" for name in classic),
-        "Cramer-Rao\nbound",
-        caption=(
-            "paper, ours ICE: the paper's px^2, ours with one free scale for all rows. Others: 1e-4 px^2, absolute.\n"
-            "- : the paper prints N/A, or nothing could be measured."
-        ),
-    )  # fmt: skip
+def far(found: Validation) -> tuple[list[Row], str]:
+    """Rows to show, and which they are: all of them, or of many those that are farthest from their prediction."""
+    if len(found.rows) <= _ROWS:
+        return list(found.rows), ""
+    rows = sorted(found.rows, key=lambda row: -abs(math.log(row.main.ratio or 1.0)))[:_ROWS]
+    return rows, f"The {_ROWS} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
+
+
+def names(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
+    """Headings of the columns that tell a table's settings apart, and their cells by setting."""
+    values: dict[str, set[str]] = {}
     for row in found.rows:
-        real = row.paper_real or (None, None)
+        for key, value in row.parameters.items():
+            values.setdefault(key, set()).add(str(value))
+    swept = [key for key, several in values.items() if len(several) > 1]
+    many = len({row.scene for row in found.rows}) > 1
+    cells = {
+        row.index: [
+            *([row.scene] if many else []), *(str(row.parameters[key]) for key in swept),
+            pose(row.sensor), pose(row.light),
+        ]
+        for row in found.rows
+    }  # fmt: skip
+    return [*(["scene"] if many else []), *swept, "sensor", "light"], cells
+
+
+def _variances(found: Validation) -> Table:
+    rows, which = far(found)
+    headings, cells = names(found)
+    others = list(dict.fromkeys(judged.method for row in rows for judged in row.classic))
+    printed = any(row.paper_ice or row.paper_real for row in found.rows)
+    paper = ["paper\nICE", "ours\nICE", "ours/\npaper", "paper real\n12.0", "\n10.0"] if printed else []
+    captions = [
+        "paper, ours ICE: the paper's px^2, ours with one free scale for all rows. Others: 1e-4 px^2, absolute."
+    ]
+    captions = [*(captions if printed else ["1e-4 px^2, absolute."]), which]
+    table = _table(
+        "\nTable 3: variance of the distance", *headings, *paper, "predicted\ncalibrated", "\npropagated",
+        f"measured\n{rows[0].main.method}", *(f"\n{name}" for name in others), "Cramer-Rao\nbound",
+        caption="\n".join([*filter(None, captions), "- : the paper prints N/A, or nothing could be measured."]),
+    )  # fmt: skip
+    for row in rows:
+        classic = {judged.method: judged.empirical for judged in row.classic}
         table.add_row(
-            _pose(row.sensor), _pose(row.light), _number(row.paper_ice), _number(row.paper),
-            _number(row.paper / row.paper_ice if row.paper_ice else None), *map(_number, real),
-            _small(row.calibrated), _small(row.main.propagated), _small(row.main.empirical),
-            *(_small(judged.empirical) for judged in row.classic), _small(row.bound),
+            *cells[row.index], *(_paper(row) if printed else []), small(row.calibrated), small(row.main.propagated),
+            small(row.main.empirical), *(small(classic.get(name)) for name in others), small(row.bound),
         )  # fmt: skip
     return table
 
 
+def _paper(row: Row) -> list[str]:
+    """What the paper printed, and our number for it."""
+    against = number(row.paper / row.paper_ice if row.paper_ice else None)
+    return [number(row.paper_ice), number(row.paper), against, *map(number, row.paper_real or (None, None))]
+
+
 def _ratios(found: Validation) -> Table:
-    judged = [found.rows[0].main, *found.rows[0].classic]
+    rows, which = far(found)
+    headings, cells = names(found)
+    main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
+    caption = (
+        "* : 1 lies outside the interval. Which pixels Canny picks is not linear in the noise; its prediction\n"
+        f"holds the choice fixed and is not exact. The verdict is about {main}. failed: one number a method."
+    )
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
-        "sensor", "light", *(f"{j.method}" for j in judged), "n", "failed", "bias px", "status",
-        caption=(
-            "* : 1 lies outside the interval. Which pixels Canny picks is not linear in the noise; its prediction\n"
-            "holds the choice fixed and is not exact. The verdict is about gradient. failed: one number a method."
-        ),
+        *headings, main, *others, "n", "failed", "bias px", "status",
+        caption="\n".join(filter(None, [caption, which])),
     )  # fmt: skip
-    for row in found.rows:
-        methods = [row.main, *row.classic]
+    for row in rows:
+        judged = {j.method: j for j in (row.main, *row.classic)}
         table.add_row(
-            _pose(row.sensor), _pose(row.light), *map(_ratio, methods), str(row.main.n), _failed(row),
-            "-" if row.main.bias is None else f"{row.main.bias:+.4f}", row.main.status,
+            *cells[row.index], *(ratio(judged[name]) if name in judged else "-" for name in (main, *others)),
+            str(row.main.n), failed(row), "-" if row.main.bias is None else f"{row.main.bias:+.4f}", row.main.status,
         )  # fmt: skip
     return table
 
@@ -96,11 +136,11 @@ def _search(found: Validation) -> Table:
     )
     for _, sensor, light, theirs, ours in found.search:
         table.add_row(
-            _pose(sensor),
-            _pose(light),
-            _number(theirs, 4),
-            _number(ours, 4),
-            _number(ours / theirs if theirs else None),
+            pose(sensor),
+            pose(light),
+            number(theirs, 4),
+            number(ours, 4),
+            number(ours / theirs if theirs else None),
         )
     return table
 
@@ -136,24 +176,24 @@ def _time(found: Validation) -> Text:
     return Text(f"\nTime: {wall:.1f} s with {workers} workers on {found.variant}. Working seconds: {parts}.")
 
 
-def _pose(pose: tuple[float, float]) -> str:
+def pose(pose: tuple[float, float]) -> str:
     return f"({pose[0]:g}, {pose[1]:g})"
 
 
-def _number(value: float | None, digits: int = 3) -> str:
+def number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else "inf" if math.isinf(value) else f"{value:.{digits}f}"
 
 
-def _small(value: float | None) -> str:
+def small(value: float | None) -> str:
     return "-" if value is None or math.isnan(value) else "inf" if math.isinf(value) else f"{value / _UNIT:#.3g}"
 
 
-def _ratio(judged: Judged) -> str:
+def ratio(judged: Judged) -> str:
     if judged.ratio is None:
         return f"- ({judged.status})"
     low, high = judged.ratio_interval
     return f"{judged.ratio:.3f} [{low:.3f}, {high:.3f}]{' ' if low <= 1 <= high else '*'}"
 
 
-def _failed(row: Row) -> str:
+def failed(row: Row) -> str:
     return " ".join(str(judged.failed) for judged in (row.main, *row.classic))

@@ -1,20 +1,29 @@
-"""The two pieces of work that a run consists of. Both are plain functions of their arguments, run by any executor."""
+"""The piece of work that a run consists of: a plain function of its argument, run by any executor."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import threading
 import time
+import zlib
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 import measure
 import planner
 import render
-from scenes import Scene
+from render import variant as variants
+from scenes import InvalidInput, Scene
+from validate.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time
+_RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
 
 
 @dataclass(frozen=True)
@@ -35,12 +44,37 @@ def methods(scene: Scene) -> tuple[Method, ...]:
     return (Method("gradient"), *(Method("canny", threshold) for threshold in scene.locator.thresholds))
 
 
+class Picture(NamedTuple):
+    """A noise-free image as it travels and is stored: zlib-compressed little-endian float64."""
+
+    height: int
+    width: int
+    data: bytes
+
+    @classmethod
+    def of(cls, image: np.ndarray) -> Picture:
+        return cls(*image.shape, zlib.compress(image.astype("<f8").tobytes(), 1))
+
+    def array(self) -> np.ndarray:
+        return np.frombuffer(zlib.decompress(self.data), "<f8").reshape(self.height, self.width)
+
+
 @dataclass(frozen=True)
 class Clean:
-    """The noise-free image of a setting and what is predicted from it, one `measure.Propagated` summary a method."""
+    """The noise-free image of a setting and what is predicted, with and without it.
 
-    image: np.ndarray
-    propagated: dict[str, tuple[float, float, str]]  # variance px^2, value px, status
+    Attributes
+    ----------
+    picture : Picture
+    propagated : dict
+        Variance (px^2), distance in the image (px) and status, by method.
+    prices : dict
+        Variances that need no image, px^2 (``paper`` without its free scale), and the model's distance ``value_px``.
+    """
+
+    picture: Picture
+    propagated: dict[str, tuple[float, float, str]]
+    prices: dict[str, float]
     seconds: dict[str, float]
 
 
@@ -53,10 +87,62 @@ class Chunk:
     seconds: dict[str, float]
 
 
-def render_setting(scene: Scene, setting: int, variant: str) -> Clean:
-    """Render a setting and predict from its image."""
+@dataclass(frozen=True)
+class Task:
+    """Chunks of one setting, (number, images) each; without a picture the worker renders it."""
+
+    case: Case
+    chunks: tuple[tuple[int, int], ...]
+    seed: int
+    variant: str
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a task found; ``trouble`` says in one line why the setting cannot be worked on."""
+
+    clean: Clean | None
+    chunks: dict[int, Chunk]
+    trouble: str | None = None
+
+
+def perform(task: Task) -> Found:
+    """Render, unless the image came with the task, then measure.
+
+    With one thread of linear algebra, whatever the worker's environment says: a sum split over threads has other bits.
+    """
+    with _libraries().limit(limits=1):
+        return _perform(task)
+
+
+@functools.cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def _perform(task: Task) -> Found:
+    with _RENDERER:
+        variants.use(task.variant)  # what the machine cannot do is not the setting's fault
+    try:
+        clean = None
+        if task.picture is None:
+            with _RENDERER:
+                clean = render_setting(task.case, task.variant)
+        image = (task.picture or clean.picture).array()
+        return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, count) for k, count in task.chunks})
+    except InvalidInput as error:
+        return Found(None, {}, str(error))
+
+
+def render_setting(case: Case, variant: str) -> Clean:
+    """Render a setting, and predict with and without its image."""
     clock = _Clock()
-    sensor, light = scene.settings[setting].sensor, scene.settings[setting].light
+    scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
+    prices = {price: planner.predict(scene, sensor, light, price) for price in ("paper", "calibrated", "bound")}
+    numbers = {price: found.variance_px2 for price, found in prices.items()}
+    numbers["value_px"] = prices["calibrated"].value_px
+    clock.lap("predict")
     image = render.image(scene, sensor, light, variant=variant)
     clock.lap("render")
     propagated = {}
@@ -64,10 +150,10 @@ def render_setting(scene: Scene, setting: int, variant: str) -> Clean:
         found = measure.propagate(image, scene, sensor, light, method.locator, method.threshold)
         propagated[method.name] = found.variance_px2, found.value_px, found.status
     clock.lap("propagate")
-    return Clean(image, propagated, clock.seconds)
+    return Clean(Picture.of(image), propagated, numbers, clock.seconds)
 
 
-def measure_chunk(scene: Scene, setting: int, image: np.ndarray, seed: int, chunk: int, count: int) -> Chunk:
+def measure_chunk(case: Case, image: np.ndarray, seed: int, chunk: int, count: int) -> Chunk:
     """Expose ``count`` images of a setting and measure each with every method.
 
     The random numbers depend on seed, setting, chunk and batch alone, so a run gives the same numbers in any order and
@@ -75,12 +161,12 @@ def measure_chunk(scene: Scene, setting: int, image: np.ndarray, seed: int, chun
     """
     cv2.setNumThreads(1)  # workers share the cores among themselves
     clock = _Clock()
-    sensor = scene.settings[setting].sensor
+    scene, sensor = case.scene, case.setting.sensor
     where = measure.footprint(scene, sensor)
     clock.lap("prepare")
     parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
     for batch, first in enumerate(range(0, count, _BATCH)):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(setting, chunk, batch)))
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
         pictures = render.expose(image, scene.noise, rng, min(_BATCH, count - first), where)
         clock.lap("expose")
         for method in methods(scene):
@@ -96,12 +182,17 @@ def measure_chunk(scene: Scene, setting: int, image: np.ndarray, seed: int, chun
     return Chunk(distances, failures, clock.seconds)
 
 
-def predictions(scene: Scene, setting: int) -> dict[str, float]:
-    """The prices that need no image, px^2; ``paper`` without its free scale."""
-    sensor, light = scene.settings[setting].sensor, scene.settings[setting].light
-    return {
-        price: planner.predict(scene, sensor, light, price).variance_px2 for price in ("paper", "calibrated", "bound")
-    }
+def effects(scene: Scene) -> list[dict[str, Any]]:
+    """What the renderer says of the effects it simulates for a scene, as plain records; empty if it says nothing."""
+    ask = getattr(render, "effects", None)
+    records = ask(scene) if ask else ()
+    records = records.values() if isinstance(records, dict) else records
+    return [_record(effect) for effect in records]
+
+
+def _record(effect: Any) -> dict[str, Any]:
+    facts = dataclasses.asdict(effect) if dataclasses.is_dataclass(effect) else dict(effect)
+    return {key: value if isinstance(value, bool | int | float | str) else str(value) for key, value in facts.items()}
 
 
 class _Clock:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-import scenes
-from validate.commands.common import Json, SceneName, app, progress
-from validate.export import write_csv
+from validate import campaign, export
+from validate.commands.common import Json, app, progress, stoppable
 from validate.run import run
 from validate.store import RunFile
 from validate.table import console, report
@@ -18,7 +18,7 @@ from validate.table import console, report
 
 @app.command("validate")
 def validate_command(
-    scene: SceneName,
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")],
     renders: Annotated[int, typer.Option(help="Noisy images a setting.")] = 1000,
     seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1,
     out: Annotated[
@@ -26,18 +26,25 @@ def validate_command(
         typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there."),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
+    ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")] = False,
+    log_json: Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Predict, render and measure every setting of a scene and judge the predictions.
+    """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
 
-    Writes run.sqlite, table.csv and pictures to DIR. Exit status 1 if the measurements contradict the predictions.
+    Writes run.sqlite, table.csv, result.json and pictures to DIR. Exit status 1 if the measurements contradict the
+    predictions.
     """
-    loaded = scenes.load(scene)
+    loaded = campaign.load(scene)
     directory = out or Path("runs") / loaded.name
-    with progress(f"{loaded.name}: {len(loaded.settings)} settings") as shown:
-        found = run(loaded, renders, seed, directory, workers, fresh, shown)
-    _write(loaded, found, directory)
+    title = f"{loaded.name}: {len(loaded)} settings"
+    with stoppable(log_json):
+        with nullcontext() if log_json else progress(title) as shown:
+            found = run(loaded, renders, seed, directory, workers, fresh, shown, dask=dask)
+        _write(loaded, found, directory)
     if as_json:
         print(json.dumps(found.to_json(), indent=1))
     else:
@@ -47,11 +54,11 @@ def validate_command(
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
-def _write(loaded, found, directory: Path) -> None:
+def _write(loaded: campaign.Campaign, found, directory: Path) -> None:
     from validate import figures  # matplotlib takes half a second to load
 
-    write_csv(found, directory / "table.csv")
-    (directory / "result.json").write_text(json.dumps(found.to_json(), indent=1), encoding="utf-8")
+    export.write_csv(found, directory / "table.csv")
+    export.write_json(found, directory / "result.json")
     store = RunFile.reopen(directory)
     try:
         figures.draw(loaded, found, store, directory / "figures")

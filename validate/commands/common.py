@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import logging
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from scenes import InvalidInput, Pose
 from validate.run import Progress as Report
+from validate.stopped import Interrupted
 from validate.table import console
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -45,7 +49,7 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[Report | None]:
-    """A progress bar on standard error, if that is a terminal."""
+    """A progress bar with rate and time left on standard error, if that is a terminal."""
     errors = console(stderr=True)
     if not errors.is_terminal:
         yield None
@@ -55,8 +59,58 @@ def progress(title: str) -> Iterator[Report | None]:
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("images"),
-        TimeRemainingColumn(),
+        _Rate(),
+        _Left(),
     )
     with Progress(*columns, console=errors, transient=True) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda _what, done, total: bar.update(task, completed=done, total=total)
+
+        def report(_what: str, done: int, total: int) -> None:
+            if bar.tasks[0].total is None:  # what an earlier session has done says nothing about the rate
+                bar.reset(task, completed=done, total=total)
+            bar.update(task, completed=done)
+
+        yield report
+
+
+class _Rate(ProgressColumn):
+    """Images a second."""
+
+    def render(self, task: Task) -> str:
+        return "" if not task.speed else f"{task.speed:.0f}/s"
+
+
+class _Left(TimeRemainingColumn):
+    """Time left, in words."""
+
+    def render(self, task: Task) -> Text:
+        return super().render(task) + " left"
+
+
+@contextmanager
+def stoppable(log_json: bool) -> Iterator[None]:
+    """Ctrl-C and SIGTERM raise `Interrupted`; with ``log_json`` every event is a JSON line on standard error."""
+    log, shown = logging.getLogger("validate"), logging.StreamHandler()
+    if log_json:
+        shown.setFormatter(_JsonLine())
+        log.addHandler(shown)
+        log.setLevel(logging.INFO)
+    former = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted", 130) from None
+    finally:
+        signal.signal(signal.SIGTERM, former)
+        log.removeHandler(shown)
+
+
+def _terminate(*_) -> None:
+    raise Interrupted("terminated", 143)
+
+
+class _JsonLine(logging.Formatter):
+    """One JSON object a line: time (seconds since 1970), event, and the event's facts."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return json.dumps({"time": record.created, "event": record.getMessage(), **getattr(record, "facts", {})})

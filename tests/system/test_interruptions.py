@@ -1,0 +1,217 @@
+"""What can go wrong overnight: each leaves a run that continues with the same numbers, and one clear line."""
+
+import json
+import multiprocessing
+import operator
+import os
+import re
+import signal
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+
+import scenes
+import validate
+from scenes import InvalidInput
+from validate import pool, store
+from validate.proof.kill import same
+from validate.store import RunFile
+from validate.work import CHUNK
+
+pytestmark = pytest.mark.render
+
+RENDERS = 2 * CHUNK + 50
+
+
+@pytest.fixture(scope="module")
+def small(small_toml):
+    return scenes.load(small_toml)
+
+
+@pytest.fixture(scope="module")
+def unbroken(small, tmp_path_factory):
+    """Directory of a run that nothing disturbed."""
+    directory = tmp_path_factory.mktemp("unbroken")
+    run(small, directory)
+    return directory
+
+
+def run(scene, directory, **options):
+    """Also writes the final table, as the command does."""
+    found = validate.run(scene, **{"renders": RENDERS, "seed": 5, "out": directory, "workers": 1, **options})
+    (directory / "result.json").write_text(json.dumps(found.to_json()))
+    return found
+
+
+def after(images, act):
+    """A progress callback that acts once, when so many images are done."""
+    acts = [act]
+
+    def progress(_what, done, _total):
+        if done >= images and acts:
+            acts.pop()()
+
+    return progress
+
+
+def images(directory):
+    run_file = RunFile.reopen(directory)
+    try:
+        return run_file.images()
+    finally:
+        run_file.close()
+
+
+def test_killed_three_times(small_toml, tmp_path):
+    """The proof of the README, reduced: SIGKILL at random moments, and the final tables equal bit for bit."""
+    command = [sys.executable, "-m", "validate.proof", "kill", "--times", "3", "--scene", small_toml, "--out", tmp_path]
+    done = subprocess.run([*map(str, command), "--renders", "750"], capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 of 3 kills hit a running process; final tables, 3000 images" in done.stdout
+    assert "all equal, bit for bit" in done.stdout
+
+
+def test_the_proof_sees_a_single_changed_number(unbroken, tmp_path):
+    """Negative control: the last bit of one distance."""
+    (tmp_path / "result.json").write_text((unbroken / "result.json").read_text())
+    source, copy = (sqlite3.connect(directory / "run.sqlite") for directory in (unbroken, tmp_path))
+    source.backup(copy)
+    assert same(unbroken, tmp_path)[0]
+    where = "WHERE setting = 2 AND chunk = 1 AND method = 'gradient'"
+    (values,) = copy.execute(f"SELECT values_px FROM distance {where}").fetchone()
+    with copy:
+        copy.execute(f"UPDATE distance SET values_px = ? {where}", (bytes([values[0] ^ 1]) + values[1:],))
+    source.close()
+    copy.close()
+    assert not same(unbroken, tmp_path)[0]
+
+
+def test_dead_worker_process_is_replaced(small, unbroken, tmp_path):
+    def kill_one():
+        multiprocessing.active_children()[0].kill()
+
+    run(small, tmp_path, workers=2, progress=after(CHUNK, kill_one))
+    assert same(unbroken, tmp_path)[0]
+
+
+def test_workers_that_keep_dying_stop_the_run(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "_begin", operator.index)  # fails in every worker
+    with pytest.raises(validate.Stopped, match=r"^stopped: workers died 3 times in a row; .*; the same command cont"):
+        run(small, tmp_path, workers=2)
+
+
+@pytest.fixture
+def cluster():
+    """Three worker processes, on the loopback interface only."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=3, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    ) as made:
+        yield made
+
+
+def test_dask_worker_killed_midway(small, unbroken, tmp_path, cluster):
+    """The same numbers as local processes, complete."""
+    nanny = next(iter(cluster.workers.values()))
+    victim = nanny.pid
+
+    def kill_one():
+        assert nanny.pid == victim
+        os.kill(victim, signal.SIGKILL)
+
+    run(small, tmp_path, dask=cluster.scheduler_address, progress=after(2 * CHUNK, kill_one))
+    assert nanny.pid != victim
+    assert same(unbroken, tmp_path)[0]
+
+
+def test_dask_scheduler_gone(small, unbroken, tmp_path, cluster):
+    with pytest.raises(validate.Stopped, match=r"^stopped: the Dask scheduler at tcp://127.0.0.1:\d+ is gone"):
+        run(small, tmp_path, dask=cluster.scheduler_address, progress=after(CHUNK, cluster.close))
+    assert 0 < images(tmp_path) < 4 * RENDERS
+    run(small, tmp_path)
+    assert same(unbroken, tmp_path)[0]
+
+
+def test_no_scheduler_at_the_address():
+    with (
+        pytest.raises(InvalidInput, match=r"--dask must be the address of a running scheduler, got 127.0.0.1:9"),
+        pool.dask("127.0.0.1:9", patience=0.5),
+    ):
+        pass
+
+
+def test_full_disk(small, unbroken, tmp_path, monkeypatch):
+    """SQLite's own limit on the file's size gives the error that a full disk gives."""
+    connect = sqlite3.connect
+
+    def tight(path, **options):
+        made = connect(path, **options)
+        made.execute("PRAGMA max_page_count = 30")
+        return made
+
+    monkeypatch.setattr(store.sqlite3, "connect", tight)
+    with pytest.raises(
+        validate.Stopped, match=r"run.sqlite could not be written \(database or disk is full\); what is"
+    ):
+        run(small, tmp_path)
+    monkeypatch.undo()
+    assert 0 < images(tmp_path) < 4 * RENDERS
+    run(small, tmp_path)
+    assert same(unbroken, tmp_path)[0]
+
+
+def test_locked_database(small, unbroken, tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "BUSY_S", 0.2)
+    others = []
+
+    def lock():
+        others.append(sqlite3.connect(tmp_path / "run.sqlite"))
+        others[0].execute("BEGIN IMMEDIATE")
+
+    with pytest.raises(validate.Stopped, match=r"run.sqlite could not be written \(database is locked\)"):
+        run(small, tmp_path, progress=after(CHUNK, lock))
+    others[0].close()
+    run(small, tmp_path)
+    assert same(unbroken, tmp_path)[0]
+
+
+def test_directory_in_use(small, tmp_path):
+    def second():
+        with pytest.raises(InvalidInput, match="--out must not be in use by another run, got"):
+            run(small, tmp_path)
+
+    run(small, tmp_path, renders=20, progress=after(20, second))
+
+
+@pytest.mark.parametrize(
+    ("sent", "status", "word"), [(signal.SIGTERM, 143, "terminated"), (signal.SIGINT, 130, "interrupted")]
+)
+def test_signals_stop_with_one_line_and_leave_no_process(small_toml, tmp_path, sent, status, word):
+    command = [sys.executable, "-m", "validate.cli", "validate", small_toml, "--renders", "5000", "--workers", "2"]
+    with subprocess.Popen(
+        [*map(str, command), "--out", str(tmp_path), "--log-json"], stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            while json.loads(process.stderr.readline())["event"] != "committed":
+                pass
+            process.send_signal(sent)
+            _, errors = process.communicate(timeout=60)  # also waits until the workers have closed the pipe
+        finally:
+            process.kill()
+    lines = [line for line in errors.splitlines() if not line.startswith("{")]
+    assert lines == [f"stopped: {word}; what is finished is kept; the same command continues the run"]
+    assert process.returncode == status
+    assert 0 < images(tmp_path) < 20000
+
+
+def test_log_json(small_toml, tmp_path):
+    command = [sys.executable, "-m", "validate.cli", "validate", small_toml, "--renders", "20", "--workers", "1"]
+    done = subprocess.run([*map(str, command), "--out", str(tmp_path), "--log-json"], capture_output=True, text=True)
+    events = [json.loads(line) for line in done.stderr.splitlines()]
+    assert [event["event"] for event in events] == ["started", *["committed"] * 4, "finished"]
+    assert [event["done"] for event in events[1:5]] == [20, 40, 60, 80]
+    assert events[0]["total"] == 80
+    assert re.match("The measured variances|No row", events[-1]["verdict"])

@@ -1,0 +1,72 @@
+"""Comparison of runs: how often it cries wolf, and what it must see."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from scenes import InvalidInput
+from validate import comparison
+
+
+def document(rng, settings=4, n=1000, factor=1.0, shift=0.0, failed=0):
+    """Results of normal distances; variance x factor, mean + shift and some failures in the last setting."""
+    rows = []
+    for i in range(settings):
+        last = i == settings - 1
+        scale, mean, lost = (np.sqrt(factor), shift, failed) if last else (1.0, 0.0, 0)
+        values = 0.01 * (scale * rng.standard_normal(n - lost) + mean)
+        rows.append({
+            "sensor": [30, i], "light": [20, i], "method": "a", "n": n, "failed": lost, "classic": [],
+            "empirical": values.var(ddof=1), "bias": values.mean(),
+        })  # fmt: skip
+    return {"scene": "made", "settings": rows}
+
+
+def changes(rng, **options):
+    return comparison.compare(document(rng), document(rng, **options)).changed
+
+
+def test_equal_runs_differ_as_often_as_claimed(rng):
+    """300 pairs of equal runs, at a level of 20 % for the table."""
+    called = sum(bool(comparison.compare(document(rng), document(rng), 0.2).changed) for _ in range(300)) / 300
+    # failures are equal here and never significant, so 8 of the 12 tests can be: 1 - 0.8^(8/12) = 13.8 % are expected
+    low, high = stats.binom.interval(0.999, 300, 1 - 0.8 ** (8 / 12))
+    assert low / 300 <= called <= high / 300
+
+
+@pytest.mark.parametrize(
+    ("options", "what"), [({"factor": 1.4}, "variance"), ({"shift": 0.3}, "mean"), ({"failed": 30}, "failed")]
+)
+def test_a_change_is_found_where_it_is(rng, options, what):
+    found = changes(rng, **options)
+    assert {(change.what, change.setting) for change in found} == {(what, "made sensor (30, 3) light (20, 3)")}
+
+
+def test_a_setting_that_no_longer_measures_is_a_change(rng):
+    before, after = document(rng), document(rng)
+    after["settings"][0] |= {"failed": 1000, "empirical": None, "bias": None}
+    assert [change.what for change in comparison.compare(before, after).changed] == ["failed"]
+
+
+def test_only_what_both_have_is_compared(rng):
+    found = comparison.compare(document(rng, settings=3), document(rng, settings=2))
+    assert found.settings == 2
+    assert found.only_before == ("made sensor (30, 2) light (20, 2) a",)
+    with pytest.raises(InvalidInput, match="at least one setting and estimator in common, got none"):
+        comparison.compare(document(rng) | {"scene": "other"}, document(rng))
+
+
+def test_f_test_against_simulation(rng):
+    """The p-value of a ratio of sample variances is uniform if the variances are equal."""
+    a, b = rng.standard_normal((2, 2000, 30))
+    p = [comparison.f_test(x, 30, y, 30) for x, y in zip(a.var(1, ddof=1), b.var(1, ddof=1), strict=True)]
+    assert stats.kstest(p, "uniform").pvalue > 0.001
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", json.dumps({"settings": []})])
+def test_what_is_no_result(tmp_path, text):
+    (tmp_path / "result.json").write_text(text)
+    with pytest.raises(InvalidInput, match=r"must be a run directory or its result.json, got"):
+        comparison.read(tmp_path)

@@ -1,0 +1,220 @@
+"""What a batch works through: scenes, poses and swept parameters, as numbered settings made one at a time."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+import tomllib
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
+
+import scenes
+from scenes import InvalidInput, Pose, Scene, Setting
+from scenes.errors import describe
+from scenes.model import Model
+
+
+def _values(axis: Any) -> Any:
+    """A list of values, or ``{from, to, count}`` or ``{from, to, step}`` written out (``to`` included)."""
+    if not isinstance(axis, dict):
+        return axis
+    try:
+        start, stop = float(axis["from"]), float(axis["to"])
+        count = int(axis["count"]) if "count" in axis else math.floor((stop - start) / axis["step"] + 1e-9) + 1
+        if len(axis) != 3 or count < 1:
+            raise ValueError
+        return np.linspace(start, stop if "count" in axis else start + (count - 1) * axis["step"], count).tolist()
+    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+        raise ValueError(f"a range must be {{from, to, count}} or {{from, to, step}}, got {axis}") from None
+
+
+Axis = Annotated[tuple[float, ...], BeforeValidator(_values), Field(min_length=1)]
+
+
+class Grid(Model):
+    """Every sensor with every light; angles in degrees."""
+
+    sensor_polar: Axis
+    sensor_azimuth: Axis
+    light_polar: Axis
+    light_azimuth: Axis
+
+    @property
+    def axes(self) -> tuple[tuple[float, ...], ...]:
+        return self.sensor_polar, self.sensor_azimuth, self.light_polar, self.light_azimuth
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setting of a campaign: its number, which its random numbers depend on, and a scene without a pose list."""
+
+    index: int
+    scene: Scene
+    setting: Setting
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+class Campaign(Model):
+    """Scenes x swept parameters x poses.
+
+    Attributes
+    ----------
+    scenes : tuple of Scene
+    grid : Grid, optional
+        Poses for all scenes, instead of each scene's own list.
+    sweep : dict
+        Values by key of the scene ("noise.sigma"); all combinations are worked through.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If there is no scene or no setting, or a swept value makes a scene invalid. `load` turns it into `InvalidInput`.
+    """
+
+    name: str
+    title: str = ""
+    scenes: Annotated[tuple[Scene, ...], Field(min_length=1)]
+    grid: Grid | None = None
+    sweep: dict[str, Annotated[tuple[Any, ...], BeforeValidator(_values), Field(min_length=1)]] = Field({})
+    _latest: tuple[tuple[int, int], Scene] | None = PrivateAttr(None)
+
+    @classmethod
+    def of(cls, scene: Scene | Campaign) -> Campaign:
+        """The campaign that is one scene with its own settings."""
+        return scene if isinstance(scene, Campaign) else cls(name=scene.name, title=scene.title, scenes=(scene,))
+
+    def __len__(self) -> int:
+        return self._ends[-1]
+
+    def case(self, index: int) -> Case:
+        """The setting of a number.
+
+        Raises
+        ------
+        InvalidInput
+            If its pose lies in or on the object, or the combination of swept values makes no valid scene.
+        """
+        which = bisect.bisect_right(self._ends, index)
+        combination, place = divmod(index - (self._ends[which - 1] if which else 0), self._poses[which])
+        scene = self._scene(which, combination)
+        setting = self._setting(which, place)
+        for role in ("sensor", "light"):
+            scene.check_pose(role, getattr(setting, role))
+        return Case(index, scene, setting, self._parameters(combination))
+
+    @cached_property
+    def _poses(self) -> list[int]:
+        """Number of poses of each scene."""
+        if self.grid:
+            return [math.prod(map(len, self.grid.axes))] * len(self.scenes)
+        return [len(scene.settings) for scene in self.scenes]
+
+    @cached_property
+    def _ends(self) -> list[int]:
+        """Number of settings up to and with each scene."""
+        combinations = math.prod(map(len, self.sweep.values()))
+        return list(itertools.accumulate(combinations * poses for poses in self._poses))
+
+    def _parameters(self, combination: int) -> dict[str, Any]:
+        if not self.sweep:
+            return {}
+        places = np.unravel_index(combination, [len(values) for values in self.sweep.values()])
+        return {key: values[i] for (key, values), i in zip(self.sweep.items(), places, strict=True)}
+
+    def _setting(self, which: int, place: int) -> Setting:
+        if self.grid:
+            places = np.unravel_index(place, [len(axis) for axis in self.grid.axes])
+            angles = [axis[i] for axis, i in zip(self.grid.axes, places, strict=True)]
+            return Setting(sensor=Pose(*angles[:2]), light=Pose(*angles[2:]))
+        setting = self.scenes[which].settings[place]
+        if self.sweep:  # the paper printed its numbers for the scene as it was
+            return Setting(sensor=setting.sensor, light=setting.light)
+        return setting
+
+    def _scene(self, which: int, combination: int) -> Scene:
+        """The last one is kept: settings are asked for in order."""
+        if self._latest is None or self._latest[0] != (which, combination):
+            scene = changed(self.scenes[which], self._parameters(combination))
+            self._latest = (which, combination), scene
+        return self._latest[1]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Campaign:
+        if not len(self):
+            raise ValueError(
+                f"settings must be a list of at least one sensor and light, or a grid given, got {self.name}"
+            )
+        for scene, (key, values) in itertools.product(self.scenes, self.sweep.items()):
+            for value in values:
+                changed(scene, {key: value})
+        return self
+
+
+def changed(scene: Scene, parameters: dict[str, Any]) -> Scene:
+    """The scene without its pose list and with other values, by key ("noise.sigma")."""
+    document = scene.model_dump(mode="json", exclude={"settings"})
+    for key, value in parameters.items():
+        *tables, last = key.split(".")
+        table = document
+        for name in tables:
+            table = table.get(name) if isinstance(table, dict) else None
+        if not isinstance(table, dict) or last not in table:
+            raise InvalidInput(f"sweep.{key} must be a key of the scene, got none in {scene.name}")
+        table[last] = value
+    try:
+        return Scene.model_validate(document)
+    except ValidationError as error:
+        raise InvalidInput(f"sweep of {scene.name}: {describe(error)}") from None
+
+
+def load(source: str | Path) -> Campaign:
+    """Read a campaign, or a scene as a campaign of its own settings.
+
+    A campaign is a TOML file with a list ``scenes`` (bundled names, or paths beside the file), and perhaps the tables
+    ``grid`` and ``sweep``.
+
+    Raises
+    ------
+    InvalidInput
+        One line that names the file and the key.
+    """
+    path = Path(source)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8")) if path.suffix == ".toml" else {}
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):
+        document = {}  # the scene's loader says what is wrong
+    if "scenes" in document:
+        return _campaign(path, document)
+    scene = scenes.load(source)
+    try:
+        return Campaign.of(scene)
+    except ValidationError as error:
+        raise InvalidInput(f"{source}: {describe(error)}") from None
+
+
+def _campaign(path: Path, document: dict[str, Any]) -> Campaign:
+    names = document["scenes"]
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InvalidInput(f"{path}: scenes must be a list of names or files, got {names!r}")
+    document["scenes"] = [scenes.load(name if name in scenes.names() else path.parent / name) for name in names]
+    if "sweep" in document:
+        document["sweep"] = _flat(document["sweep"])
+    try:
+        return Campaign.model_validate({"name": path.stem, **document})
+    except ValidationError as error:
+        raise InvalidInput(f"{path}: {describe(error)}") from None
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from None
+
+
+def _flat(table: Any, prefix: str = "") -> Any:
+    """Nested tables as keys with dots, down to lists and ranges."""
+    if not isinstance(table, dict) or "from" in table:
+        return {prefix: table} if prefix else table
+    return {k: v for name, item in table.items() for k, v in _flat(item, f"{prefix}.{name}".lstrip(".")).items()}

@@ -1,0 +1,127 @@
+"""Two runs of the same settings: which of them differ by more than chance?"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from scipy import stats
+
+from scenes import InvalidInput
+
+
+@dataclass(frozen=True)
+class Change:
+    """One test on one estimator in one setting.
+
+    ``what`` is "variance" (F test), "mean" (Welch's t test) or "failed" (Fisher's exact test); ``before`` and ``after``
+    are variance in px^2, mean error in px, or number of failed images.
+    """
+
+    setting: str
+    method: str
+    what: str
+    before: float | None
+    after: float | None
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The outcome: ``changed`` are the tests below ``limit``, the most significant first.
+
+    Two runs of the same code, with different seeds, differ with probability ``level``. With the same seed they share
+    their random numbers and the tests are conservative.
+    """
+
+    changed: tuple[Change, ...]
+    tests: int
+    settings: int
+    level: float
+    limit: float
+    only_before: tuple[str, ...]
+    only_after: tuple[str, ...]
+    text: str
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The document of ``ice validate --json`` from a run directory or a file.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none.
+    """
+    file = path / "result.json" if path.is_dir() else path
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+        if not isinstance(document, dict) or not document["settings"]:
+            raise KeyError("settings")
+        return document
+    except (OSError, ValueError, KeyError) as error:
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise InvalidInput(f"{path} must be a run directory or its result.json, got: {reason}") from None
+
+
+def compare(before: dict[str, Any], after: dict[str, Any], level: float = 0.01) -> Comparison:
+    """Compare two documents of ``ice validate --json``, setting by setting and estimator by estimator.
+
+    Raises
+    ------
+    InvalidInput
+        If they have no setting with a common estimator.
+    """
+    first, second = _judged(before), _judged(after)
+    tests = [c for key in first if key in second for c in _tests(key, first[key], second[key])]
+    if not tests:
+        raise InvalidInput("the runs must have at least one setting and estimator in common, got none")
+    limit = -math.expm1(math.log1p(-level) / len(tests))
+    changed = tuple(sorted((c for c in tests if c.p_value < limit), key=lambda change: change.p_value))
+    settings = len({key[0] for key in first} & {key[0] for key in second})
+    text = (
+        f"{len(changed) or 'None'} of {len(tests)} tests on {settings} settings differ beyond chance "
+        f"(smallest p-value {min(c.p_value for c in tests):.2g} against {limit:.2g}, Sidak, {level:.0%} for all)."
+    )
+    only = [tuple(" ".join(key) for key in a if key not in b) for a, b in ((first, second), (second, first))]
+    return Comparison(changed, len(tests), settings, level, limit, *only, text)
+
+
+def _judged(document: dict[str, Any]) -> dict[tuple[str, str], dict[str, Any]]:
+    """Results by setting (scene, parameters and poses) and estimator."""
+    found = {}
+    for row in document["settings"]:
+        parameters = "".join(f" {key}={value}" for key, value in row.get("parameters", {}).items())
+        poses = " ".join(f"{role} ({row[role][0]:g}, {row[role][1]:g})" for role in ("sensor", "light"))
+        setting = f"{row.get('scene', document['scene'])}{parameters} {poses}"
+        for judged in (row, *row["classic"]):
+            found[setting, judged["method"]] = judged
+    return found
+
+
+def _tests(key: tuple[str, str], a: dict[str, Any], b: dict[str, Any]) -> list[Change]:
+    good = [judged["n"] - judged["failed"] for judged in (a, b)]
+    table = [[a["failed"], good[0]], [b["failed"], good[1]]]
+    tests = [Change(*key, "failed", a["failed"], b["failed"], float(stats.fisher_exact(table).pvalue))]
+    if min(good) > 1 and a["empirical"] and b["empirical"]:
+        p = float(f_test(a["empirical"], good[0], b["empirical"], good[1]))
+        tests.append(Change(*key, "variance", a["empirical"], b["empirical"], p))
+        sigmas = [math.sqrt(judged["empirical"]) for judged in (a, b)]
+        t = stats.ttest_ind_from_stats(a["bias"], sigmas[0], good[0], b["bias"], sigmas[1], good[1], equal_var=False)
+        tests.append(Change(*key, "mean", a["bias"], b["bias"], float(t.pvalue)))
+    return tests
+
+
+def f_test(first: float, n: int, second: float, m: int) -> float:
+    """Two-sided p-value of two sample variances, of n and m normal values, being of one variance.
+
+    >>> round(f_test(1.0, 1000, 1.25, 1000), 5)
+    0.00043
+    """
+    ratio = first / second
+    return float(min(1.0, 2 * min(stats.f.cdf(ratio, n - 1, m - 1), stats.f.sf(ratio, n - 1, m - 1))))

@@ -1,0 +1,20 @@
+"""Why a run ended before its work was done. What is finished is kept; the same command continues it."""
+
+from __future__ import annotations
+
+CONTINUE = "what is finished is kept; the same command continues the run"
+
+
+class Stopped(RuntimeError):
+    """A run that something outside it has ended. Its text is one line."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"stopped: {reason}; {CONTINUE}")
+
+
+class Interrupted(BaseException):
+    """Ctrl-C or SIGTERM. Not a KeyboardInterrupt, which typer swallows."""
+
+    def __init__(self, word: str, status: int) -> None:
+        super().__init__(f"stopped: {word}; {CONTINUE}")
+        self.status = status
