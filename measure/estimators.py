@@ -14,7 +14,7 @@ from measure.frames import EdgeFrame, edge_frames
 from measure.gradient import GradientLocator
 from measure.layout import Layout
 from measure.likelihood import LikelihoodEstimator
-from measure.lines import fit_lines, regression
+from measure.lines import fit_lines, regression, trapezoid
 from measure.polygon import polygon_estimator
 from measure.strip import strip_estimator
 from planner.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
@@ -94,6 +94,11 @@ class PointEstimator:
     noise_variance: float
 
     @property
+    def weights(self) -> np.ndarray | float:
+        """Of the edge points: few evenly spaced ones stand for the whole edge; Canny's pixels are what they are."""
+        return trapezoid(self.frame.stations) if isinstance(self.locator, GradientLocator) else 1.0
+
+    @property
     def frames(self) -> tuple[EdgeFrame, ...]:
         return (self.frame,)
 
@@ -103,7 +108,7 @@ class PointEstimator:
 
     def estimate(self, images: np.ndarray) -> Estimate:
         points = self.locator.locate(images)
-        lines = fit_lines(points)
+        lines = fit_lines(points, self.weights)
         slope = np.tan(lines.tilt)
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.frame.stations.size, 3)
         clear = points.contrast > MIN_CONTRAST * np.sqrt(self.noise_variance)
@@ -125,9 +130,10 @@ class PointEstimator:
         points, response = self.locator.linear_response(clean)
         count = response.shape[0]
         keep = points.valid[0, :count]
-        along = points.along[0, :count][keep]
-        mean, slope = (sparse.csr_array(response)[np.flatnonzero(keep)].T @ regression(along).T).T
-        return Response(self.estimate(clean[None]), np.stack([mean - along.mean() * slope, slope]))
+        along, weights = points.along[0, :count][keep], np.broadcast_to(self.weights, keep.shape)[keep]
+        mean, slope = (sparse.csr_array(response)[np.flatnonzero(keep)].T @ regression(along, weights).T).T
+        middle = weights @ along / weights.sum()
+        return Response(self.estimate(clean[None]), np.stack([mean - middle * slope, slope]))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from measure import status
 from measure.layout import Layout
+from planner.locator import MIN_USABLE
 
 MIN_STATIONS = 3
 
@@ -26,8 +27,8 @@ class EdgeFrame:
     length : float
         Length of the edge's image, px.
     stations : ndarray, shape (m,)
-        Places along the edge, 1 px apart, where it can be measured: the trimmed corners and what lies outside the
-        image are left out.
+        Places along the edge, at most 1 px apart, where it can be measured: the trimmed corners and what lies outside
+        the image are left out.
     status : str
         ``ok``, ``clutter``, ``short`` or ``not_visible``, as far as geometry alone tells.
     """
@@ -75,7 +76,7 @@ def _frame(layout: Layout, i: int, clear: float, margin: float) -> EdgeFrame:
     along = (stop - start) / length
     first = trim(along, layout.beside[i][0], clear)
     last = length - trim(-along, layout.beside[i][1], clear)
-    stations = first + (last - first) % 1 / 2 + np.arange(int(last - first) + 1) if last > first else np.empty(0)
+    stations = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
     places = start + stations[:, None] * along
     size = np.array(layout.optics.shape[::-1])
     inside = ((places >= margin) & (places <= size - 1 - margin)).all(-1)

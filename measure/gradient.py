@@ -13,7 +13,7 @@ from scipy import sparse
 
 from measure.frames import EdgeFrame
 from measure.layout import Optics
-from measure.lines import regression
+from measure.lines import regression, trapezoid
 from measure.points import EdgePoints
 from planner.locator import edge_blur
 
@@ -83,7 +83,7 @@ class GradientLocator:
 
         The offsets are the second derivative's noise at the crossing over its slope; neighbours share pixels.
         """
-        response = regression(self.stations) @ self.unit_noise()
+        response = regression(self.stations, trapezoid(self.stations)) @ self.unit_noise()
         return response @ response.T
 
     def unit_noise(self) -> sparse.csr_array:

@@ -19,26 +19,36 @@ class Lines(NamedTuple):
     count: np.ndarray
 
 
-def fit_lines(points: EdgePoints) -> Lines:
+def fit_lines(points: EdgePoints, weights: np.ndarray | float = 1.0) -> Lines:
     """Total-least-squares lines through the valid points of each image (Pearson's principal axis).
 
-    Fewer than two points, or all at one place, leave NaN.
+    Fewer than two points, or all at one place, leave NaN. ``weights`` (m,) weigh the squared distances.
     """
-    count = points.valid.sum(1)
+    count, weight = points.valid.sum(1), points.valid * weights
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean_along = (points.along * points.valid).sum(1) / count
-        mean_offset = (points.offset * points.valid).sum(1) / count
-        s = (points.along - mean_along[:, None]) * points.valid
-        e = (points.offset - mean_offset[:, None]) * points.valid
-        ss, ee, se = (s * s).sum(1), (e * e).sum(1), (s * e).sum(1)
+        total = weight.sum(1)
+        mean_along = (points.along * weight).sum(1) / total
+        mean_offset = (points.offset * weight).sum(1) / total
+        s = points.along - mean_along[:, None]
+        e = points.offset - mean_offset[:, None]
+        ss, ee, se = ((weight * product).sum(1) for product in (s * s, e * e, s * e))
         tilt = np.where(ss > 0, np.arctan2(2 * se, ss - ee) / 2, np.nan)
     return Lines(mean_along, mean_offset, tilt, count)
 
 
-def regression(along: np.ndarray) -> np.ndarray:
+def regression(along: np.ndarray, weights: np.ndarray | float = 1.0) -> np.ndarray:
     """Linear map from offsets at places (m,) to (mean offset, slope): what `fit_lines` does to first order, (2, m)."""
-    s = along - along.mean()
-    return np.stack([np.full(s.size, 1 / s.size), s / (s @ s)])
+    weight = np.broadcast_to(weights, along.shape) / np.broadcast_to(weights, along.shape).sum()
+    s = along - weight @ along
+    return np.stack([weight, weight * s / (weight @ (s * s))])
+
+
+def trapezoid(along: np.ndarray) -> np.ndarray:
+    """Weights that make evenly spaced places (m,), both ends among them, stand for the whole line between the ends."""
+    weights = np.ones(along.size)
+    if along.size > 2:
+        weights[[0, -1]] = 0.5
+    return weights
 
 
 def unit_covariance(along: np.ndarray, scale: float) -> np.ndarray:

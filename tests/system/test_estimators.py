@@ -76,7 +76,7 @@ def test_each_image_is_measured_by_itself(rng):
         assert np.isfinite(together).all()
 
 
-@pytest.mark.parametrize(("degrees", "limit"), [(30, 0.005), (20, 0.01), (10, 0.05)])
+@pytest.mark.parametrize(("degrees", "limit"), [(30, 0.01), (20, 0.01), (10, 0.05)])
 def test_sharp_corner_is_trimmed_by_its_angle(degrees, limit):
     """Noise-free error: `gradient` trims 3.5 sigma / sin(angle), `polygon` models the corner itself."""
     a = np.radians(degrees)
