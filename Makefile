@@ -25,7 +25,7 @@ lint: $(VENV)/.test-installed
 
 # Store the run that the tests compare with anew, after a change of the measurement that was wanted.
 reference: $(VENV)/.installed
-	$(BIN)/ice validate tests/regression/reference.toml --renders 500 --seed 1 --workers 1 --fresh --out runs/reference
+	ICE_VARIANT=scalar_rgb $(BIN)/ice validate tests/regression/reference.toml --renders 500 --seed 1 --workers 1 --fresh --out runs/reference
 	cp runs/reference/result.json tests/regression/reference.json
 
 # A run killed 20 times ends with the numbers of an unbroken one.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import contextlib
 import itertools
 import math
 import tomllib
@@ -107,6 +108,16 @@ class Campaign(Model):
         for role in ("sensor", "light"):
             scene.check_pose(role, getattr(setting, role))
         return Case(index, scene, setting, self._parameters(combination))
+
+    def samples(self, count: int = 32) -> tuple[Scene, ...]:
+        """Each scene as it is without the sweep, with up to so many of its poses as its settings."""
+        found = []
+        for which, scene in enumerate(self.scenes):
+            places = np.unique(np.linspace(0, self._poses[which] - 1, count).astype(int)) if self._poses[which] else ()
+            settings = [self._setting(which, int(place)) for place in places]
+            with contextlib.suppress(ValidationError, InvalidInput):  # a pose in the object
+                found.append(Scene.model_validate(scene.model_dump() | {"settings": settings}))
+        return tuple(found)
 
     @cached_property
     def _poses(self) -> list[int]:

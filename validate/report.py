@@ -79,7 +79,7 @@ def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Sec
         ]
         effects = _effects(store)
         if effects.rows:
-            sections.append(Section("Effects simulated", [effects]))
+            sections.append(Section("Effects, on and off", [effects]))
         if found.refused:
             sections.append(Section("Settings without a result", [_refused(found)]))
         sections.append(Section("What it cost", [], [_time(found, folder)]))

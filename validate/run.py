@@ -90,7 +90,7 @@ def run(
         store.note(
             "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
         )
-        store.note("effects", {s.name: work.effects(s) for s in campaign.scenes})
+        store.note("effects", {sample.name: work.effects(sample) for sample in campaign.samples()})
         batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None))
         log.info(
             "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}

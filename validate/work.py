@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import threading
 import time
@@ -183,16 +182,11 @@ def measure_chunk(case: Case, image: np.ndarray, seed: int, chunk: int, count: i
 
 
 def effects(scene: Scene) -> list[dict[str, Any]]:
-    """What the renderer says of the effects it simulates for a scene, as plain records; empty if it says nothing."""
+    """Which effects the renderer simulates for a scene, and why; empty where it does not say."""
     ask = getattr(render, "effects", None)
-    records = ask(scene) if ask else ()
-    records = records.values() if isinstance(records, dict) else records
-    return [_record(effect) for effect in records]
-
-
-def _record(effect: Any) -> dict[str, Any]:
-    facts = dataclasses.asdict(effect) if dataclasses.is_dataclass(effect) else dict(effect)
-    return {key: value if isinstance(value, bool | int | float | str) else str(value) for key, value in facts.items()}
+    if not callable(ask):
+        return []
+    return [{"effect": found.effect.name, "on": found.on, "reason": found.reason} for found in ask(scene)]
 
 
 class _Clock:

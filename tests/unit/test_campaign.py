@@ -124,3 +124,10 @@ def test_what_is_wrong_is_one_line_with_the_file(write, text, line):
 def test_scene_without_settings(task1):
     with pytest.raises(Exception, match="settings must be a list of at least one sensor and light"):
         Campaign.of(task1.model_copy(update={"settings": ()}))
+
+
+def test_samples_are_the_scenes_with_some_of_their_poses(task1):
+    (whole,) = Campaign.of(task1).samples()
+    assert whole == task1
+    (some,) = Campaign.of(task1).samples(4)
+    assert [setting.sensor for setting in some.settings] == [task1.settings[i].sensor for i in (0, 5, 10, 15)]

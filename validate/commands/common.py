@@ -68,7 +68,7 @@ def progress(title: str) -> Iterator[Report | None]:
         def report(_what: str, done: int, total: int) -> None:
             if bar.tasks[0].total is None:  # what an earlier session has done says nothing about the rate
                 bar.reset(task, completed=done, total=total)
-            bar.update(task, completed=done)
+            bar.update(task, completed=done, total=total)
 
         yield report
 
