@@ -18,7 +18,7 @@ from planner.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
 
 Search = Literal["exhaustive", "alternating"]
-COARSE_STEP = 8.0  # degrees; where every pair has to be priced
+COARSE_STEP = 10.0  # degrees; where every pair has to be priced
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
 
@@ -118,7 +118,7 @@ def plan(
         The scene's required edges, or the best of all sets that measure the same (the paper's required edge list).
     step_deg : float, optional
         Grid step. By default 1 where a bound makes the exhaustive search fast (convex, diffuse, straight edges), else
-        8 degrees with refinement from the three best settings.
+        10 degrees with refinement from the three best settings.
     constraints : Constraints, optional
         By default the upper hemisphere.
     sensor, light : Pose or pair, optional
