@@ -11,8 +11,8 @@ validate: $(VENV)/.installed
 test: lint
 	$(BIN)/pytest -n 2
 
-bench-planner: $(VENV)/.test-installed
-	$(BIN)/python -m tests.benchmarks.planner
+bench-planner: $(VENV)/.installed
+	$(BIN)/python -m planner.benchmark
 
 lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .

@@ -44,7 +44,7 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 
 @contextmanager
-def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
+def progress(title: str) -> Iterator[Report | None]:
     """A progress bar on standard error, if that is a terminal."""
     errors = console(stderr=True)
     if not errors.is_terminal:
@@ -54,7 +54,7 @@ def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn(unit),
+        TextColumn("images"),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=errors, transient=True) as bar:
