@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.contrast import behind
+from planner.illumination import level as grey_level
 from planner.rays import first_face
-from planner.reflectance import reflected
 from planner.view import direction, frame, project
 from scenes import Circle, Scene
 
@@ -147,5 +147,5 @@ def _level(scene, points, normal, sensor_at, light_at, fall_off) -> np.ndarray:
     to_light, to_sensor = light_at - points, sensor_at - points
     distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
     to_sensor = to_sensor / np.linalg.norm(to_sensor, axis=-1, keepdims=True)
-    level = scene.camera.exposure * reflected(scene.material, normal, to_light / distance, to_sensor)
+    level = grey_level(scene, normal, to_light / distance, to_sensor, light_at)
     return level * (scene.light.distance / distance[..., 0]) ** 2 if fall_off else level

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.illumination import level as grey_level
 from planner.rays import first_face, reaches
-from planner.reflectance import reflected
 from planner.view import direction, edge_points, facing
 from planner.visibility import seen, turned
 from scenes import Scene, Solid
@@ -99,7 +99,7 @@ def _level(scene, points, normals, sensor_at, light_at, fall_off) -> np.ndarray:
     """Grey level of points (..., E, k, n, 3) with normals that broadcast, seen and lit freely."""
     to_light, light_distance = _towards(points, light_at[..., None, None, None, :])
     to_sensor, _ = _towards(points, sensor_at[..., None, None, None, :])
-    level = scene.camera.exposure * reflected(scene.material, normals, to_light, to_sensor)
+    level = grey_level(scene, normals, to_light, to_sensor, light_at[..., None, None, None, :])
     return level * (scene.light.distance / light_distance) ** 2 if fall_off else level
 
 
@@ -148,7 +148,7 @@ def behind(scene: Scene, points, sensor_at, light_at, wanted, own: tuple[int, ..
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     to_light, distance = _towards(hit, light_at)
     normals = solid.normals[face]
-    level = scene.camera.exposure * reflected(scene.material, normals, to_light, _towards(hit, sensor_at)[0])
+    level = grey_level(scene, normals, to_light, _towards(hit, sensor_at)[0], light_at)
     bright = wanted & (face >= 0) & (level > 0)
     places = [np.broadcast_to(place, (*bright.shape, 3))[bright] for place in (hit, light_at)]
     bright[bright] = reaches(solid, places[0], np.broadcast_to(face, bright.shape)[bright], places[1])

@@ -8,29 +8,17 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.alternating import Partial, Step, alternate
+from planner.candidates import Candidate, candidates
 from planner.constraints import Constraints
-from planner.exhaustive import Found, Report, exhaustive, is_separable, price_pairs
+from planner.exhaustive import Found, Report, exhaustive, is_separable
 from planner.predict import Objective, Prediction, Price, check_objective, evaluator, in_units, predict
 from planner.quantity import required_edges
 from planner.refine import refine
-from planner.view import direction
 from planner.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
 
 Search = Literal["exhaustive", "alternating"]
-COARSE_STEP = 8.0  # degrees; where every pair has to be priced
-_APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A setting worth considering: poses, required edges, its variance in both units (px^2 and cm^2, or degrees^2)."""
-
-    sensor: Pose
-    light: Pose
-    edges: tuple[str, ...]
-    variance_object: float
-    variance_image: float
+COARSE_STEP = 10.0  # degrees; where every pair has to be priced
 
 
 @dataclass(frozen=True)
@@ -118,7 +106,7 @@ def plan(
         The scene's required edges, or the best of all sets that measure the same (the paper's required edge list).
     step_deg : float, optional
         Grid step. By default 1 where a bound makes the exhaustive search fast (convex, diffuse, straight edges), else
-        8 degrees with refinement from the three best settings.
+        10 degrees with refinement from the three best settings.
     constraints : Constraints, optional
         By default the upper hemisphere.
     sensor, light : Pose or pair, optional
@@ -226,11 +214,11 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
     option, result = options[best], results[best]
     scene, found, partial = option.scene, result.found, result.partial
     sensor, light, variance = result.sensor, result.light, result.variance
-    candidates = _candidates(options, results, objective)
+    choice = candidates(options, results, objective)
     if refined and option.free:
         starts = [(sensor, light)]
         if found is None or not is_separable(scene, option.price):
-            others = [c for c in candidates[1:3] if c.edges == scene.task.edges]
+            others = [c for c in choice[1:3] if c.edges == scene.task.edges]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
         descents = [refine(scene, *at, option.price, objective, option.step_deg, option.constraints) for at in starts]
         sensor, light, variance = min(descents, key=lambda descent: descent[2])
@@ -251,7 +239,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
         guarantee=_guarantee(option, found),
         pairs=sum(r.found.pairs for r in results if r.found),
         priced=sum(r.found.priced for r in results if r.found),
-        candidates=candidates,
+        candidates=choice,
     )  # fmt: skip
 
 
@@ -259,52 +247,3 @@ def _guarantee(option: _Option, found: Found | None) -> str:
     if found is None:
         return "none: a partial optimum, no neighbour of the sensor and none of the light is better"
     return f"no pair of the {option.step_deg:g} degree grid is better; between its directions a better one may lie"
-
-
-def _candidates(options: list[_Option], results: list[_Result], objective: str, count: int = 10):
-    """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges."""
-    rows = []
-    for k, result in enumerate(results):
-        if result.found is None:
-            if np.isfinite(result.variance):
-                rows.append((result.variance, k, result.sensor, result.light))
-            continue
-        order = np.argsort(result.found.least)
-        order = order[np.isfinite(result.found.least[order])]
-        picked = _spread(direction(options[k].sensors[order]), count)
-        for s in order[picked]:
-            light = options[k].lights[result.found.best_light[s]]
-            rows.append((result.found.least[s], k, options[k].sensors[s], light))
-        rows.append((result.variance, k, result.sensor, result.light))
-    rows.sort(key=lambda row: row[0])
-    chosen: list[tuple] = []
-    for row in rows:
-        if all(_differ(row, other) for other in chosen):
-            chosen.append(row)
-    made = [_candidate(options[k], sensor, light) for _, k, sensor, light in chosen[: 2 * count]]
-    value = "variance_object" if objective == "object" else "variance_image"
-    return tuple(sorted(made, key=lambda c: getattr(c, value))[:count])
-
-
-def _candidate(option: _Option, sensor: np.ndarray, light: np.ndarray) -> Candidate:
-    values = [
-        float(in_units(option.scene, price_pairs(option.scene, sensor[None], light[None], option.price, units)[0], 2))
-        for units in ("object", "image")
-    ]
-    return Candidate(Pose(*map(float, sensor)), Pose(*map(float, light)), option.scene.task.edges, *values)
-
-
-def _spread(directions: np.ndarray, count: int) -> list[int]:
-    """The first of the directions, then each next one that is far from all before."""
-    picked: list[int] = []
-    open_ = np.ones(len(directions), bool)
-    while open_.any() and len(picked) < count:
-        picked.append(int(np.argmax(open_)))
-        open_ &= directions @ directions[picked[-1]] < np.cos(np.radians(_APART))
-    return picked
-
-
-def _differ(row: tuple, other: tuple) -> bool:
-    """Whether sensors or lights are clearly apart."""
-    near = np.cos(np.radians(_APART))
-    return any(direction(row[i]) @ direction(other[i]) < near for i in (2, 3))

@@ -51,7 +51,7 @@ def fresnel(cosine: np.ndarray, n: float, k: float) -> tuple[np.ndarray, np.ndar
 def beckmann(cosine: np.ndarray, sine: np.ndarray, m: float) -> np.ndarray:
     """Beckmann roughness distribution D, as printed: exp(-(tan/m)^2) / (m^2 cos^4)."""
     cosine = np.asarray(cosine, float)
-    with np.errstate(divide="ignore", over="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         exponent = -((np.asarray(sine) / (m * cosine)) ** 2) - 4 * np.log(np.abs(cosine)) - 2 * np.log(m)
     return np.where(cosine > 0, np.exp(np.where(cosine > 0, exponent, -np.inf)), 0.0)
 
@@ -61,13 +61,38 @@ def attenuation(nh: np.ndarray, nv: np.ndarray, nl: np.ndarray, vh: np.ndarray) 
     return np.minimum(1.0, 2 * nh * np.minimum(nv, nl) / vh)
 
 
-def reflected(material: Material, normal: np.ndarray, to_light: np.ndarray, to_sensor: np.ndarray) -> np.ndarray:
-    """Brightness N.L (R_par J_par + R_perp J_perp) under unpolarised light, J_par = J_perp = 1/2 (eq. 1).
+def perpendicular_share(to_light: np.ndarray, half: np.ndarray, field: np.ndarray | None) -> np.ndarray | float:
+    """J_perp of light of unit strength: the share of its field across the plane of incidence, spanned by L and H.
+
+    1/2 for unpolarised light, and at normal incidence, where the two directions are the same to the surface.
+    """
+    if field is None:
+        return 0.5
+    field = field - np.einsum("...i,...i->...", field, to_light)[..., None] * to_light
+    across = np.cross(to_light, half)
+    size = np.einsum("...i,...i->...", across, across) * np.einsum("...i,...i->...", field, field)
+    share = np.einsum("...i,...i->...", field, across) ** 2
+    return np.divide(share, size, out=np.full(np.broadcast(share, size).shape, 0.5), where=size > 1e-28)
+
+
+def reflected(
+    material: Material,
+    normal: np.ndarray,
+    to_light: np.ndarray,
+    to_sensor: np.ndarray,
+    field: np.ndarray | None = None,
+    index: tuple[float, float] | None = None,
+) -> np.ndarray:
+    """Brightness N.L (R_par J_par + R_perp J_perp) with J_par + J_perp = 1 (eq. 1).
 
     Parameters
     ----------
     normal, to_light, to_sensor : ndarray, shape (..., 3)
         Unit vectors N, L and V.
+    field : ndarray, shape (..., 3), optional
+        Electric field of linearly polarised light; unpolarised (J_par = J_perp = 1/2) when not given.
+    index : pair of float, optional
+        (n, k) at the wavelength; the material's when not given.
 
     Returns
     -------
@@ -79,18 +104,22 @@ def reflected(material: Material, normal: np.ndarray, to_light: np.ndarray, to_s
     s = material.specular_fraction
     brightness = (1 - s) * material.diffuse_reflectance * nl
     if not material.is_diffuse:
-        brightness = brightness + s * _specular(material, normal, to_light, to_sensor, nl, nv)
+        index = index or (material.refractive_index, material.extinction)
+        brightness = brightness + s * _specular(material, normal, to_light, to_sensor, nl, nv, field, index)
     return np.where((nl > 0) & (nv > 0), brightness, 0.0)
 
 
-def _specular(material, normal, to_light, to_sensor, nl, nv):
-    """N.L K (rho_par + rho_perp) / 2 with the factor G / (N.V) kept finite at grazing view."""
+def _specular(material, normal, to_light, to_sensor, nl, nv, field, index):
+    """N.L K (rho_par J_par + rho_perp J_perp) with the factor G / (N.V) kept finite at grazing view."""
     half = to_light + to_sensor
     half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), np.finfo(float).tiny)
     nh = np.einsum("...i,...i->...", normal, half)
     vh = np.clip(np.einsum("...i,...i->...", to_sensor, half), np.finfo(float).tiny, 1.0)
     sine = np.linalg.norm(np.cross(normal, half), axis=-1)
     above = np.clip(nv, np.finfo(float).tiny, None)
-    g_over_nv = np.minimum(1 / above, 2 * nh * np.minimum(1.0, np.maximum(nl, 0) / above) / vh)
-    parallel, perpendicular = fresnel(vh, material.refractive_index, material.extinction)
-    return beckmann(nh, sine, material.roughness) * g_over_nv / np.pi * (parallel + perpendicular) / 2
+    with np.errstate(over="ignore"):
+        g_over_nv = np.minimum(1 / above, 2 * nh * np.minimum(1.0, np.maximum(nl, 0) / above) / vh)
+    parallel, perpendicular = fresnel(vh, *index)
+    share = perpendicular_share(to_light, half, field)
+    mirrored = parallel * (1 - share) + perpendicular * share
+    return beckmann(nh, sine, material.roughness) * g_over_nv / np.pi * mirrored

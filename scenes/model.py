@@ -6,6 +6,7 @@ Lengths in space are cm, lengths in the image px, brightness is in grey levels.
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -69,12 +70,23 @@ def _tag_of_object(value: Any) -> str:
 Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")], Discriminator(_tag_of_object)]
 
 
+def _rising(key: str, rows: tuple) -> tuple:
+    """The rows of a table, once their wavelengths are known to rise."""
+    if any(a[0] >= b[0] for a, b in pairwise(rows)):
+        raise ValueError(f"{key} must be rows of rising wavelength, got {[row[0] for row in rows]}")
+    return rows
+
+
+Curve = tuple[tuple[Positive, NotNegative], ...]
+
+
 class Material(Model):
     """Reflectance of the surface: the paper's Torrance-Sparrow model (its section 2).
 
     ``specular_fraction`` is s, ``diffuse_reflectance`` R_d, ``refractive_index`` n, ``extinction`` k
     and ``roughness`` the Beckmann m. With n = 1 and k = 0 the Fresnel term vanishes and the surface is
-    purely diffuse, reflecting (1 - s) R_d.
+    purely diffuse, reflecting (1 - s) R_d. ``index_table`` gives n and k by wavelength, rows
+    [wavelength in nm, n, k] with rising wavelengths, and then replaces ``refractive_index`` and ``extinction``.
     """
 
     specular_fraction: Fraction = 0.0
@@ -82,11 +94,18 @@ class Material(Model):
     refractive_index: Positive = 1.0
     extinction: NotNegative = 0.0
     roughness: Positive = 0.2
+    index_table: tuple[tuple[Positive, Positive, NotNegative], ...] = ()
+
+    @field_validator("index_table")
+    @classmethod
+    def _rising(cls, rows: tuple) -> tuple:
+        return _rising("material.index_table", rows)
 
     @property
     def is_diffuse(self) -> bool:
         """Whether the specular term is exactly zero."""
-        return self.specular_fraction == 0 or (self.refractive_index == 1 and self.extinction == 0)
+        indices = [row[1:] for row in self.index_table] or [(self.refractive_index, self.extinction)]
+        return self.specular_fraction == 0 or all(index == (1, 0) for index in indices)
 
 
 class Camera(Model):
@@ -94,7 +113,8 @@ class Camera(Model):
 
     ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
     blur, ``exposure`` the grey level of a white diffuse surface at the origin that faces the light, and
-    ``black_level`` the grey level of darkness, which keeps noise from being clipped.
+    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``lens`` and ``responsivity``
+    are C and S of eq. 1 by wavelength, rows [nm, relative value], constant where not given.
     """
 
     width: Annotated[int, Field(ge=1, le=16384)]
@@ -104,12 +124,30 @@ class Camera(Model):
     blur_px: NotNegative = 0.6
     exposure: Positive = 200.0
     black_level: NotNegative = 0.0
+    lens: Curve = ()
+    responsivity: Curve = ()
+
+    @field_validator("lens", "responsivity")
+    @classmethod
+    def _rising(cls, rows: tuple, info: ValidationInfo) -> tuple:
+        return _rising(f"camera.{info.field_name}", rows)
 
 
 class Light(Model):
-    """An unpolarised point light on a sphere around the origin; ``distance`` in cm."""
+    """A point light on a sphere around the origin; ``distance`` in cm.
+
+    ``polarisation_deg`` is the angle of its electric field from the vertical plane through the light, where it is
+    linearly polarised; it is unpolarised when not given. ``spectrum`` is Q of eq. 1, rows [nm, relative value].
+    """
 
     distance: Positive
+    polarisation_deg: float | None = None
+    spectrum: Curve = ()
+
+    @field_validator("spectrum")
+    @classmethod
+    def _rising(cls, rows: tuple) -> tuple:
+        return _rising("light.spectrum", rows)
 
 
 class Noise(Model):

@@ -64,8 +64,7 @@ def _draw_map(figure, axis, plan, space, values, best, title) -> None:
     frame = _frame(space, values)
     picture = np.sqrt(_pixels(frame, space, values, 700))
     finite = picture[np.isfinite(picture)]
-    colours = plt.get_cmap("gray_r").copy()
-    colours.set_bad(alpha=0)
+    colours = plt.get_cmap("gray_r").with_extremes(bad=(0, 0, 0, 0))
     axis.add_patch(plt.Circle((0, 0), 1, color="#1b2a49", zorder=0))
     shown = axis.imshow(
         np.where(np.isfinite(picture), picture, np.nan), extent=(-1, 1, -1, 1), origin="lower", cmap=colours,

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Group
+from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
 import planner
 import scenes
-from validate.commands.common import Json, SceneName, app, parse_pose, progress
+from validate.commands.common import Json, SceneName, app, parse_pose
 from validate.table import console
 
 Pair = Annotated[str | None, typer.Option(metavar="P,A", help="Hold it fixed: polar angle and azimuth, degrees.")]
@@ -29,7 +31,7 @@ def plan_command(
     price: Annotated[str, typer.Option(help="calibrated or paper")] = "calibrated",
     edges: Annotated[str, typer.Option(help="given, or best of all sets that measure the same")] = "given",
     step: Annotated[
-        float | None, typer.Option(help="Grid step, degrees; default 1, or 8 for hollow or glossy.")
+        float | None, typer.Option(help="Grid step, degrees; default 1, or 10 for hollow or glossy.")
     ] = None,
     sensor: Pair = None,
     light: Pair = None,
@@ -49,7 +51,7 @@ def plan_command(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Find where sensor and light should stand. Exit status 1 if the optimum cannot be measured."""
+    """Find where sensor and light should stand."""
     loaded = scenes.load(scene)
     limits = planner.Constraints(
         sensor_polar_deg=_range("--sensor-polar", sensor_polar),
@@ -67,7 +69,7 @@ def plan_command(
         "start": parse_pose("--start", start),
     }
     began = time.perf_counter()
-    with progress(f"{loaded.name}: searching") as shown:
+    with _progress(f"{loaded.name}: searching") as shown:
         found = planner.plan(
             loaded, objective, price=price, search=search, edges=edges, step_deg=step, constraints=limits, **poses,
             report=shown,
@@ -79,7 +81,15 @@ def plan_command(
         _print_json(found, safe, seconds, pictures)
     else:
         _print(found, safe, seconds, pictures)
-    raise typer.Exit(0 if found.prediction.status == "ok" else 1)
+
+
+@contextmanager
+def _progress(title: str):
+    """A bar of the sensors searched, on standard error, if that is a terminal."""
+    errors = console(stderr=True)
+    with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda _what, done, total: bar.update(task, completed=done, total=total)
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:
