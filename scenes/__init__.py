@@ -2,11 +2,12 @@
 
 from scenes.errors import InvalidInput
 from scenes.load import load, names
-from scenes.model import Block, Camera, Corner, Light, Locator, Material, Noise, Scene, Setting, Task
+from scenes.model import Block, Camera, Corner, Light, Locator, Material, Scene, Setting, Task
+from scenes.optics import Band, Floor, Jitter, Lens, Noise, Obstacle
 from scenes.pose import Pose
 from scenes.solid import Edge, Solid, block
 
 __all__ = [
-    "Block", "Camera", "Corner", "Edge", "InvalidInput", "Light", "Locator", "Material", "Noise", "Pose",
-    "Scene", "Setting", "Solid", "Task", "block", "load", "names",
+    "Band", "Block", "Camera", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator",
+    "Material", "Noise", "Obstacle", "Pose", "Scene", "Setting", "Solid", "Task", "block", "load", "names",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scenes.errors import InvalidInput
+from scenes.optics import Band, Floor, Jitter, Lens, Noise, Obstacle
 from scenes.pose import Pose, PoseField
 from scenes.solid import Solid, block
 
@@ -43,7 +44,8 @@ class Material(Model):
 
     ``specular_fraction`` is s, ``diffuse_reflectance`` R_d, ``refractive_index`` n, ``extinction`` k
     and ``roughness`` the Beckmann m. With n = 1 and k = 0 the Fresnel term vanishes and the surface is
-    purely diffuse, reflecting (1 - s) R_d.
+    purely diffuse, reflecting (1 - s) R_d. ``dispersion_um2`` is Cauchy's B: n at a wavelength w (um) is
+    ``refractive_index`` + B (1 / w^2 - 1 / 0.5893^2).
     """
 
     specular_fraction: Fraction = 0.0
@@ -51,6 +53,7 @@ class Material(Model):
     refractive_index: Positive = 1.0
     extinction: NotNegative = 0.0
     roughness: Positive = 0.2
+    dispersion_um2: NotNegative = 0.0
 
     @property
     def is_diffuse(self) -> bool:
@@ -63,7 +66,8 @@ class Camera(Model):
 
     ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
     blur, ``exposure`` the grey level of a white diffuse surface at the origin that faces the light, and
-    ``black_level`` the grey level of darkness, which keeps noise from being clipped.
+    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``analyser_deg`` is the
+    direction that an ideal linear polariser in front of the lens lets through, from the image's x towards its y.
     """
 
     width: Annotated[int, Field(ge=1, le=16384)]
@@ -73,27 +77,22 @@ class Camera(Model):
     blur_px: NotNegative = 0.6
     exposure: Positive = 200.0
     black_level: NotNegative = 0.0
+    lens: Lens = Lens()
+    analyser_deg: float | None = None
 
 
 class Light(Model):
-    """An unpolarised point light on a sphere around the origin; ``distance`` in cm."""
+    """A light on a sphere around the origin; ``distance`` in cm.
 
-    distance: Positive
-
-
-class Noise(Model):
-    """The sensor's noise: Gaussian of standard deviation ``sigma`` (grey levels), then ``bits`` of digits.
-
-    Without ``bits`` grey levels stay real numbers; with it they are rounded and clipped to 0 .. 2^bits - 1.
+    ``radius`` (cm) is 0 for a point. ``polarisation_deg`` is the direction in which the light swings, seen along the
+    beam: from the direction away from the pole (0) towards that of growing azimuth (90); None for unpolarised light.
+    ``bands`` are the wavelengths it consists of.
     """
 
-    sigma: NotNegative
-    bits: Annotated[int, Field(ge=1, le=16)] | None = None
-
-    @property
-    def variance(self) -> float:
-        """Variance of a grey level, rounding included (1/12 of a squared grey level)."""
-        return self.sigma**2 + (0.0 if self.bits is None else 1 / 12)
+    distance: Positive
+    radius: NotNegative = 0.0
+    polarisation_deg: float | None = None
+    bands: tuple[Band, ...] = ()
 
 
 class Corner(Model):
@@ -164,6 +163,9 @@ class Scene(Model):
     locator: Locator = Locator()
     settings: tuple[Setting, ...] = ()
     same_scale: tuple[str, ...] = ()
+    floor: Floor | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    jitter: Jitter = Jitter()
 
     @property
     def solid(self) -> Solid:
@@ -191,10 +193,13 @@ class Scene(Model):
         if self.solid.height_above(self.position(role, pose)) <= 1e-6 * np.ptp(self.solid.vertices):
             radius = (self.camera if role == "sensor" else self.light).distance
             raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
+        if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
+            raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
+        self._check_surroundings()
         for end in ("start", "end"):
             self._check_corner(f"task.{end}", getattr(self.task, end))
         if self.task.start.vertex == self.task.end.vertex:
@@ -205,6 +210,19 @@ class Scene(Model):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
         return self
+
+    def _check_surroundings(self) -> None:
+        """Floor below the object, light and sensor above it and outside obstacles, one level of darkness."""
+        low = float(self.solid.vertices[:, 2].min())
+        if self.floor is not None and self.floor.height > low:
+            raise ValueError(f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}")
+        if self.noise.needs_darkness and self.noise.dark_level != self.camera.black_level:
+            raise ValueError(
+                f"noise.dark_level must be camera.black_level ({self.camera.black_level:g}) where noise depends on the "
+                f"light, got {self.noise.dark_level:g}"
+            )
+        if self.light.radius >= self.light.distance / 2:
+            raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")
 
     def _check_corner(self, key: str, corner: Corner) -> None:
         if corner.vertex not in self.solid.vertex_names:
