@@ -215,7 +215,9 @@ class Scene(Model):
         """Floor below the object, light and sensor above it and outside obstacles, one level of darkness."""
         low = float(self.solid.vertices[:, 2].min())
         if self.floor is not None and self.floor.height > low:
-            raise ValueError(f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}")
+            raise ValueError(
+                f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
+            )
         if self.noise.needs_darkness and self.noise.dark_level != self.camera.black_level:
             raise ValueError(
                 f"noise.dark_level must be camera.black_level ({self.camera.black_level:g}) where noise depends on the "
