@@ -50,17 +50,18 @@ def propagate(
     """Propagate pixel noise through edge points, lines and corners to the distance.
 
     On the noise-free image the offset of each edge point is linear in small noise, and so is all that follows. With g
-    the derivative of the distance by the pixels, its variance is the noise variance times the sum of g^2; neighbouring
-    points share pixels, and so their correlation is in g.
+    the derivative of the distance by the pixels, its variance is the sum of g^2 times each pixel's noise variance;
+    neighbouring points share pixels, and so their correlation is in g.
 
     Parameters
     ----------
     clean : ndarray, shape (height, width)
-        Noise-free image, grey levels.
+        Noise-free image, grey levels, not yet cut off at the end of the sensor's scale.
     scene, sensor, light, locator, threshold
         As for `measure.distance`.
     """
-    clean = np.asarray(clean, float)
+    noise = scene.noise.variance_at(clean).ravel()  # of each pixel: shot noise grows with light, saturation ends it
+    clean = scene.noise.mean_at(clean)
     found = distance(clean, scene, sensor, light, locator, threshold)
     if str(found.status) not in status.MEASURED:
         shape = np.full((4, 4), np.inf), np.zeros(clean.shape)
@@ -75,9 +76,12 @@ def propagate(
     ends = np.vstack(corners)
     unit = (found.corners[1] - found.corners[0]) / float(found.value_px)
     g = np.concatenate([-unit, unit]) @ ends
-    noise = scene.noise.variance
     return Propagated(
-        float(found.value_px), float(noise * (g @ g)), noise * ends @ ends.T, g.reshape(clean.shape), str(found.status)
+        float(found.value_px),
+        float(noise @ (g * g)),
+        (noise * ends) @ ends.T,
+        g.reshape(clean.shape),
+        str(found.status),
     )
 
 

@@ -16,7 +16,7 @@ from scenes import Floor, Pose, Scene
 BOUNCES = 4  # surfaces a ray may meet with interreflection; the fifth would add less than reflectance^4 of the first
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _TINY_LIGHT = 1e-2  # of the distance: in single precision Mitsuba samples a smaller sphere wrongly
-_CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
+CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
 
 
 def description(
@@ -74,7 +74,7 @@ def polariser_axes(scene: Scene, sensor: Pose, light: Pose) -> tuple[np.ndarray 
 
 def _surface(mitsuba, scene: Scene, sensor: Pose, light: Pose, active: frozenset[str]) -> dict:
     material = scene.material
-    if not active & _CUSTOM:
+    if not active & CUSTOM:
         albedo = (1 - material.specular_fraction) * material.diffuse_reflectance
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": albedo}}
     swing, analyser = (None if axis is None else tuple(axis.tolist()) for axis in polariser_axes(scene, sensor, light))

@@ -15,12 +15,12 @@ def blur_and_bin(
 ) -> np.ndarray:
     """Blur an image of ``supersample`` x finer pixels by a Gaussian of ``blur_px`` and average to pixels.
 
-    Outside the image it is dark. The blur acts on the fine image, so that the result depends on the edge's
-    place within a pixel only as in a real camera, and the noise of pixels stays independent. ``warp`` acts between
-    the two: a blurred image can be interpolated without ringing.
+    Outside, the image goes on as at its border. The blur acts on the fine image, so that the result depends on the
+    edge's place within a pixel only as in a real camera, and the noise of pixels stays independent. ``warp`` acts
+    between the two: a blurred image can be interpolated without ringing.
     """
     if blur_px > 0:
-        fine = gaussian_filter(fine, blur_px * supersample, mode="constant", truncate=6)
+        fine = gaussian_filter(fine, blur_px * supersample, mode="nearest", truncate=6)
     if warp is not None:
         fine = warp(fine)
     height, width = fine.shape[0] // supersample, fine.shape[1] // supersample
@@ -47,4 +47,4 @@ def distort(fine: np.ndarray, camera: Camera, start: tuple[int, int], supersampl
     for _ in range(6):
         source = source + seen - distorted(source, camera)
     at = (source + 0.5) * supersample - 0.5 - np.array(start)
-    return map_coordinates(fine, [at[..., 1], at[..., 0]], order=3, mode="constant")
+    return map_coordinates(fine, [at[..., 1], at[..., 0]], order=3, mode="nearest")

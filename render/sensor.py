@@ -45,7 +45,7 @@ def expose(
     if count < 1:
         raise InvalidInput(f"count must be at least 1, got {count}")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
-    sigma = np.sqrt(variance(image, noise) - (0.0 if noise.bits is None else 1 / 12))
+    sigma = np.sqrt(noise.sigma**2 + noise.gain * np.maximum(image - noise.dark_level, 0.0))
     pictures = np.repeat((np.asarray(image, float) + fixed_pattern(image, noise))[None], count, axis=0)
     height, width = image.shape
     across = -(-width // TILE)

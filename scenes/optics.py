@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from scipy.special import ndtr
 
 from scenes.solid import Solid, block
 
@@ -102,6 +103,31 @@ class Noise(Part):
     def variance_at(self, image: np.ndarray) -> np.ndarray:
         """Variance over repeated pictures (not sigma) of each pixel of a noise-free image, squared grey levels.
 
-        EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12. The fixed pattern does not vary.
+        EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12, less near the end of the scale, which cuts it off.
+        The fixed pattern does not vary.
         """
-        return self.variance + self.gain * np.maximum(np.asarray(image, float) - self.dark_level, 0.0)
+        return self._recorded(image)[1]
+
+    def mean_at(self, image: np.ndarray) -> np.ndarray:
+        """Mean over repeated pictures of each pixel of a noise-free image: itself but near the end of the scale."""
+        return self._recorded(image)[0]
+
+    def _recorded(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance of what the sensor records: a normal distribution cut off at 2^bits - 1.
+
+        The cut at 0 is left out: the camera's black level keeps the noise away from it.
+        """
+        level = np.asarray(image, float)
+        variance = self.variance + self.gain * np.maximum(level - self.dark_level, 0.0)
+        full = np.inf if self.bits is None else 2.0**self.bits - 1
+        near = level > full - 6 * np.sqrt(variance)
+        if not near.any():
+            return level, variance
+        sigma = np.sqrt(variance[near])
+        below = (full - level[near]) / sigma
+        density = np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi)
+        missing = below * ndtr(below) + density  # mean of (full - x) / sigma where x is below, 0 elsewhere
+        square = (1 + below**2) * ndtr(below) + below * density
+        level, variance = level.copy(), variance.copy()
+        level[near], variance[near] = full - sigma * missing, sigma**2 * np.maximum(square - missing**2, 0.0)
+        return level, variance

@@ -8,7 +8,7 @@ import sys
 import typer
 
 from scenes import InvalidInput
-from validate.commands import batch, image  # noqa: F401
+from validate.commands import batch, effects, image  # noqa: F401
 from validate.commands.common import app
 
 _UsageError = typer.BadParameter.__base__  # typer does not export it

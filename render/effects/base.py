@@ -10,6 +10,7 @@ import numpy as np
 
 from scenes import InvalidInput, Scene
 
+RANDOM = 4.0  # time of a render in which every pixel gets many rays, over one in which only edges do
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
 
 
@@ -60,14 +61,17 @@ class Effect(ABC):
     ----------
     name : str
     cost : float
-        Time of a render with this effect alone over that without, compiled variant. 1 is free: it is then never left
-        out where it can matter.
+        Time of a render with this effect alone over that without, compiled variant, about (measured by ``ice effects
+        --check``). 1 is free: it is then never left out where it can matter.
+    random : bool
+        Whether single rays become random, so that all pixels need `RANDOM` times the rays; included in the cost.
     switch : str
         How it is simulated.
     """
 
     name: ClassVar[str]
     cost: ClassVar[float] = 1.0
+    random: ClassVar[bool] = False
     switch: ClassVar[str]
 
     @abstractmethod

@@ -64,7 +64,8 @@ class DepthOfField(Effect):
     """A thin lens blurs what is out of focus."""
 
     name = "depth_of_field"
-    cost = 1.9
+    cost = 4.0
+    random = True
     switch = "a thin lens instead of a pinhole; random, so edge pixels cannot be singled out"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:

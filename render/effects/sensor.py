@@ -109,5 +109,5 @@ class Saturation(Effect):
     def _top(self, scene: Scene, poses: Poses) -> float:
         level = scene.camera.black_level + _brightest(scene, poses)
         noise = scene.noise
-        sigma = np.sqrt(float(noise.variance_at(np.array(level))) + (noise.prnu * level) ** 2 + noise.dsnu**2)
+        sigma = np.sqrt(noise.variance + noise.gain * level + (noise.prnu * level) ** 2 + noise.dsnu**2)
         return level + self._MARGIN * float(sigma)

@@ -53,7 +53,7 @@ class SpecularLobe(Effect):
     """The Torrance-Sparrow term."""
 
     name = "specular_lobe"
-    cost = 1.6
+    cost = 1.5
     switch = "the paper's reflectance as a BSDF instead of a diffuse one"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
@@ -129,7 +129,8 @@ class LightSize(Effect):
     """A light of finite radius: softer shading, lobes and shadows."""
 
     name = "light_size"
-    cost = 2.1
+    cost = 11.0
+    random = True
     switch = "a sphere instead of a point"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:

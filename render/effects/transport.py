@@ -59,7 +59,8 @@ class Interreflection(Effect):
     """Light that one surface sends to another."""
 
     name = "interreflection"
-    cost = 3.0
+    cost = 6.5
+    random = True
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:

@@ -50,7 +50,7 @@ def test_bad_scene_is_one_line_with_file_and_key(tmp_path, old, new, line):
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("nothing", "scene must be a TOML file or one of task1, task1_part1, got 'nothing'"),
+        ("nothing", "task1, task1_part1, got 'nothing'"),
         ("missing.toml", "missing.toml must be a readable file, got No such file"),
     ],
 )

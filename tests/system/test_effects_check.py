@@ -1,0 +1,27 @@
+"""What was left out, switched on: reduced to one setting and few rays. ``ice effects SCENE --check`` does all of it."""
+
+import pytest
+
+import render
+import scenes
+from validate.effects_check import RENDERED, Switched, check
+
+pytestmark = pytest.mark.render
+COARSE = render.Quality(supersample=2, samples=1, edge_samples=16, random_samples=4)
+
+
+@pytest.mark.parametrize("name", ["task1", "low_light"])
+def test_left_out_effects_are_within_their_bounds(name):
+    scene = scenes.load(name)
+    cheap = [
+        row for row in check(scene, quality=COARSE, settings=scene.settings[:1], only=("interreflection", "floor"))
+    ]
+    assert [row.name for row in cheap] == ["interreflection", "floor", "all"]
+    assert all(row.holds for row in cheap), cheap
+
+
+def test_a_bound_that_is_too_small_is_found(task1):
+    """Negative control: a floor whose influence is said to be nothing."""
+    row = Switched(task1.settings[0], "floor", render.effects(task1)[1].influence, 0.01, 0.0, 2e-4, 1e-3, 1.0, 1.0)
+    assert not row.holds
+    assert "floor" in RENDERED
