@@ -58,6 +58,17 @@ def description(
     return parts
 
 
+def light_radius(scene: Scene, active: frozenset[str]) -> float:
+    """Radius of the light as it is simulated, cm."""
+    return max(scene.light.radius, _TINY_LIGHT * scene.light.distance) if "light_size" in active else 0.0
+
+
+def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
+    """Radius of the aperture as it is simulated, cm."""
+    least = _TINY_APERTURE * scene.camera.distance
+    return max(scene.camera.lens.aperture_radius, least) if "depth_of_field" in active else 0.0
+
+
 def polariser_axes(scene: Scene, sensor: Pose, light: Pose) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Directions in space of the light's swing and of the analyser; None without them."""
     found = []
@@ -87,8 +98,8 @@ def _surface(mitsuba, scene: Scene, sensor: Pose, light: Pose, active: frozenset
             *places,
             swing=swing if "polarisation" in active else None,
             analyser=analyser if "analyser" in active else None,
-            light_angle=2 * scene.light.radius / scene.light.distance,
-            sensor_angle=2 * scene.camera.lens.aperture_radius / scene.camera.distance,
+            light_angle=2 * light_radius(scene, active) / scene.light.distance,
+            sensor_angle=2 * aperture_radius(scene, active) / scene.camera.distance,
         ),
     )
 
@@ -100,8 +111,11 @@ def view(mitsuba, scene: Scene, sensor: Pose, active, size, crop, samples: int) 
     rows, columns = crop
     lens = {"type": "perspective"}
     if "depth_of_field" in active:
-        radius = max(camera.lens.aperture_radius, _TINY_APERTURE * camera.distance)
-        lens = {"type": "thinlens", "aperture_radius": radius, "focus_distance": camera.lens.focus or camera.distance}
+        lens = {
+            "type": "thinlens",
+            "aperture_radius": aperture_radius(scene, active),
+            "focus_distance": camera.lens.focus or camera.distance,
+        }
     return {
         **lens,
         "fov_axis": "x",
@@ -137,7 +151,7 @@ def _light(mitsuba, scene: Scene, light: Pose, active) -> dict:
     if "light_size" not in active:
         value = {"type": "spectrum", "value": intensity}
         return {"type": "point", "position": position.tolist(), "intensity": value}
-    radius = max(scene.light.radius, _TINY_LIGHT * scene.light.distance)
+    radius = light_radius(scene, active)
     radiance = {"type": "spectrum", "value": intensity / (math.pi * radius**2)}
     return {
         "type": "sphere",

@@ -10,13 +10,18 @@ pytestmark = pytest.mark.render
 COARSE = render.Quality(supersample=2, samples=1, edge_samples=16, random_samples=4)
 
 
-@pytest.mark.parametrize("name", ["task1", "low_light"])
-def test_left_out_effects_are_within_their_bounds(name):
+@pytest.mark.parametrize(
+    ("name", "only"),
+    [
+        ("task1", ("interreflection", "floor", "all")),
+        ("macro", ("floor", "light_size")),
+        ("polarised", ("wavelength",)),
+    ],
+)
+def test_left_out_effects_are_within_their_bounds(name, only):
     scene = scenes.load(name)
-    cheap = [
-        row for row in check(scene, quality=COARSE, settings=scene.settings[:1], only=("interreflection", "floor"))
-    ]
-    assert [row.name for row in cheap] == ["interreflection", "floor", "all"]
+    cheap = check(scene, quality=COARSE, settings=scene.settings[:1], only=only)
+    assert [row.name for row in cheap] == list(only)
     assert all(row.holds for row in cheap), cheap
 
 
