@@ -159,3 +159,11 @@ def _axes(scene, pose, lamp, light, sensor):
         None if a is None else polarised_across(NUMPY, tuple(a), tuple(b))
         for a, b in zip(found, (light, sensor), strict=True)
     ]
+
+
+def test_polarised_light_is_known_by_the_size_it_is_simulated_with(task1):
+    """A light that `all` makes 1 cm large still swings: its angle is that of the simulated sphere."""
+    from render.build import light_radius
+
+    assert light_radius(task1, frozenset({"light_size"})) == 1.0
+    assert light_radius(task1, frozenset()) == 0.0
