@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 import measure
 import render
@@ -18,7 +19,8 @@ RENDERED = (
     "depth_of_field", "lens_distortion",
 )  # fmt: skip
 _SAMPLING_N = 1000  # renders of `ice validate`, whose variance is known to sqrt(2 / (n - 1))
-_SEEDS = (0, 1, 2)
+_SEEDS = (0, 1, 2, 3, 4)
+_FALSE_ALARM = 1e-3  # of one comparison whose estimate is true
 _ROUNDING = Influence(2e-4, 1e-3)  # single precision, in which the smallest light that can be sampled is no point
 
 
@@ -34,7 +36,8 @@ class Switched:
     bias_px, variance : float
         Measured: change of the noise-free distance, px, and relative change of its propagated variance.
     resolution_px, resolution_variance : float
-        What the renderer itself may contribute to them: 4 standard errors over three seeds, and single precision.
+        What the renderer itself may contribute to them: its scatter over the seeds (Student's t, 0.1 %), and single
+        precision.
     seconds : float
         Time of one render with it; ``seconds_auto`` without.
     """
@@ -105,8 +108,9 @@ class _Runs:
 
 def _row(setting: Setting, name: str, estimated: Influence, base: _Runs, runs: _Runs) -> Switched:
     bias, change = runs.values - base.values, runs.variances / base.variances - 1
+    errors = stats.t.isf(_FALSE_ALARM / 2, len(_SEEDS) - 1) / np.sqrt(len(_SEEDS))
     resolution = [
-        4 * float(differences.std(ddof=1)) / np.sqrt(len(_SEEDS)) + rounding
+        float(errors * differences.std(ddof=1)) + rounding
         for differences, rounding in zip((bias, change), _ROUNDING, strict=True)
     ]
     return Switched(

@@ -125,7 +125,7 @@ def _check_table(rows: list[Switched]) -> Table:
             f"{row.seconds / row.seconds_auto:.1f}",
             "ok" if row.holds else "EXCEEDED",
         )
-    table.caption = "bound: estimated, + 4 standard errors of the renders. time: of one render over that of auto."
+    table.caption = "bound: estimated, + what the renders scatter by (0.1 %). time: of one render over that of auto."
     return table
 
 
