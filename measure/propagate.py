@@ -50,17 +50,18 @@ def propagate(
     """Propagate pixel noise through lines and corners to the distance.
 
     On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of the
-    distance by the pixels, its variance is the noise variance times the sum of g^2; neighbouring edge points share
-    pixels, and so their correlation is in g.
+    distance by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
+    share pixels, and so their correlation is in g.
 
     Parameters
     ----------
     clean : ndarray, shape (height, width)
-        Noise-free image, grey levels.
+        Noise-free image, grey levels, not yet cut off at the end of the sensor's scale.
     scene, sensor, light, estimator, threshold
         As for `measure.distance`.
     """
-    clean = np.asarray(clean, float)
+    noise = scene.noise.variance_at(clean).ravel()  # of each pixel: shot noise grows with light, saturation ends it
+    clean = scene.noise.mean_at(clean)
     found = distance(clean, scene, sensor, light, estimator, threshold)
     if str(found.status) not in status.MEASURED:
         nothing = np.full((4, 4), np.inf), np.zeros(clean.shape)
@@ -72,7 +73,10 @@ def propagate(
     ends = response @ tool.respond(clean).lines
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends
-    noise = scene.noise.variance
     return Propagated(
-        float(found.value_px), float(noise * (g @ g)), noise * ends @ ends.T, g.reshape(clean.shape), str(found.status)
+        float(found.value_px),
+        float(noise @ (g * g)),
+        (noise * ends) @ ends.T,
+        g.reshape(clean.shape),
+        str(found.status),
     )

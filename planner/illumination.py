@@ -32,7 +32,7 @@ def bands(scene: Scene) -> tuple[Band, ...]:
     width = np.gradient(wavelength) if len(wavelength) > 2 else np.ones(len(wavelength))
     width[[0, -1]] = np.diff(wavelength)[[0, -1]] / 2 if len(wavelength) > 2 else 1.0
     share = width.copy()
-    for curve in (scene.camera.lens, scene.camera.responsivity, scene.light.spectrum):
+    for curve in (scene.camera.transmission, scene.camera.responsivity, scene.light.spectrum):
         if curve:
             share *= np.interp(wavelength, *np.array(curve).T)
     share /= share.sum()

@@ -1,6 +1,8 @@
 """A scene and a pose become an image: rendered without noise, then exposed with the sensor's noise."""
 
+from render.effects import Tolerance, choose, effects
+from render.effects.pose import shaken
 from render.image import Quality, image
-from render.sensor import expose
+from render.sensor import expose, variance
 
-__all__ = ["Quality", "expose", "image"]
+__all__ = ["Quality", "Tolerance", "choose", "effects", "expose", "image", "shaken", "variance"]

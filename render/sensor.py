@@ -22,7 +22,8 @@ def expose(
     image : ndarray, shape (height, width)
         Noise-free grey levels.
     noise : Noise
-        Standard deviation and bits of digitisation.
+        Terms of the noise. Shot noise is drawn as the normal distribution that a Poisson one of more than about 20
+        electrons is; the fixed pattern is the same in all pictures and in all calls.
     rng : numpy.random.Generator
         Two 64-bit numbers are taken from it as the key of all streams.
     count : int
@@ -44,7 +45,8 @@ def expose(
     if count < 1:
         raise InvalidInput(f"count must be at least 1, got {count}")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
-    pictures = np.repeat(np.asarray(image, float)[None], count, axis=0)
+    sigma = np.sqrt(noise.sigma**2 + noise.gain * np.maximum(image - noise.dark_level, 0.0))
+    pictures = np.repeat((np.asarray(image, float) + fixed_pattern(image, noise))[None], count, axis=0)
     height, width = image.shape
     across = -(-width // TILE)
     for index in range(across * -(-height // TILE)):
@@ -53,7 +55,20 @@ def expose(
         if where is None or where[tile].any():
             stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
             block = pictures[(slice(None), *tile)]
-            block += noise.sigma * stream.standard_normal(block.shape)
+            block += sigma[tile] * stream.standard_normal(block.shape)
     if noise.bits is not None:
         np.clip(np.rint(pictures, out=pictures), 0, 2**noise.bits - 1, out=pictures)
     return pictures
+
+
+def variance(image: np.ndarray, noise: Noise) -> np.ndarray:
+    """Variance over repeated pictures (not sigma) of each pixel, squared grey levels, shape as the image."""
+    return noise.variance_at(image)
+
+
+def fixed_pattern(image: np.ndarray, noise: Noise) -> np.ndarray:
+    """What one camera's pixels add to a noise-free image, grey levels: offset (DSNU) and part of the signal (PRNU)."""
+    if noise.prnu == 0 and noise.dsnu == 0:
+        return np.zeros(image.shape)
+    offset, share = np.random.default_rng(noise.pattern_seed).standard_normal((2, *image.shape))
+    return noise.dsnu * offset + noise.prnu * share * np.maximum(image - noise.dark_level, 0.0)

@@ -1,4 +1,4 @@
-"""Which Mitsuba variant is safe on this machine: compiled with LLVM where that works, otherwise scalar.
+"""Which Mitsuba variant is safe on this machine: compiled for CUDA or with LLVM where that works, otherwise scalar.
 
 Some releases of libLLVM load but abort the whole process in the first compilation, which no `try` can catch. So a
 candidate is tried in a process of its own, with an operation that those releases cannot compile.
@@ -19,6 +19,7 @@ from scenes import InvalidInput
 
 SCALAR = "scalar_rgb"
 LLVM = "llvm_ad_mono"
+CUDA = "cuda_ad_mono"
 OVERRIDE = "ICE_VARIANT"
 _LIBRARY = "DRJIT_LIBLLVM_PATH"
 _PLACES = (
@@ -33,17 +34,26 @@ mitsuba.set_variant("{LLVM}")
 from drjit.llvm import Float
 assert list(drjit.minimum(Float(1, 2, 3), 2)) == [1, 2, 2]
 """
+_CUDA_PROBE = f"""
+import mitsuba
+mitsuba.set_variant("{CUDA}")
+scene = mitsuba.load_dict({{"type": "scene", "a": {{"type": "cube"}}, "b": {{"type": "constant"}}}})
+assert float(mitsuba.render(scene, sensor=mitsuba.load_dict({{"type": "perspective"}}), spp=1).array[0]) >= 0
+"""
+_NVIDIA = Path("/dev/nvidiactl")  # what its driver makes
 
 
 @functools.cache
 def choose() -> str:
     """Name of the variant to render with; found once a process.
 
-    The environment variable ICE_VARIANT overrides the choice. DRJIT_LIBLLVM_PATH, where set, is the only libLLVM
-    that is tried; otherwise the newest installed one that passes.
+    The environment variable ICE_VARIANT overrides the choice. With an NVIDIA driver CUDA is tried first.
+    DRJIT_LIBLLVM_PATH, where set, is the only libLLVM that is tried; otherwise the newest installed one that passes.
     """
     if OVERRIDE in os.environ:
         return os.environ[OVERRIDE]
+    if _NVIDIA.exists() and _runs(_CUDA_PROBE, dict(os.environ)):
+        return CUDA
     if _LIBRARY in os.environ:
         return LLVM if _works(os.environ[_LIBRARY]) else SCALAR
     for library in _candidates():
@@ -53,9 +63,8 @@ def choose() -> str:
     return SCALAR
 
 
-@functools.cache
 def use(name: str):
-    """The mitsuba module with the named variant active.
+    """The mitsuba module with the named variant active, whichever was before.
 
     Raises
     ------
@@ -67,6 +76,8 @@ def use(name: str):
 
     if name not in mitsuba.variants():
         raise InvalidInput(f"{OVERRIDE} must be one of {', '.join(mitsuba.variants())}, got {name!r}")
+    if mitsuba.variant() == name:
+        return mitsuba
     try:
         with _silent():
             mitsuba.set_variant(name)
@@ -104,9 +115,13 @@ def _release(path: str) -> tuple[int, ...]:
 
 def _works(library: str) -> bool:
     """Whether a separate process can compile and run with this libLLVM."""
-    environment = {**os.environ, _LIBRARY: library}
+    return _runs(_PROBE, {**os.environ, _LIBRARY: library})
+
+
+def _runs(code: str, environment: dict[str, str]) -> bool:
+    """Whether a separate process runs the code to its end; an abort there does no harm here."""
     try:
-        probe = subprocess.run([sys.executable, "-c", _PROBE], env=environment, capture_output=True, timeout=120)
+        probe = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, timeout=120)
     except subprocess.TimeoutExpired:
         return False
     return probe.returncode == 0

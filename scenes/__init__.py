@@ -11,16 +11,16 @@ from scenes.model import (
     Locator,
     Material,
     Mesh,
-    Noise,
     Scene,
     Setting,
     Task,
 )
+from scenes.optics import Floor, Jitter, Lens, Noise, Obstacle
 from scenes.pose import Pose
 from scenes.solid import Circle, Edge, Solid, block
 
 __all__ = [
-    "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "InvalidInput", "Light", "Locator", "Material", "Mesh",
-    "Noise", "Pose",
-    "Scene", "Setting", "Solid", "Task", "block", "load", "names",
+    "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
+    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Pose", "Scene", "Setting", "Solid", "Task", "block", "load",
+    "names",
 ]  # fmt: skip

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 
 from scenes import mesh
 from scenes.errors import InvalidInput
+from scenes.optics import Floor, Jitter, Lens, Noise, Obstacle
 from scenes.pose import Pose, PoseField
 from scenes.solid import Solid, block
 
@@ -113,8 +114,10 @@ class Camera(Model):
 
     ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
     blur, ``exposure`` the grey level of a white diffuse surface at the origin that faces the light, and
-    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``lens`` and ``responsivity``
-    are C and S of eq. 1 by wavelength, rows [nm, relative value], constant where not given.
+    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``analyser_deg`` is the
+    direction that an ideal linear polariser in front of the lens lets through, from the image's x towards its y.
+    ``transmission`` (of the lens) and ``responsivity`` (of the sensor) are C and S of eq. 1 by wavelength, rows
+    [nm, relative value], constant where not given.
     """
 
     width: Annotated[int, Field(ge=1, le=16384)]
@@ -124,23 +127,27 @@ class Camera(Model):
     blur_px: NotNegative = 0.6
     exposure: Positive = 200.0
     black_level: NotNegative = 0.0
-    lens: Curve = ()
+    lens: Lens = Lens()
+    analyser_deg: float | None = None
+    transmission: Curve = ()
     responsivity: Curve = ()
 
-    @field_validator("lens", "responsivity")
+    @field_validator("transmission", "responsivity")
     @classmethod
     def _rising(cls, rows: tuple, info: ValidationInfo) -> tuple:
         return _rising(f"camera.{info.field_name}", rows)
 
 
 class Light(Model):
-    """A point light on a sphere around the origin; ``distance`` in cm.
+    """A light on a sphere around the origin; ``distance`` in cm.
 
-    ``polarisation_deg`` is the angle of its electric field from the vertical plane through the light, where it is
-    linearly polarised; it is unpolarised when not given. ``spectrum`` is Q of eq. 1, rows [nm, relative value].
+    ``radius`` (cm) is 0 for a point. ``polarisation_deg`` is the direction in which the light swings, seen along the
+    beam: from the direction away from the pole (0) towards that of growing azimuth (90); None for unpolarised light.
+    ``spectrum`` is Q of eq. 1, rows [nm, relative value].
     """
 
     distance: Positive
+    radius: NotNegative = 0.0
     polarisation_deg: float | None = None
     spectrum: Curve = ()
 
@@ -148,21 +155,6 @@ class Light(Model):
     @classmethod
     def _rising(cls, rows: tuple) -> tuple:
         return _rising("light.spectrum", rows)
-
-
-class Noise(Model):
-    """The sensor's noise: Gaussian of standard deviation ``sigma`` (grey levels), then ``bits`` of digits.
-
-    Without ``bits`` grey levels stay real numbers; with it they are rounded and clipped to 0 .. 2^bits - 1.
-    """
-
-    sigma: NotNegative
-    bits: Annotated[int, Field(ge=1, le=16)] | None = None
-
-    @property
-    def variance(self) -> float:
-        """Variance of a grey level, rounding included (1/12 of a squared grey level)."""
-        return self.sigma**2 + (0.0 if self.bits is None else 1 / 12)
 
 
 class Corner(Model):
@@ -266,6 +258,9 @@ class Scene(Model):
     locator: Locator = Locator()
     settings: tuple[Setting, ...] = ()
     same_scale: tuple[str, ...] = ()
+    floor: Floor | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    jitter: Jitter = Jitter()
 
     @property
     def solid(self) -> Solid:
@@ -293,11 +288,14 @@ class Scene(Model):
         if self.solid.height_above(self.position(role, pose)) <= 1e-6 * np.ptp(self.solid.vertices):
             radius = (self.camera if role == "sensor" else self.light).distance
             raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
+        if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
+            raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         self._check_task()
+        self._check_surroundings()
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
@@ -326,6 +324,21 @@ class Scene(Model):
         known = [circle.name for circle in self.solid.circles]
         if centre.circle not in known:
             raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
+
+    def _check_surroundings(self) -> None:
+        """Floor below the object, light and sensor above it and outside obstacles, one level of darkness."""
+        low = float(self.solid.vertices[:, 2].min())
+        if self.floor is not None and self.floor.height > low:
+            raise ValueError(
+                f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
+            )
+        if self.noise.needs_darkness and self.noise.dark_level != self.camera.black_level:
+            raise ValueError(
+                f"noise.dark_level must be camera.black_level ({self.camera.black_level:g}) where noise depends on the "
+                f"light, got {self.noise.dark_level:g}"
+            )
+        if self.light.radius >= self.light.distance / 2:
+            raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")
 
     def _check_corner(self, key: str, corner: Corner) -> None:
         if corner.vertex not in self.solid.vertex_names:

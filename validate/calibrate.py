@@ -119,9 +119,7 @@ def _square(degrees: float, ratio: float, scene: Scene) -> tuple[np.ndarray, Lay
     a = np.radians(degrees)
     turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * _SIDE / 2 @ turn.T + _SIZE / 2 + np.array([0.3, 0.7])
-    optics = Optics(
-        (_SIZE, _SIZE), scene.camera.blur_px, ratio**2, scene.locator.scale_px, scene.locator.window_px
-    )
+    optics = Optics((_SIZE, _SIZE), scene.camera.blur_px, ratio**2, scene.locator.scale_px, scene.locator.window_px)
     y, x = np.mgrid[:_SIZE, :_SIZE]
     nodes = np.stack([x, y], -1)[..., None, :] + NODES
     covered = np.ones((_SIZE, _SIZE, len(NODES)))

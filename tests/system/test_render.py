@@ -5,10 +5,12 @@ import pytest
 
 import measure
 import render
+from measure.distance import prepare
+from measure.lines import fit_lines
 from planner.view import direction, frame, project
 from render.image import window
-from scenes import InvalidInput, Material, Pose
-from tests.oracle import polygon_image
+from scenes import InvalidInput, Pose
+from tests.oracle import block_image, polygon_image
 
 pytestmark = pytest.mark.render
 
@@ -70,6 +72,21 @@ def test_edges_lie_where_the_exact_image_has_them(task1, sensor):
     assert abs(float(ours.value_px) - float(oracle.value_px)) < 0.002
 
 
+@pytest.mark.parametrize(("sensor", "light"), [((30, 90), (15, 270)), ((45, 225), (60, 45))])
+def test_lines_lie_where_the_exact_shaded_image_has_them(task1, sensor, light):
+    """Each fitted line's mean place against the exact image of the shaded block: < 0.001 px; 1 px / 50 is seen."""
+    rendered, exact = render.image(task1, sensor, light), block_image(task1, sensor, light)
+    offsets = [_line_offsets(task1, sensor, image) for image in (rendered, exact)]
+    assert np.abs(offsets[0] - offsets[1]).max() < 0.001
+    shifted = task1.model_copy(update={"camera": task1.camera.model_copy(update={"distance": 100.02})})
+    assert np.abs(_line_offsets(task1, sensor, block_image(shifted, sensor, light)) - offsets[1]).max() > 0.005
+
+
+def _line_offsets(scene, sensor, image):
+    frames = prepare(scene, Pose(*sensor), "gradient", None)
+    return np.array([fit_lines(locator.locate(image[None])).mean_offset[0] for _, locator in frames])
+
+
 def test_same_seed_is_bit_identical(task1):
     first, again = (render.image(task1, (30, 135), (15, 315)) for _ in range(2))
     assert (first == again).all()
@@ -95,6 +112,7 @@ def test_bad_arguments(task1):
         render.Quality(samples=5)
     with pytest.raises(InvalidInput, match="supersample must be at least 1, got 0"):
         render.Quality(supersample=0)
-    glossy = task1.model_copy(update={"material": Material(specular_fraction=0.5, refractive_index=1.5)})
-    with pytest.raises(InvalidInput, match="material must be diffuse"):
-        render.image(glossy, (30, 135), (15, 315))
+    with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .*, got 'fog'"):
+        render.image(task1, (30, 135), (15, 315), effects="fog")
+    with pytest.raises(InvalidInput, match="tolerance bias_px must be at least 0, got -1"):
+        render.Tolerance(bias_px=-1)

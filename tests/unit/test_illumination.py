@@ -97,7 +97,7 @@ TABLE = ((450.0, 1.2, 2.5), (550.0, 0.4, 2.4), (650.0, 0.2, 3.4))
 def metal(task1):
     material = Material(specular_fraction=0.5, diffuse_reflectance=0.4, roughness=0.3, index_table=TABLE)
     camera = task1.camera.model_copy(update={
-        "responsivity": ((400, 0.2), (700, 1.0)), "lens": ((400, 0.9), (700, 0.8))
+        "responsivity": ((400, 0.2), (700, 1.0)), "transmission": ((400, 0.9), (700, 0.8))
     })  # fmt: skip
     light = scenes.Light(distance=100, spectrum=((400, 1.0), (700, 2.0)))
     return task1.model_copy(update={"material": material, "camera": camera, "light": light})

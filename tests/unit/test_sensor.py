@@ -50,3 +50,38 @@ def test_no_noise():
 def test_bad_count():
     with pytest.raises(InvalidInput, match="count must be at least 1, got 0"):
         render.expose(np.zeros((2, 2)), Noise(sigma=1.0), np.random.default_rng(1), 0)
+
+
+def test_shot_noise_grows_with_light_and_dark_noise_does_not():
+    """EMVA 1288: variance sigma^2 + gain (level - dark level); 3 levels, 4 standard errors; 1.3 x is rejected."""
+    noise = Noise(sigma=1.5, gain=0.25, dark_level=20.0)
+    image = np.repeat([[20.0], [60.0], [220.0]], 2000, axis=1)
+    pictures = render.expose(image, noise, np.random.default_rng(5), 20)
+    ratio = pictures.var(axis=0, ddof=1).mean(1) / render.variance(image, noise)[:, 0]
+    error = np.sqrt(2 / (2000 * 19))
+    assert np.abs(ratio - 1).max() < 4 * error
+    assert np.abs(ratio / 1.3 - 1).min() > 4 * error
+    assert render.variance(image, noise)[:, 0] == pytest.approx([2.25, 12.25, 52.25])
+
+
+def test_fixed_pattern_is_the_same_in_every_picture_and_scales_as_said():
+    noise = Noise(sigma=0.0, prnu=0.01, dsnu=0.3, dark_level=10.0)
+    image = np.full((2, 64, 64), 10.0)
+    image[1] = 210.0
+    pictures = [render.expose(level, noise, np.random.default_rng(s), 2) for level in image for s in (1, 2)]
+    assert (pictures[0] == pictures[1][::-1]).all()
+    for level, picture, sigma in ((image[0], pictures[0], 0.3), (image[1], pictures[2], np.hypot(0.3, 2.0))):
+        assert (picture[0] - level).std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * 64 * 64))
+    other = render.expose(image[0], noise.model_copy(update={"pattern_seed": 1}), np.random.default_rng(1), 1)
+    assert (other != pictures[0][:1]).any()
+
+
+def test_mean_and_variance_at_the_end_of_the_scale():
+    """What a clipped sensor records, against 200 000 exposures at levels around it."""
+    noise = Noise(sigma=3.0, bits=8)
+    image = np.array([[128.0, 245.0, 250.0, 255.0, 258.0, 270.0]])
+    pictures = render.expose(np.repeat(image, 200, 0), noise, np.random.default_rng(3), 1000).reshape(-1, 6)
+    sigma = np.sqrt(noise.variance)
+    assert noise.mean_at(image)[0] == pytest.approx(pictures.mean(0), abs=5 * sigma / np.sqrt(len(pictures)) + 0.01)
+    assert render.variance(image, noise)[0] == pytest.approx(pictures.var(0), rel=0.05, abs=1e-3)
+    assert noise.mean_at(image)[0, 0] == 128.0

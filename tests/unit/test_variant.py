@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from scenes import InvalidInput
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch):
     monkeypatch.delenv(variant.OVERRIDE, raising=False)
+    monkeypatch.setattr(variant, "_NVIDIA", Path("/none"))
     variant.choose.cache_clear()
     yield
     variant.choose.cache_clear()
@@ -34,6 +36,14 @@ def test_library_that_aborts_the_process_means_scalar(monkeypatch):
     monkeypatch.setattr(variant, "_PROBE", "import os; os.abort()")
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/any")
     assert variant.choose() == variant.SCALAR
+
+
+@pytest.mark.parametrize(("probe", "found"), [("pass", variant.CUDA), ("import os; os.abort()", variant.SCALAR)])
+def test_cuda_is_taken_where_there_is_a_driver_and_the_trial_succeeds(monkeypatch, tmp_path, probe, found):
+    monkeypatch.setattr(variant, "_NVIDIA", tmp_path)
+    monkeypatch.setattr(variant, "_CUDA_PROBE", probe)
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/none")
+    assert variant.choose() == found
 
 
 def test_newest_library_that_works_is_taken(monkeypatch):

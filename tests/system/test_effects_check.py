@@ -1,0 +1,46 @@
+"""What was left out, switched on: reduced to one setting and few rays. ``ice effects SCENE --check`` does all of it."""
+
+import pytest
+
+import render
+import scenes
+from render.effects import Tolerance
+from scenes import Floor, Lens
+from validate.effects_check import RENDERED, Switched, check
+
+pytestmark = pytest.mark.render
+COARSE = render.Quality(supersample=2, samples=1, edge_samples=16, random_samples=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "only"),
+    [
+        ("task1", ("interreflection", "floor", "all")),
+        ("macro", ("floor", "light_size")),
+    ],
+)
+def test_left_out_effects_are_within_their_bounds(name, only):
+    scene = scenes.load(name)
+    cheap = check(scene, quality=COARSE, settings=scene.settings[:1], only=only)
+    assert [row.name for row in cheap] == list(only)
+    assert all(row.holds for row in cheap), cheap
+
+
+def test_bounds_hold_where_they_are_not_zero(task1):
+    """Distortion and a dark floor, left out by a wide tolerance: each is measurable and within its bound."""
+    wide, lens = Tolerance(1e9, 1e9), Lens(distortion=-0.05)
+    cases = {
+        "lens_distortion": task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})}),
+        "floor": task1.model_copy(update={"floor": Floor(reflectance=0.02, height=-3.0)}),
+    }
+    for name, scene in cases.items():
+        (row,) = check(scene, wide, COARSE, task1.settings[4:5], only=(name,))
+        assert row.holds, row
+        assert abs(row.bias_px) > 0.02 or abs(row.variance) > 0.01, row
+
+
+def test_a_bound_that_is_too_small_is_found(task1):
+    """Negative control: a floor whose influence is said to be nothing."""
+    row = Switched(task1.settings[0], "floor", render.effects(task1)[1].influence, 0.01, 0.0, 2e-4, 1e-3, 1.0, 1.0)
+    assert not row.holds
+    assert "floor" in RENDERED

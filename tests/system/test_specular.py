@@ -1,0 +1,169 @@
+"""The paper's reflectance inside the renderer, against `planner.reflectance` and closed forms of polarisation."""
+
+import math
+
+import numpy as np
+import pytest
+
+import render
+from planner.reflectance import fresnel, reflected
+from render import bsdf, variant
+from render.reflectance import NUMPY, brightness, indices
+from render.reflectance import fresnel as complex_fresnel
+from scenes import Material
+
+pytestmark = pytest.mark.render
+METAL = Material(specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.8, extinction=2.0, roughness=0.2)
+GLASS = Material(specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.5, roughness=0.3)
+
+
+def ray(polar, azimuth=0.0):
+    polar, azimuth = np.radians([polar, azimuth])
+    return np.array([math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)])
+
+
+def variants_here():
+    return sorted({variant.SCALAR, variant.choose()})
+
+
+@pytest.mark.parametrize("name", variants_here())
+@pytest.mark.parametrize("material", [METAL, GLASS])
+def test_bsdf_is_the_papers_reflectance(name, material):
+    """Light and sensor from normal to 80 degrees, in and out of the plane of incidence: 1e-4 of the value."""
+    mitsuba = variant.use(name)
+    import drjit as dr
+
+    surface = bsdf.Surface(material, indices(material, ()), (0.0, 0.0, 100.0), (0.0, 0.0, 100.0))
+    made, context = mitsuba.load_dict(bsdf.describe(mitsuba, surface)), mitsuba.BSDFContext()
+    hit = dr.zeros(mitsuba.SurfaceInteraction3f)
+    hit.sh_frame = mitsuba.Frame3f(mitsuba.Normal3f(0, 0, 1))
+    for t in (0, 20, 40, 60, 70, 80):
+        for u, phi in ((0, 0), (30, 180), (60, 90), (80, 180), (80, 175)):
+            light, sensor = ray(t), ray(u, phi)
+            hit.wi = mitsuba.Vector3f(*sensor.tolist())
+            ours = np.array(made.eval(context, hit, mitsuba.Vector3f(*light.tolist()), True)).ravel()[0] * math.pi
+            assert ours == pytest.approx(float(reflected(material, np.array([0, 0, 1.0]), light, sensor)), rel=1e-4)
+
+
+def test_numpy_text_is_the_planners_to_ten_digits(rng):
+    vectors = rng.normal(size=(2, 500, 3)) * [1, 1, 0.5] + [0, 0, 1.2]
+    light, sensor = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    up = (np.zeros(500), np.zeros(500), np.ones(500))
+    for material in (METAL, GLASS):
+        ours = brightness(NUMPY, material, indices(material, ()), up, tuple(light.T), tuple(sensor.T))
+        expected = reflected(material, np.broadcast_to([0, 0, 1.0], (500, 3)), light, sensor)
+        assert ours == pytest.approx(expected, rel=1e-10, abs=1e-12)
+
+
+@pytest.mark.parametrize(("n", "k"), [(1.5, 0.0), (1.1, 6.9), (1.8, 2.0)])
+def test_coherent_term_is_that_of_the_complex_amplitudes(n, k):
+    """Real part of r_parallel conj(r_perpendicular), Born and Wolf's amplitudes, and both squares."""
+    cosine = np.cos(np.radians([0.0, 20, 50, 56.3, 70, 85]))
+    index = n - 1j * k
+    inside = np.sqrt(1 - (1 - cosine**2) / index**2)
+    perpendicular = (cosine - index * inside) / (cosine + index * inside)
+    parallel = (index * cosine - inside) / (index * cosine + inside)
+    ours = complex_fresnel(NUMPY, cosine, n, k)
+    assert ours[0] == pytest.approx(np.abs(parallel) ** 2, abs=1e-12)
+    assert ours[1] == pytest.approx(np.abs(perpendicular) ** 2, abs=1e-12)
+    assert ours[2] == pytest.approx((parallel * perpendicular.conj()).real, abs=1e-12)
+    assert np.array(ours[:2]) == pytest.approx(np.array(fresnel(cosine, n, k)), abs=1e-12)
+
+
+def seen(material, light, sensor, swing=None, analyser=None):
+    up = (np.array(0.0), np.array(0.0), np.array(1.0))
+    axes = (None if axis is None else tuple(np.array(axis, float)) for axis in (swing, analyser))
+    return float(brightness(NUMPY, material, indices(material, ()), up, tuple(light), tuple(sensor), *axes))
+
+
+def test_polarisation_in_the_plane_of_incidence():
+    """Parallel light at Brewster's angle: nothing specular. J_par = J_perp = 1/2 is the mean of the two."""
+    mirror = GLASS.model_copy(update={"diffuse_reflectance": 0.0})
+    brewster = np.degrees(np.arctan(1.5))
+    light, sensor = ray(brewster), ray(brewster, 180)
+    parallel, across = np.cross([0, 1, 0], light), np.array([0, 1.0, 0])
+    values = [seen(mirror, light, sensor, swing) for swing in (parallel, across)]
+    assert abs(values[0]) < 1e-12 * values[1]
+    assert sum(values) / 2 == pytest.approx(seen(mirror, light, sensor), rel=1e-12)
+
+
+def test_two_crossed_analysers_pass_everything_together(rng):
+    light, sensor = ray(35, 20), ray(50, 170)
+    first = np.cross(sensor, [0, 0, 1.0])
+    first /= np.linalg.norm(first)
+    pair = first, np.cross(sensor, first)
+    swing = np.cross(light, rng.normal(size=3))
+    swing /= np.linalg.norm(swing)
+    for material in (METAL, GLASS):
+        for source in (None, swing):
+            both = sum(seen(material, light, sensor, source, analyser) for analyser in pair)
+            assert both == pytest.approx(seen(material, light, sensor, source), rel=1e-12)
+
+
+def test_crossed_polarisers_leave_half_of_the_diffuse_term():
+    """Face on, a mirror keeps the swing: the crossed analyser stops it, the parallel one passes all of it."""
+    up = ray(0)
+    diffuse = 0.5 * 0.6
+    mirror = seen(GLASS, up, up) - diffuse
+    assert seen(GLASS, up, up, (1, 0, 0), (0, 1, 0)) == pytest.approx(diffuse / 2, rel=1e-9)
+    assert seen(GLASS, up, up, (1, 0, 0), (1, 0, 0)) == pytest.approx(diffuse / 2 + mirror, rel=1e-9)
+
+
+def test_the_spectrum_weighs_the_indices(task1):
+    material = GLASS.model_copy(update={"index_table": ((450.0, 1.52, 0.0), (650.0, 1.48, 0.0))})
+    light = task1.light.model_copy(update={"spectrum": ((450.0, 1.0), (650.0, 3.0))})
+    index = indices(task1.model_copy(update={"material": material, "light": light}))
+    assert [i.weight for i in index] == [0.25, 0.75]
+    assert [i.n for i in index] == [1.52, 1.48]
+
+
+def test_rendered_face_has_the_formulas_intensity(task1):
+    """A pixel of the top face in glossy and in polarised light, against numpy, to 2e-3 (its rays are few)."""
+    from planner.view import direction, project
+
+    small = task1.camera.model_copy(update={"width": 16, "height": 16, "focal_px": 80.0, "blur_px": 0.1})
+    for update in ({}, {"analyser_deg": 30.0}):
+        scene = task1.model_copy(update={"material": METAL, "camera": small.model_copy(update=update)})
+        if update:
+            scene = scene.model_copy(update={"light": scene.light.model_copy(update={"polarisation_deg": 60.0})})
+        pose, lamp = np.array([40.0, 225.0]), np.array([30.0, 60.0])
+        point = np.array([6.0, 3.5, 2.5])
+        x, y = np.rint(project(point[None], pose, small)[0]).astype(int)
+        point = _behind(small, pose, np.array([x, y]), 2.5)
+        picture = render.image(scene, pose, lamp, render.Quality(3, 4, 4)) - 20
+        away = [100 * direction(angles) - point for angles in (lamp, pose)]
+        distance = np.linalg.norm(away[0])
+        light, sensor = (a / np.linalg.norm(a) for a in away)
+        axes = _axes(scene, pose, lamp, light, sensor)
+        expected = 200 * seen(METAL, light, sensor, *axes) * (100 / distance) ** 2
+        assert picture[y, x] == pytest.approx(expected, rel=2e-3)
+
+
+def _behind(camera, pose, pixel, height):
+    from planner.view import frame
+
+    axes = frame(pose)
+    u, v = (pixel - (np.array([camera.width, camera.height]) - 1) / 2) / camera.focal_px
+    direction = axes.forward + u * axes.right + v * axes.down
+    start = -camera.distance * axes.forward
+    return start + direction * (height - start[2]) / direction[2]
+
+
+def _axes(scene, pose, lamp, light, sensor):
+    from render.build import polariser_axes
+    from render.reflectance import polarised_across
+    from scenes import Pose
+
+    found = polariser_axes(scene, Pose(*pose.tolist()), Pose(*lamp.tolist()))
+    return [
+        None if a is None else polarised_across(NUMPY, tuple(a), tuple(b))
+        for a, b in zip(found, (light, sensor), strict=True)
+    ]
+
+
+def test_polarised_light_is_known_by_the_size_it_is_simulated_with(task1):
+    """A light that `all` makes 1 cm large still swings: its angle is that of the simulated sphere."""
+    from render.build import light_radius
+
+    assert light_radius(task1, frozenset({"light_size"})) == 1.0
+    assert light_radius(task1, frozenset()) == 0.0

@@ -1,0 +1,110 @@
+"""The register of effects: exact zeros, decisions, and what each looks at."""
+
+import numpy as np
+import pytest
+
+import render
+import scenes
+from render.effects import REGISTER, Tolerance, choose
+from scenes import Floor, InvalidInput, Noise, Obstacle, Pose
+from scenes.load import names
+
+SENSOR, LIGHT = Pose(30, 135), Pose(15, 315)
+NEEDED = {
+    "glossy_metal": {"specular_lobe", "saturation"},
+    "polarised": {"polarisation", "analyser", "specular_lobe"},
+    "grey_floor": {"floor", "cast_shadow", "interreflection"},
+    "macro": {"depth_of_field"},
+    "low_light": {"shot_noise", "fixed_pattern"},
+}
+
+
+def active(scene, **tolerance):
+    return choose(scene, "auto", Tolerance(**tolerance), SENSOR, LIGHT).active
+
+
+def test_register_has_every_effect_once():
+    wanted = (
+        "attached_shadow cast_shadow interreflection floor specular_lobe polarisation analyser wavelength fall_off "
+        "light_size depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern quantisation "
+        "saturation pose_jitter"
+    )
+    assert set(REGISTER) == set(wanted.split())
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_bundled_scenes_get_what_they_need_and_task1_does_not(name, task1):
+    on = {decision.effect.name for decision in render.effects(scenes.load(name)) if decision.on}
+    assert NEEDED[name] <= on
+    assert not NEEDED[name] & {d.effect.name for d in render.effects(task1) if d.on}
+
+
+@pytest.mark.parametrize("name", [name for name in names() if name != "task1_part1"])
+def test_what_cannot_matter_is_exactly_zero_and_neutral(name):
+    scene = scenes.load(name)
+    for decision in render.effects(scene):
+        if decision.reason not in ("free", "above the tolerance", "below the tolerance"):
+            assert tuple(decision.influence) == (0, 0)
+            assert not decision.on
+        assert decision.on or tuple(decision.influence) <= (0.01, 0.05)
+
+
+def test_tolerance_decides(task1):
+    scene = task1.model_copy(update={"floor": Floor(reflectance=1e-3)})
+    assert "floor" in active(scene)
+    assert not {"floor", "interreflection"} & active(scene, bias_px=0.1, variance=0.1)
+    assert choose(scene, "auto", Tolerance(0.1, 0.1), SENSOR, LIGHT).scene.floor is None
+
+
+def test_decision_is_made_for_the_setting(task1):
+    """An upright that shades a required edge from one light and not from the other."""
+    scene = task1.model_copy(update={"obstacles": (Obstacle(corner=(14, 0, 0), size=(1, 7.5, 10)),)})
+    shades = REGISTER["cast_shadow"]
+    from render.effects.base import Poses
+
+    def influence(light):
+        return shades.influence(scene, Poses(np.array([[30.0, 135.0]]), np.array([light], float)))
+
+    assert influence((40, 0)).variance == np.inf
+    assert influence((40, 180)) == (0, 0)
+
+
+def test_named_effects_and_bad_names(task1):
+    assert choose(task1, "floor,lens_blur", Tolerance()).active == {"floor", "lens_blur"}
+    assert choose(task1, ["floor"], Tolerance()).active == {"floor"}
+    assert choose(task1, "all", Tolerance()).active == set(REGISTER)
+    with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .*, got 'fog'"):
+        choose(task1, "fog", Tolerance())
+    with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
+        render.effects(task1.model_copy(update={"settings": ()}))
+
+
+def test_depth_of_field_grows_with_the_aperture(task1):
+    def influence(radius):
+        lens = task1.camera.lens.model_copy(update={"aperture_radius": radius})
+        scene = task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})})
+        return next(d.influence for d in render.effects(scene) if d.effect.name == "depth_of_field")
+
+    assert influence(0.2).variance / influence(0.1).variance == pytest.approx(4, rel=0.05)
+
+
+def test_shaken_poses_scatter_as_said(task1, rng):
+    scene = task1.model_copy(update={"jitter": task1.jitter.model_copy(update={"sensor_deg": 0.1})})
+    poses = np.array([list(render.shaken(scene, "sensor", SENSOR, rng)) for _ in range(2000)])
+    along = (poses - [30, 135]) * [1, np.sin(np.radians(30))]
+    assert along.std(0) == pytest.approx(0.1, rel=4 / np.sqrt(2 * 2000))
+    assert render.shaken(scene, "light", LIGHT, rng) == LIGHT
+
+
+def test_noise_that_needs_darkness_names_it(tmp_path):
+    text = (scenes.load.__globals__["BUNDLED"] / "low_light.toml").read_text()
+    path = tmp_path / "bad.toml"
+    path.write_text(text.replace("dark_level = 20.0", "dark_level = 3.0"))
+    with pytest.raises(InvalidInput, match=r"noise.dark_level must be camera.black_level \(20\) where"):
+        scenes.load(path)
+
+
+def test_saturation_only_where_levels_reach_the_end(task1):
+    assert "saturation" not in active(task1)
+    bright = task1.model_copy(update={"noise": Noise(sigma=2.4, bits=7)})
+    assert "saturation" in active(bright)
