@@ -74,8 +74,11 @@ def _frame(layout: Layout, i: int, clear: float, margin: float) -> EdgeFrame:
     if not layout.visible[i] or not length > 0:
         return EdgeFrame(layout.names[i], np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0), status.NOT_VISIBLE)
     along = (stop - start) / length
-    first = trim(along, layout.beside[i][0], clear)
-    last = length - trim(-along, layout.beside[i][1], clear)
+    shown = length * layout.shown[i]
+    first = max(trim(along, layout.beside[i][0], clear), shown[0] + clear if shown[0] > 0 else 0.0)
+    last = length - max(
+        trim(-along, layout.beside[i][1], clear), length - shown[1] + clear if shown[1] < length else 0.0
+    )
     stations = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
     places = start + stations[:, None] * along
     size = np.array(layout.optics.shape[::-1])

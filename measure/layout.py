@@ -11,7 +11,7 @@ from skimage.draw import polygon2mask
 from measure.shading import Shading, face_shadings
 from planner.outline import outline
 from planner.view import depth, direction, facing, project
-from scenes import Pose, Scene
+from scenes import Corner, InvalidInput, Pose, Scene
 
 BACKGROUND = -1
 
@@ -49,6 +49,8 @@ class Layout:
     ends : ndarray, shape (E, 2, 2)
         End points (x, y) of each edge, px; NaN where it is not in front of the sensor.
     visible : ndarray of bool, shape (E,)
+    shown : ndarray, shape (E, 2)
+        The piece of each edge that nothing hides, as fractions (from, to) of its length.
     corners : tuple of (int, int)
         Pairs of edges whose lines are intersected.
     joints : tuple of ((int, int), (int, int))
@@ -71,6 +73,7 @@ class Layout:
     names: tuple[str, ...]
     ends: np.ndarray
     visible: np.ndarray
+    shown: np.ndarray
     corners: tuple[tuple[int, int], ...]
     joints: tuple[tuple[tuple[int, int], tuple[int, int]], ...]
     beside: tuple[tuple[np.ndarray, np.ndarray], ...]
@@ -166,8 +169,15 @@ def optics_of(scene: Scene) -> Optics:
 def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
     """The task's edges as a sensor pose projects them.
 
+    Raises
+    ------
+    InvalidInput
+        If the task is not the distance between two corners.
+
     With the light known, the shading of each face is known too, and a face that is not lit is background.
     """
+    if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
+        raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
     solid, pose = scene.solid, np.array(list(sensor))
     view = outline(scene, pose)
     points = project(solid.vertices, pose, scene.camera)
@@ -187,6 +197,7 @@ def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
         names=view.names,
         ends=ends,
         visible=view.visible & np.isfinite(ends).all((1, 2)),
+        shown=view.shown,
         corners=tuple((2 * k, 2 * k + 1) for k in range(2)),
         joints=_joints([edge.ends for edge in required]),
         beside=tuple(tuple(_away(points, edge, end, shown) for end in (0, 1)) for edge in required),
@@ -215,6 +226,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         names=tuple(f"s{i + 1}" for i in range(count)),
         ends=ends,
         visible=np.ones(count, bool),
+        shown=np.tile([0.0, 1.0], (count, 1)),
         corners=tuple(((i - 1) % count, i) for i in range(count)),
         joints=_joints(indices),
         beside=tuple((-unit[[(i - 1) % count]], unit[[(i + 1) % count]]) for i in range(count)),

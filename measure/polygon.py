@@ -73,7 +73,12 @@ def inner_face(layout: Layout) -> tuple[int, np.ndarray] | None:
     None if there is no such face, the edges do not close around it, or it is not convex.
     """
     common = set.intersection(*(set(pair) for pair in layout.sides.tolist())) - {BACKGROUND}
-    if not common or not layout.visible.all() or len(layout.joints) != len(layout.names):
+    if (
+        not common
+        or not layout.visible.all()
+        or (layout.shown != [0, 1]).any()
+        or len(layout.joints) != len(layout.names)
+    ):
         return None
     inner = common.pop()
     sign = np.where(layout.sides[:, 0] == inner, 1.0, -1.0)

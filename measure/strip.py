@@ -66,7 +66,8 @@ def _strip(layout: Layout, frame: EdgeFrame, index: int, clear: float) -> tuple[
     points = np.stack([x, y], 1).astype(float)
     along, across = frame.coordinates(points)
     keep = (np.abs(across) <= HALF_WIDTH) & (along >= frame.stations[0] - 0.5) & (along <= frame.stations[-1] + 0.5)
-    task = np.delete(layout.ends[layout.visible], layout.visible[:index].sum(), 0)
+    # an edge may be required twice, once for each of its corners
+    task = [ends for ends in layout.ends[layout.visible] if not np.array_equal(ends, layout.ends[index])]
     apart = {segment.tobytes() for segment in layout.apart[index]}
     for segment in (*task, *layout.others):
         away = distance_to_segment(points[keep], *segment)

@@ -53,6 +53,9 @@ class Mesh(Model):
     file: Path
     names: dict[str, tuple[float, float, float]] = {}
 
+    def __hash__(self) -> int:
+        return hash((self.file, tuple(sorted(self.names.items()))))
+
     @field_validator("file")
     @classmethod
     def _beside_the_scene(cls, file: Path, info: ValidationInfo) -> Path:

@@ -131,7 +131,7 @@ def _square(degrees: float, ratio: float, scene: Scene) -> tuple[np.ndarray, Lay
 
 
 def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] | None:
-    """Pooled variance of edge points about each image's mean place, and the correlation length from a line's variance."""
+    """Pooled variance of edge points, and the correlation length that the variance of their mean tells."""
     tool = estimator(layout, name, 0.15)
     variances, lengths = [], []
     for part in tool.parts:

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.locator import edge_blur
-from planner.outline import outline
+from planner.outline import outline, straight
 from planner.view import direction, edge_points, facing, project
 from render.build import polariser_axes
 from render.effects.base import Influence, Poses, largest
 from render.reflectance import NUMPY, brightness, indices, polarised_across
-from scenes import Pose, Scene
+from scenes import Corner, Pose, Scene
 
 NEAR_STEP = float(np.exp(-0.5))
 _FRACTIONS = np.linspace(0.03, 0.97, 24)
@@ -50,7 +50,7 @@ class Sides(NamedTuple):
 
 def sides(scene: Scene, poses: Poses, *, fall_off: bool = True) -> Sides:
     """Levels and slopes of a scene's required edges, unshadowed, before a black background."""
-    solid, names = scene.solid, scene.task.edges
+    solid, names = scene.solid, straight(scene)
     points = edge_points(solid, names, _FRACTIONS)
     faces = np.array([solid.edge(name).faces for name in names])
     inner = points[:, None] + _inward(scene, faces)[:, :, None]
@@ -115,8 +115,10 @@ def lever(scene: Scene, poses: Poses) -> np.ndarray:
     """|d distance / d offset| of each required edge when all its points may move by up to 1 px, shape (S, E).
 
     Twice the response to a shift of the whole edge: extrapolating a fitted line from the points to its end at most
-    doubles what moves them.
+    doubles what moves them. For anything but a distance between two corners the plain bound 2.
     """
+    if not all(isinstance(feature, Corner) for feature in scene.task.corners) or scene.task.kind != "distance":
+        return np.full((len(poses.sensors), len(straight(scene))), 2.0)
     view = outline(scene, poses.sensors)
     along = view.ends[..., 1, :] - view.ends[..., 0, :]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
@@ -127,7 +129,9 @@ def lever(scene: Scene, poses: Poses) -> np.ndarray:
     )
     unit = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
     with np.errstate(all="ignore"):
-        found = [np.abs(np.einsum("si,sij->sj", unit, np.linalg.pinv(normals[:, k : k + 2]))) for k in (0, 2)]
+        found = [
+            np.abs(np.einsum("si,sij->sj", unit, np.linalg.pinv(np.nan_to_num(normals[:, k : k + 2])))) for k in (0, 2)
+        ]
     return 2 * np.concatenate(found, -1)
 
 
@@ -141,7 +145,7 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
     """Small steps (cm) from each edge into its two faces, shape (E, 2, 3)."""
     solid = scene.solid
     steps = []
-    for name, pair in zip(scene.task.edges, faces, strict=True):
+    for name, pair in zip(straight(scene), faces, strict=True):
         ends = solid.vertices[list(solid.edge(name).ends)]
         along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
         for face in pair:

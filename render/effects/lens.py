@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.locator import edge_blur
+from planner.outline import straight
 from planner.view import depth, edge_points, project
 from render.effects.base import EVERYTHING, Effect, Influence, Poses, changed, largest
 from render.effects.edges import lever, sides
@@ -41,7 +42,7 @@ class LensDistortion(Effect):
 
     def influence(self, scene: Scene, poses: Poses) -> Influence:
         """How far the required edges' points move, and how much the image is stretched there."""
-        points = edge_points(scene.solid, scene.task.edges, np.linspace(0, 1, 33))
+        points = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 33))
         moved = []
         for sensor in poses.sensors:
             image = project(points.reshape(-1, 3), sensor, scene.camera)
@@ -77,7 +78,7 @@ class DepthOfField(Effect):
         The edge moves by shading, and by up to r^2 / 4 of a pixel where the blur changes along it.
         """
         camera, lens = scene.camera, scene.camera.lens
-        ends = edge_points(scene.solid, scene.task.edges, np.linspace(0, 1, 9)).reshape(-1, 3)
+        ends = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
         z = depth(ends, poses.sensors, camera)
         if (z <= 0).any():
             return EVERYTHING

@@ -5,8 +5,8 @@ import pytest
 
 import measure
 import render
-from measure.distance import prepare
-from measure.lines import fit_lines
+from measure.layout import layout_of
+from measure.shape import prepared
 from planner.view import direction, frame, project
 from render.image import window
 from scenes import InvalidInput, Pose
@@ -83,8 +83,10 @@ def test_lines_lie_where_the_exact_shaded_image_has_them(task1, sensor, light):
 
 
 def _line_offsets(scene, sensor, image):
-    frames = prepare(scene, Pose(*sensor), "gradient", None)
-    return np.array([fit_lines(locator.locate(image[None])).mean_offset[0] for _, locator in frames])
+    """Offset of each fitted line at the middle of its edge, px."""
+    tool = prepared(layout_of(scene, Pose(*sensor)), "gradient", 12.0)
+    found = tool.estimate(image[None])
+    return (found.level + found.slope * [frame.length / 2 for frame in tool.frames])[0]
 
 
 def test_same_seed_is_bit_identical(task1):
