@@ -184,7 +184,7 @@ def _peak(gx, gy, which, y, x):
     magnitude = np.hypot(gx, gy)
     low = _bilinear(magnitude, which, x - gx0 / m0, y - gy0 / m0)
     high = _bilinear(magnitude, which, x + gx0 / m0, y + gy0 / m0)
-    bend = np.minimum(low - 2 * m0 + high, -np.finfo(float).tiny)
+    bend = np.minimum(low - 2 * m0 + high, -1e-6 * np.maximum(m0, 1e-30))  # flat: no peak, and no overflow
     shift = (low - high) / (2 * bend)
     return shift, (0.5 - shift) / bend, 2 * shift / bend, (-0.5 - shift) / bend, gx0, gy0, m0
 

@@ -16,13 +16,15 @@ from measure.coverage import NODE_WEIGHTS, NODES, half_plane
 from measure.estimators import ESTIMATORS, estimator
 from measure.layout import Layout, Optics, polygon_layout
 from measure.shape import find_shape
-from planner.locator import edge_blur, information_bound, kappa2
+from planner.locator import information_bound, kappa2
 from planner.prices import PAPER_KAPPA2
 from scenes import Scene
 
 RATIOS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 ANGLES = (0.0, 11.0, 22.5, 37.0)
 _SIDE, _SIZE = 60.0, 96  # px: of the square, and of the image
+_CONTRAST = 100.0  # grey levels; only noise over contrast matters
+_SMALL = 0.1  # noise over contrast up to which the law is fitted
 _LINEAR = 0.15  # relative departure of a variance from kappa^2 (s_n / C)^2 at which linearity has ended
 
 
@@ -38,8 +40,10 @@ class Curve:
     sigma_px : ndarray
         Standard deviation of an edge point across the edge (for likelihood estimators: of the line's offset, times the
         root of the edge's length over the correlation length of `gradient`), px; NaN where nothing was found.
+    floor_px : float
+        What is left without noise: the error of the points' places within a pixel, px.
     kappa2 : float
-        Fitted over the linear range.
+        Fitted together with it over the smaller ratios.
     correlation_px : float
         Integral of the correlation along the edge, px.
     linear_to : float
@@ -51,6 +55,7 @@ class Curve:
     name: str
     ratios: np.ndarray
     sigma_px: np.ndarray
+    floor_px: float
     kappa2: float
     correlation_px: float
     linear_to: float
@@ -104,7 +109,7 @@ def _variance(name: str, ratio: float, scene: Scene, images: int, rng) -> tuple[
     points, lengths = [], []
     for degrees in ANGLES:
         clean, layout = _square(degrees, ratio, scene)
-        noisy = clean + ratio * rng.standard_normal((images, *clean.shape))
+        noisy = clean + _CONTRAST * ratio * rng.standard_normal((images, *clean.shape))
         found = _points(noisy, layout, name) if name in ("canny", "gradient") else _lines(noisy, layout, name)
         if found is not None:
             points.append(found[0])
@@ -115,11 +120,13 @@ def _variance(name: str, ratio: float, scene: Scene, images: int, rng) -> tuple[
 
 
 def _square(degrees: float, ratio: float, scene: Scene) -> tuple[np.ndarray, Layout]:
-    """Unit contrast image of a turned square far larger than the blur, and its layout."""
+    """Image of a turned square far larger than the blur, and its layout."""
     a = np.radians(degrees)
     turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * _SIDE / 2 @ turn.T + _SIZE / 2 + np.array([0.3, 0.7])
-    optics = Optics((_SIZE, _SIZE), scene.camera.blur_px, ratio**2, scene.locator.scale_px, scene.locator.window_px)
+    optics = Optics(
+        (_SIZE, _SIZE), scene.camera.blur_px, (_CONTRAST * ratio) ** 2, scene.locator.scale_px, scene.locator.window_px
+    )
     y, x = np.mgrid[:_SIZE, :_SIZE]
     nodes = np.stack([x, y], -1)[..., None, :] + NODES
     covered = np.ones((_SIZE, _SIZE, len(NODES)))
@@ -127,24 +134,25 @@ def _square(degrees: float, ratio: float, scene: Scene) -> tuple[np.ndarray, Lay
         along = (stop - start) / _SIDE
         inward = np.array([-along[1], along[0]])
         covered = covered * half_plane((nodes - start) @ inward / max(scene.camera.blur_px, 0.3))
-    return (covered * NODE_WEIGHTS).sum(-1), polygon_layout(corners, optics)
+    return _CONTRAST * (covered * NODE_WEIGHTS).sum(-1), polygon_layout(corners, optics)
 
 
 def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] | None:
     """Pooled variance of edge points, and the correlation length that the variance of their mean tells."""
-    tool = estimator(layout, name, 0.15)
+    tool = estimator(layout, name, 0.15 * _CONTRAST)
     variances, lengths = [], []
     for part in tool.parts:
         found = part.locator.locate(noisy)
-        if found.valid.mean() < 0.98:
+        span = part.frame.stations[-1] - part.frame.stations[0]
+        if found.valid.sum(1).mean() < 0.98 * (part.frame.stations.size if name == "gradient" else span / np.sqrt(2)):
             return None
         weight = found.valid / found.valid.sum(1, keepdims=True)
         mean = (weight * found.offset).sum(1)
-        span = part.frame.stations[-1] - part.frame.stations[0]
         centre = (found.offset * found.valid).sum() / found.valid.sum()
         each = ((found.offset - centre) ** 2 * found.valid).sum() / found.valid.sum()
         variances.append(each)
-        lengths.append(mean.var(ddof=1) * span / each)
+        spacing = span / max(found.valid.sum(1).mean() - 1, 1)
+        lengths.append(mean.var(ddof=1) * (span + spacing) / each)
     return float(np.mean(variances)), float(np.mean(lengths))
 
 
@@ -161,15 +169,30 @@ def _lines(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] 
 
 
 def _curve(name: str, found: np.ndarray, scene: Scene, bound: float) -> Curve:
-    """Fit kappa^2 to the small ratios, then see how far it holds."""
+    """Fit variance = floor^2 + kappa^2 (s_n / C)^2 to the smaller ratios, then see how far it holds."""
     ratios, variance, length = np.array(RATIOS), found[:, 0], found[:, 1]
-    small = (ratios <= 0.025) & np.isfinite(variance)
-    fitted = float(np.mean(variance[small] / ratios[small] ** 2)) if small.any() else float("nan")
-    correlation = float(np.mean(length[small])) if small.any() else float("nan")
-    holds = np.abs(variance / (fitted * ratios**2) - 1) < _LINEAR
-    ends = np.flatnonzero(~holds)
-    linear_to = float(ratios[ends[0] - 1] if ends.size and ends[0] else ratios[-1] if not ends.size else np.nan)
-    return Curve(name, ratios, np.sqrt(variance), fitted, correlation, linear_to, bound / (fitted * correlation))
+    small = (ratios <= _SMALL) & np.isfinite(variance)
+    if small.sum() < 3:
+        return Curve(name, ratios, np.sqrt(variance), *[float("nan")] * 5)
+    design = np.stack([np.ones(small.sum()), ratios[small] ** 2], 1)
+    weight = 1 / variance[small]  # sampling errors are a constant part of a variance
+    floor, fitted = np.linalg.lstsq(design * weight[:, None], variance[small] * weight, rcond=None)[0]
+    quiet = small & (fitted * ratios**2 > 4 * floor)
+    correlation = float(np.mean(length[quiet if quiet.any() else small]))
+    holds = np.abs(variance / (floor + fitted * ratios**2) - 1) < _LINEAR
+    ends = np.flatnonzero(~holds & (ratios > ratios[small][0]))
+    linear_to = float(ratios[ends[0] - 1]) if ends.size else float(ratios[-1])
+    efficiency = bound / (fitted * correlation)
+    return Curve(
+        name,
+        ratios,
+        np.sqrt(variance),
+        float(np.sqrt(max(floor, 0))),
+        float(fitted),
+        correlation,
+        linear_to,
+        efficiency,
+    )
 
 
 def blur_for(kappa2_wanted: float, scale: float) -> float:
@@ -177,8 +200,3 @@ def blur_for(kappa2_wanted: float, scale: float) -> float:
     ratio = (8 * kappa2_wanted / 3) ** (1 / 3) - 1
     edge = scale * np.sqrt(max(ratio, 0.0))
     return float(np.sqrt(max(edge**2 - 1 / 12, 0.0)))
-
-
-def total_blur(blur_px: float) -> float:
-    """Edge blur with the pixel's box, px."""
-    return edge_blur(blur_px)

@@ -94,3 +94,16 @@ def test_bad_scene_value_names_file_and_key(tmp_path):
     done = ice("validate", path)
     assert done.returncode == 2
     assert done.stderr == f"{path}: noise.sigma must be at least 0, got -2.4\n"
+
+
+def test_calibrate_agrees_with_the_closed_form(tmp_path):
+    """kappa^2 of `gradient` within 10 % of the closed form; polygon within 12 % of the bound; a picture is written."""
+    done = ice("calibrate", "task1", "--images", "40", "-o", tmp_path / "c.png", "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    curves = {curve["name"]: curve for curve in document["curves"]}
+    assert curves["gradient"]["kappa2"] == pytest.approx(document["closed_kappa2"], rel=0.1)
+    assert curves["gradient"]["correlation_px"] == pytest.approx(document["closed_correlation_px"], rel=0.15)
+    assert 0.85 < curves["polygon"]["efficiency"] < 1.1
+    assert curves["canny"]["efficiency"] < curves["polygon"]["efficiency"]
+    assert (tmp_path / "c.png").stat().st_size > 10000
