@@ -11,12 +11,16 @@ from planner.locator import correlation
 
 
 class Lines(NamedTuple):
-    """Lines offset = mean_offset + tan(tilt) (along - mean_along); all arrays of shape (n,)."""
+    """Lines offset = mean_offset + tan(tilt) (along - mean_along); all arrays of shape (n,).
+
+    ``scatter`` is the root mean square distance of the points from their line, px.
+    """
 
     mean_along: np.ndarray
     mean_offset: np.ndarray
     tilt: np.ndarray
     count: np.ndarray
+    scatter: np.ndarray
 
 
 def fit_lines(points: EdgePoints) -> Lines:
@@ -32,7 +36,8 @@ def fit_lines(points: EdgePoints) -> Lines:
         e = (points.offset - mean_offset[:, None]) * points.valid
         ss, ee, se = (s * s).sum(1), (e * e).sum(1), (s * e).sum(1)
         tilt = np.where(ss > 0, np.arctan2(2 * se, ss - ee) / 2, np.nan)
-    return Lines(mean_along, mean_offset, tilt, count)
+        scatter = np.sqrt((((e - np.tan(tilt)[:, None] * s) * np.cos(tilt)[:, None]) ** 2).sum(1) / count)
+    return Lines(mean_along, mean_offset, tilt, count, scatter)
 
 
 def regression(along: np.ndarray) -> np.ndarray:
