@@ -116,7 +116,7 @@ def within_image(scene: Scene, ends: np.ndarray) -> np.ndarray:
     margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
     size = np.array([scene.camera.width, scene.camera.height])
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         low, high = (margin - start) / along, (size - 1 - margin - start) / along
     inside = (start >= margin) & (start <= size - 1 - margin)
     still = along == 0
@@ -161,7 +161,7 @@ def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np
         aside = corners[other.ends[1 - other.ends.index(here)]] - corners[here]
         cosine = np.einsum("...i,...i->...", along, aside)
         sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
         trim = np.where(seen[..., list(other.faces)].any(-1), np.fmax(trim, needed), trim)
     return trim
