@@ -15,6 +15,8 @@ from measure.points import EdgePoints
 from planner.locator import edge_blur, kappa2
 
 _FIXED_POINT = 64  # Canny takes gradients as 16-bit integers: 1/64 grey level a pixel
+_LARGEST = 32767
+_SINGLE = 2.0**16  # grey levels that single precision resolves to 1/256; darkness is brought below
 _TRUNCATE = 4
 
 
@@ -147,7 +149,9 @@ class CannyLocator:
 
     def gradient(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaussian derivatives along x and y of the part that matters, grey levels a pixel."""
-        part = np.ascontiguousarray(image[self.rows, self.columns], dtype=np.float32)
+        part = image[self.rows, self.columns]
+        base = _SINGLE * np.rint(part.min() / _SINGLE)  # 0 for 8 and 16 bit images
+        part = np.ascontiguousarray(part - base, dtype=np.float32)
         border = cv2.BORDER_REPLICATE
         return (
             cv2.sepFilter2D(part, cv2.CV_32F, self.derive, self.smooth, borderType=border),
@@ -156,8 +160,10 @@ class CannyLocator:
 
     def edge_pixels(self, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
         """Pixels near the edge that Canny keeps: gradient above the threshold and largest along its direction."""
-        fixed = [np.clip(np.rint(g * _FIXED_POINT), -32767, 32767).astype(np.int16) for g in (gx, gy)]
-        limit = self.threshold * _FIXED_POINT
+        steepest = max(float(np.abs(gx).max()), float(np.abs(gy).max()), 1.0)
+        unit = min(_FIXED_POINT, _LARGEST / steepest)  # coarser in a picture so bright that the integers would saturate
+        fixed = [np.rint(g * unit).astype(np.int16) for g in (gx, gy)]
+        limit = self.threshold * unit
         return (cv2.Canny(fixed[0], fixed[1], limit, limit, L2gradient=True) > 0) & self.near
 
     def _filter_matrix(self, shape: tuple[int, int], along_x: np.ndarray, along_y: np.ndarray) -> sparse.csr_array:
@@ -184,7 +190,7 @@ def _peak(gx, gy, which, y, x):
     magnitude = np.hypot(gx, gy)
     low = _bilinear(magnitude, which, x - gx0 / m0, y - gy0 / m0)
     high = _bilinear(magnitude, which, x + gx0 / m0, y + gy0 / m0)
-    bend = np.minimum(low - 2 * m0 + high, -1e-6 * np.maximum(m0, 1e-30))  # flat: no peak, and no overflow
+    bend = np.minimum(low - 2 * m0 + high, -1e-9 * np.maximum(m0, 1e-30))  # flat: no peak, and no overflow
     shift = (low - high) / (2 * bend)
     return shift, (0.5 - shift) / bend, 2 * shift / bend, (-0.5 - shift) / bend, gx0, gy0, m0
 

@@ -24,6 +24,7 @@ ESTIMATORS = ("canny", "gradient", "strip", "polygon")
 CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
 _MIN_FOUND = 0.5  # part of an edge's stations at which a point must be found
+_MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
 def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
@@ -112,7 +113,8 @@ class PointEstimator:
         slope = np.tan(lines.tilt)
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.frame.stations.size, 3)
         clear = points.contrast > MIN_CONTRAST * np.sqrt(self.noise_variance)
-        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(enough & clear, status.OK, status.LOW_CONTRAST))
+        edge = enough & clear & (lines.scatter < _MAX_SCATTER)
+        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
         columns = (
             lines.mean_offset - slope * lines.mean_along,
             slope,

@@ -11,12 +11,16 @@ from planner.locator import correlation
 
 
 class Lines(NamedTuple):
-    """Lines offset = mean_offset + tan(tilt) (along - mean_along); all arrays of shape (n,)."""
+    """Lines offset = mean_offset + tan(tilt) (along - mean_along); all arrays of shape (n,).
+
+    ``scatter`` is the root mean square distance of the points from their line, px.
+    """
 
     mean_along: np.ndarray
     mean_offset: np.ndarray
     tilt: np.ndarray
     count: np.ndarray
+    scatter: np.ndarray
 
 
 def fit_lines(points: EdgePoints, weights: np.ndarray | float = 1.0) -> Lines:
@@ -33,7 +37,8 @@ def fit_lines(points: EdgePoints, weights: np.ndarray | float = 1.0) -> Lines:
         e = points.offset - mean_offset[:, None]
         ss, ee, se = ((weight * product).sum(1) for product in (s * s, e * e, s * e))
         tilt = np.where(ss > 0, np.arctan2(2 * se, ss - ee) / 2, np.nan)
-    return Lines(mean_along, mean_offset, tilt, count)
+        scatter = np.sqrt((((e - np.tan(tilt)[:, None] * s) * np.cos(tilt)[:, None]) ** 2).sum(1) / count)
+    return Lines(mean_along, mean_offset, tilt, count, scatter)
 
 
 def regression(along: np.ndarray, weights: np.ndarray | float = 1.0) -> np.ndarray:

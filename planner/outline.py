@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.locator import reach
-from planner.view import depth, direction, facing, project
+from planner.view import depth, direction, facing, from_axis, image_centre
 from planner.visibility import longest_span, turned
 from scenes import Edge, Scene
 
@@ -27,6 +27,8 @@ class Outline:
         Edge names, as `Task.edges`.
     ends : ndarray, shape (..., E, 2, 2)
         The two end points (x, y), px.
+    along : ndarray, shape (..., E, 2)
+        From the first end to the last, px; exact too where it is small against the image.
     trims : ndarray, shape (..., E, 2)
         Length to leave out at each end, px: what is hidden, and what a neighbouring edge disturbs.
     framed : ndarray, shape (..., E, 2)
@@ -40,6 +42,7 @@ class Outline:
 
     names: tuple[str, ...]
     ends: np.ndarray
+    along: np.ndarray
     trims: np.ndarray
     framed: np.ndarray
     shown: np.ndarray
@@ -48,7 +51,7 @@ class Outline:
     @property
     def lengths(self) -> np.ndarray:
         """Length of each edge's image, px, shape (..., E)."""
-        return np.linalg.norm(self.ends[..., 1, :] - self.ends[..., 0, :], axis=-1)
+        return np.linalg.norm(self.along, axis=-1)
 
     @property
     def usable(self) -> np.ndarray:
@@ -78,16 +81,20 @@ def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = N
     seen = facing(solid, positions)
     edges = [solid.edge(name) for name in names]
     needed, clear = _near(solid.edges, edges), reach(scene.locator.scale_px, scene.camera.blur_px)
-    corners = dict(zip(needed, np.moveaxis(project(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True))
+    corners = dict(
+        zip(needed, np.moveaxis(from_axis(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True)
+    )
     trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
     trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
     shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
-    lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    along = ends[..., 1, :] - ends[..., 0, :]
+    lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
     if not solid.is_convex:
         trims = cut(trims, shown, lengths, clear)
     return Outline(
         names=names,
         ends=ends,
+        along=along,
         trims=trims,
         framed=cut(trims, within_image(scene, ends), lengths, 0.0),
         shown=shown,
@@ -109,7 +116,7 @@ def within_image(scene: Scene, ends: np.ndarray) -> np.ndarray:
     margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
     size = np.array([scene.camera.width, scene.camera.height])
     start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         low, high = (margin - start) / along, (size - 1 - margin - start) / along
     inside = (start >= margin) & (start <= size - 1 - margin)
     still = along == 0
@@ -154,7 +161,7 @@ def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np
         aside = corners[other.ends[1 - other.ends.index(here)]] - corners[here]
         cosine = np.einsum("...i,...i->...", along, aside)
         sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
         trim = np.where(seen[..., list(other.faces)].any(-1), np.fmax(trim, needed), trim)
     return trim

@@ -219,9 +219,9 @@ def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
 def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step: float) -> str:
     if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
         return "not_visible"
-    if not step > MIN_CONTRAST * np.sqrt(scene.noise.variance):
-        return "low_contrast"
-    return "short" if usable < MIN_USABLE else "ok"
+    if usable < MIN_USABLE:  # first, for where nothing is left there is no contrast either
+        return "short"
+    return "ok" if step > MIN_CONTRAST * np.sqrt(scene.noise.variance) else "low_contrast"
 
 
 def _status(scene: Scene, priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:

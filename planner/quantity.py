@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.outline import Outline, outline
-from planner.view import depth, frame, project
+from planner.view import depth, frame, from_axis, image_centre, project
 from scenes import Centre, Corner, Edge, Scene, Task
 
 
@@ -94,8 +94,9 @@ def jacobian(points: np.ndarray, poses: np.ndarray, camera) -> np.ndarray:
 def _distance(scene: Scene, sensors: np.ndarray, view: Outline) -> Quantity:
     solid = scene.solid
     places = np.array([_place(scene, feature) for feature in scene.task.corners])
-    points = project(places, sensors, scene.camera)
+    points = from_axis(places, sensors, scene.camera)
     across = points[..., 1, :] - points[..., 0, :]
+    points = points + image_centre(scene.camera)
     value = np.linalg.norm(across, axis=-1)
     pull = across / value[..., None]
     offset = np.zeros((*value.shape, len(view.names)))
@@ -121,7 +122,7 @@ def _add_corner(gradient, view: Outline, edges: list[Edge], feature: Corner, sol
 
 def normals(view: Outline) -> np.ndarray:
     """Unit normal of each edge's image, (-t_y, t_x) of its direction t, shape (..., E, 2)."""
-    along = (view.ends[..., 1, :] - view.ends[..., 0, :]) / np.where(view.lengths > 0, view.lengths, np.nan)[..., None]
+    along = view.along / np.where(view.lengths > 0, view.lengths, np.nan)[..., None]
     return np.stack([-along[..., 1], along[..., 0]], -1)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 
 from scenes import Camera, Solid
 
+_EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
+
 
 class Frame(NamedTuple):
     """Axes of a sensor that looks at the origin: unit vectors, shape (..., 3)."""
@@ -54,11 +56,20 @@ def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray
     ndarray, shape (..., n, 2)
         Image coordinates, px; NaN for points that are not in front of the sensor.
     """
+    return image_centre(camera) + from_axis(points, poses, camera)
+
+
+def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """The same from the image's middle, px: what is small against the image keeps its digits in differences."""
     axes = frame(poses)
     beside = points @ np.stack([axes.right, axes.down], -1)
     away = depth(points, poses, camera)[..., None]
-    centre = np.array([camera.width - 1, camera.height - 1]) / 2
-    return centre + camera.focal_px * beside / np.where(away > 0, away, np.nan)
+    return camera.focal_px * beside / np.where(away > 0, away, np.nan)
+
+
+def image_centre(camera: Camera) -> np.ndarray:
+    """Image of the origin (x, y), px."""
+    return np.array([camera.width - 1, camera.height - 1]) / 2
 
 
 def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
@@ -68,7 +79,16 @@ def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
 
 def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:
     """Which faces turn towards a position (cm, shape (..., 3)); bool, shape (..., F)."""
-    return positions @ solid.normals.T > solid.offsets
+    return above(positions, solid.normals, solid.offsets)
+
+
+def above(positions: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Which planes (F, 3), (F,) positions (..., 3) stand over; bool, shape (..., F).
+
+    A plane seen edge-on is not seen: cos(270 degrees) is -2e-16 in floating point, cos(-90 degrees) +6e-17, and a
+    face must not come and go with the way in which an angle is written.
+    """
+    return positions @ normals.T - offsets > _EDGE_ON * np.linalg.norm(positions, axis=-1, keepdims=True)
 
 
 def edge_points(solid: Solid, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:

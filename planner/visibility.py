@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.view import above
 from scenes import Edge, Solid
 
 _BEFORE = 1e-9  # a triangle that touches the edge does not hide it
@@ -79,7 +80,7 @@ def turned(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     At an inner edge each face hides the other unless both are turned towards the position.
     """
     faces = list(edge.faces)
-    towards = positions @ solid.normals[faces].T > solid.offsets[faces]
+    towards = above(positions, solid.normals[faces], solid.offsets[faces])
     return towards if edge.convex else towards & towards.all(-1, keepdims=True)
 
 

@@ -1,58 +1,15 @@
-"""Images made without the renderer: a convex polygon, exactly blurred and exactly averaged over square pixels."""
-
-from itertools import pairwise
+"""Images made without the renderer: convex polygons, exactly blurred and exactly averaged over square pixels."""
 
 import numpy as np
 from scipy.special import ndtr
 
 from planner.reflectance import reflected
 from planner.view import direction, facing, frame, project
+from validate.hard.polygon import _scan_lines, _spans, polygon_image
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+__all__ = ["block_image", "polygon_image", "shaded_image"]
+
 _FEW, _FEW_WEIGHTS = np.polynomial.legendre.leggauss(4)
-
-
-def polygon_image(corners, shape, blur, contrast=100.0, background=0.0):
-    """Grey levels (height, width) of a uniform convex polygon, corners (k, 2) in px, under a Gaussian blur.
-
-    Along x everything is in closed form: the blurred span of a scan line averaged over a pixel is a difference of
-    integrals of the normal distribution. Along y Gauss-Legendre quadrature on panels of at most half a pixel that end
-    at the vertices: the integrand is smooth between them, so the error is below 1e-9 of the contrast.
-    """
-    height, width = shape
-    corners = np.asarray(corners, float)
-    lines, weights = _scan_lines(np.unique(corners[:, 1]))
-    left, right = _spans(corners, lines)
-    x = np.arange(width)
-    span = _ramp((x + 0.5 - left[:, None]) / blur) - _ramp((x - 0.5 - left[:, None]) / blur)
-    span -= _ramp((x + 0.5 - right[:, None]) / blur) - _ramp((x - 0.5 - right[:, None]) / blur)
-    away = lines - np.arange(height)[:, None]
-    weight = (ndtr((away + 0.5) / blur) - ndtr((away - 0.5) / blur)) * weights
-    return background + contrast * blur * weight @ span
-
-
-def _scan_lines(breaks):
-    """Quadrature nodes and weights on the intervals between the breaks."""
-    edges = np.concatenate([np.linspace(a, b, int(np.ceil(2 * (b - a))) + 1)[:-1] for a, b in pairwise(breaks)])
-    edges = np.append(edges, breaks[-1])
-    half = np.diff(edges)[:, None] / 2
-    return (edges[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
-
-
-def _ramp(u):
-    """Integral of the standard normal distribution function."""
-    return u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
-
-
-def _spans(corners, lines):
-    """Where each horizontal line enters and leaves the polygon."""
-    left, right = np.full(lines.size, np.inf), np.full(lines.size, -np.inf)
-    for (x0, y0), (x1, y1) in zip(corners, np.roll(corners, -1, 0), strict=True):
-        if y0 != y1:
-            inside = (lines - y0) * (lines - y1) <= 0
-            x = x0 + (x1 - x0) * (lines - y0) / (y1 - y0)
-            left, right = np.where(inside, np.minimum(left, x), left), np.where(inside, np.maximum(right, x), right)
-    return left, right
 
 
 def shaded_image(faces, shape, blur):
