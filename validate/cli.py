@@ -9,7 +9,7 @@ import sys
 import typer
 
 from scenes import InvalidInput
-from validate.commands import batch, compare, image, plan, report  # noqa: F401
+from validate.commands import batch, compare, cost, image, plan, report  # noqa: F401
 from validate.commands.common import app
 from validate.stopped import CONTINUE, Interrupted, Stopped
 

@@ -48,7 +48,7 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Report | None]:
+def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
     """A progress bar with rate and time left on standard error, if that is a terminal."""
     errors = console(stderr=True)
     if not errors.is_terminal:
@@ -58,7 +58,7 @@ def progress(title: str) -> Iterator[Report | None]:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("images"),
+        TextColumn(unit),
         _Rate(),
         _Left(),
     )

@@ -23,7 +23,7 @@ def half_width(n: int) -> float:
     Examples
     --------
     >>> round(half_width(1000), 4)
-    0.0881
+    0.088
     """
     low, high = ratio_interval(1.0, n)
     return (high - low) / 2
@@ -35,7 +35,7 @@ def images(width: float) -> int:
     Examples
     --------
     >>> images(0.2)
-    198
+    201
     """
     if not width > 0:
         raise InvalidInput(f"accuracy must be greater than 0, got {width}")

@@ -49,7 +49,7 @@ def trial(
         If none of the settings can be measured.
     """
     imports, started = time.process_time(), time.perf_counter()  # so far this process has done little but import
-    variant, cases = variants.choose(), _cases(campaign, settings)
+    variant, cases = variants.choose(), spread_cases(campaign, settings)
     warm = _timed(lambda: work.render_setting(cases[0], variant))
     found = []
     for done, case in enumerate(cases):
@@ -79,7 +79,7 @@ def trial(
     )
 
 
-def _cases(campaign: Campaign, count: int) -> list[Case]:
+def spread_cases(campaign: Campaign, count: int) -> list[Case]:
     """Spread over the campaign, those whose pose is impossible left out."""
     found = []
     for index in np.unique(np.linspace(0, len(campaign) - 1, count).round().astype(int)):
