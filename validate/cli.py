@@ -9,7 +9,7 @@ import sys
 import typer
 
 from scenes import InvalidInput
-from validate.commands import batch, calibrate, compare, effects, hard, image, plan, report  # noqa: F401
+from validate.commands import batch, calibrate, compare, cost, effects, hard, image, plan, report  # noqa: F401
 from validate.commands.common import app
 from validate.stopped import CONTINUE, Interrupted, Stopped
 

@@ -7,11 +7,10 @@ import logging
 import platform
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,6 +18,7 @@ import measure
 import planner
 import render
 import scenes
+from render import Quality
 from render import variant as variants
 from scenes import InvalidInput, Scene
 from validate import pool as pools
@@ -26,6 +26,7 @@ from validate import work
 from validate.campaign import Campaign, Case
 from validate.pool import Crew
 from validate.result import Validation, collect
+from validate.stages import Stages
 from validate.stopped import Stopped
 from validate.store import RunFile
 from validate.work import CHUNK, Found, Picture, Task
@@ -37,6 +38,7 @@ _PICTURES = 64  # settings whose image is kept for the report
 _BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
 _CHECK_S = 5.0  # between looks at whether the workers are still there
 Progress = Callable[[str, int, int], None]
+More = Callable[[RunFile], Sequence[int] | None]
 
 
 def run(
@@ -49,6 +51,8 @@ def run(
     progress: Progress | None = None,
     executor: Executor | None = None,
     dask: str | None = None,
+    quality: Quality = Quality(),
+    more: More | None = None,
 ) -> Validation:
     """Validate all settings of a scene or a campaign.
 
@@ -72,6 +76,11 @@ def run(
         Used instead of local processes.
     dask : str, optional
         Address of a Dask scheduler, whose workers are used instead.
+    quality : Quality
+        Of the noise-free images.
+    more : callable, optional
+        Asked as more(run file) whenever all images asked for are measured; answers how many each setting should have,
+        or None when it is enough. Its answers are kept, so that a killed run continues with them.
 
     Raises
     ------
@@ -85,13 +94,15 @@ def run(
     started = time.perf_counter()
     campaign, variant = Campaign.of(scene), variants.choose()
     count = workers or pools.cores()
-    store = RunFile(Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant), fresh)
+    store = RunFile(
+        Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, quality), fresh
+    )
     try:
         store.note(
             "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
         )
         store.note("effects", {sample.name: work.effects(sample) for sample in campaign.samples()})
-        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None))
+        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), quality, more)
         log.info(
             "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
         )
@@ -121,7 +132,7 @@ def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
 
 
-def _identity(campaign: Campaign, renders: int, seed: int, variant: str) -> dict:
+def _identity(campaign: Campaign, renders: int, seed: int, variant: str, quality: Quality) -> dict:
     """All that the numbers depend on; a directory that holds other ones is refused."""
     return {
         "campaign": campaign.model_dump(mode="json"),
@@ -129,6 +140,7 @@ def _identity(campaign: Campaign, renders: int, seed: int, variant: str) -> dict
         "renders": renders,
         "chunk": CHUNK,
         "variant": variant,
+        "quality": asdict(quality),
         "versions": {name: version(name) for name in _PACKAGES},
         "code": _code(),
     }
@@ -157,10 +169,17 @@ class _Batch:
     variant: str
     store: RunFile
     progress: Progress
+    quality: Quality = Quality()
+    more: More | None = None
 
     def __post_init__(self) -> None:
-        self.total = self.renders * len(self.campaign)
+        self.stages = Stages([[self.renders] * len(self.campaign), *self.store.fact("stages", [])])
         self.done = self.store.images()
+
+    @property
+    def total(self) -> int:
+        """Images asked for so far."""
+        return self.stages.total
 
     def finish(self, open_crew: Callable[[], AbstractContextManager[Crew]]) -> None:
         """Work until all is done; after the death of a worker begin again with what is left."""
@@ -172,12 +191,24 @@ class _Batch:
                 if next(self._settings(), None):  # else do not start workers for nothing
                     with open_crew() as crew:
                         self._work(crew)
+                        while self._extend():
+                            self._work(crew)
+                elif self._extend():
+                    continue
                 return
             except (BrokenExecutor, CancelledError) as error:
                 deaths = 1 if self.done > before else deaths + 1
                 log.warning("workers lost", extra={"facts": {"deaths": deaths, "error": str(error)}})
                 if deaths == _BREAKS:
                     raise Stopped(f"workers died {_BREAKS} times in a row; is there enough memory?") from None
+
+    def _extend(self) -> bool:
+        """Whether more images are wanted than there are."""
+        wanted = self.more(self.store) if self.more else None
+        if wanted is None or not self.stages.extend(wanted):
+            return False
+        self.store.note("stages", self.stages.later)
+        return True
 
     def _work(self, crew: Crew) -> None:
         """Keep every worker busy, with no more tasks in flight than that needs: memory does not grow with the run."""
@@ -216,24 +247,21 @@ class _Batch:
 
     def _commit(self, index: int, found: Found) -> None:
         self.store.add(index, found)
-        if index >= _PICTURES and len(self.store.chunks(index)) == len(self._sizes):
+        finished = len(self.store.chunks(index)) == len(self.stages.sizes(index))
+        if index >= _PICTURES and finished and self.more is None:
             self.store.drop_picture(index)
-        images = sum(self._sizes[chunk] for chunk in found.chunks)
+        sizes = self.stages.sizes(index)
+        images = sum(sizes[chunk] for chunk in found.chunks)
         self.done += images
         self.progress("images", self.done, self.total)
         facts = {"setting": index, "images": images, "done": self.done, "total": self.total, "trouble": found.trouble}
         log.info("committed", extra={"facts": facts})
 
-    @cached_property
-    def _sizes(self) -> dict[int, int]:
-        """Images of each chunk."""
-        return {chunk: min(CHUNK, self.renders - CHUNK * chunk) for chunk in range(-(-self.renders // CHUNK))}
-
     def _settings(self) -> Iterator[_Setting]:
         """The settings that have work left, one at a time."""
         for index in range(len(self.campaign)):
             done = self.store.chunks(index)
-            left = deque((chunk, size) for chunk, size in self._sizes.items() if chunk not in done)
+            left = deque((chunk, size) for chunk, size in self.stages.sizes(index).items() if chunk not in done)
             if not left or self.store.trouble(index):
                 continue
             try:
@@ -241,11 +269,11 @@ class _Batch:
             except InvalidInput as error:
                 self._commit(index, Found(None, {}, str(error)))
                 continue
-            yield _Setting(case, left, self.seed, self.variant, self.store.picture(index))
+            yield _Setting(case, left, self.seed, self.variant, self.quality, self.store.picture(index))
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
-        return max(1, min(_MAX_CHUNKS, len(self.campaign) * len(self._sizes) // (16 * size)))
+        return max(1, min(_MAX_CHUNKS, self.total // CHUNK // (16 * size)))
 
 
 @dataclass
@@ -256,9 +284,10 @@ class _Setting:
     left: deque[tuple[int, int]]
     seed: int
     variant: str
+    quality: Quality
     picture: Picture | None
 
     def task(self, group: int) -> Task:
         """The next task."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
-        return Task(self.case, chunks, self.seed, self.variant, self.picture)
+        return Task(self.case, chunks, self.seed, self.variant, self.picture, self.quality)

@@ -16,6 +16,7 @@ from threadpoolctl import ThreadpoolController
 import measure
 import planner
 import render
+from render import Quality
 from render import variant as variants
 from scenes import InvalidInput, Scene
 from validate.campaign import Case
@@ -95,6 +96,7 @@ class Task:
     seed: int
     variant: str
     picture: Picture | None = None
+    quality: Quality = Quality()
 
 
 @dataclass(frozen=True)
@@ -127,14 +129,14 @@ def _perform(task: Task) -> Found:
         clean = None
         if task.picture is None:
             with _RENDERER:
-                clean = render_setting(task.case, task.variant)
+                clean = render_setting(task.case, task.variant, task.quality)
         image = (task.picture or clean.picture).array()
         return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, count) for k, count in task.chunks})
     except InvalidInput as error:
         return Found(None, {}, str(error))
 
 
-def render_setting(case: Case, variant: str) -> Clean:
+def render_setting(case: Case, variant: str, quality: Quality = Quality()) -> Clean:
     """Render a setting, and predict with and without its image."""
     clock = _Clock()
     scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
@@ -142,7 +144,7 @@ def render_setting(case: Case, variant: str) -> Clean:
     numbers = {price: found.variance_px2 for price, found in prices.items()}
     numbers["value_px"] = prices["calibrated"].value_px
     clock.lap("predict")
-    image = render.image(scene, sensor, light, variant=variant)
+    image = render.image(scene, sensor, light, quality, variant)
     clock.lap("render")
     propagated = {}
     for method in methods(scene):

@@ -1,0 +1,66 @@
+"""Asking for an accuracy or a time, end to end on a small scene."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import validate
+from validate import campaign
+from validate.cost.goal import reach
+from validate.cost.trial import trial
+
+pytestmark = pytest.mark.render
+
+
+def ice(*arguments):
+    command = [sys.executable, "-m", "validate.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300)
+
+
+def test_accuracy_asked_for_is_reached_in_every_setting(small_toml, tmp_path):
+    said = []
+    loaded = campaign.load(small_toml)
+    found, reached = reach(loaded, 0.15, workers=1, out=tmp_path, say=said.append)
+    assert reached.widest == pytest.approx(0.15, rel=0.1)
+    assert "images a setting" in said[0]
+    for row in found.rows:  # what is said of all sources holds at least the interval itself
+        low, high = row.main.ratio_interval
+        assert (high - low) / 2 <= 1.001 * max(reached.half_widths)
+    assert len(set(reached.images)) > 1  # settings stopped on their own
+    again, _ = reach(loaded, 0.15, workers=1, out=tmp_path)  # nothing is left to be done
+    assert [row.main.empirical for row in again.rows] == [row.main.empirical for row in found.rows]
+
+
+def test_images_of_a_later_stage_change_nothing_before(small_toml, tmp_path):
+    loaded = campaign.load(small_toml)
+    grown = validate.run(loaded, 60, 1, tmp_path / "grown", 1, more=lambda store: [90, 60, 60, 60])
+    plain = validate.run(loaded, 60, 1, tmp_path / "plain", 1)
+    assert [row.main.n for row in grown.rows] == [90, 60, 60, 60]
+    assert [r.main.empirical for r in grown.rows[1:]] == [r.main.empirical for r in plain.rows[1:]]
+    assert grown.rows[0].main.empirical != plain.rows[0].main.empirical
+
+
+def test_the_trial_measures(small_toml):
+    found = trial(campaign.load(small_toml), settings=2)
+    assert found.image > 0
+    assert found.rendered[0].seconds > 0
+    assert all(0 < rendered.sigma < 0.2 for rendered in found.rendered)
+    assert 0 < found.phase < 0.2
+    assert np.isfinite(found.model)
+    assert found.model < 0.1
+
+
+def test_two_goals_are_refused_in_one_line(small_toml):
+    done = ice("validate", small_toml, "--budget", "9s", "--accuracy", "0.1")
+    line = "--budget must be given without --accuracy, got both (9s, 0.1)"
+    assert (done.returncode, done.stderr.strip()) == (2, line)
+
+
+def test_json_tells_the_goal(small_toml, tmp_path):
+    done = ice("validate", small_toml, "--accuracy", "0.4", "--out", tmp_path, "--workers", "1", "--json")
+    document = json.loads(done.stdout)
+    assert document["goal"]["half_width"] == pytest.approx(0.4, rel=0.1)
+    assert set(document["goal"]["errors"]) == {"sampling", "render", "phase", "model"}

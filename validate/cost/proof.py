@@ -1,0 +1,85 @@
+"""Is what was asked for reached? Runs with several accuracies and budgets: ``python -m validate.cost.proof task1``."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from render import Quality
+from validate import campaign
+from validate.cost.goal import reach, seconds
+from validate.cost.interval import images
+from validate.cost.model import KNOB
+from validate.run import run
+from validate.table import console
+
+_SWEPT = (4, 16, 64)  # rays of a fine pixel at an edge, hand-tuned
+_PLENTY = 1.15  # ratio of the widest setting, which whoever tunes by hand has to find, too
+
+
+def main(
+    scene: str = "task1",
+    accuracy: Annotated[list[float], typer.Option(help="To be asked for; may be repeated.")] = [0.2, 0.1, 0.05, 0.02],
+    budget: Annotated[list[str], typer.Option(help="To be asked for; may be repeated.")] = ["20s", "60s", "180s"],
+    hand: Annotated[bool, typer.Option(help="Also time fixed knobs, the rays swept, for each accuracy.")] = True,
+) -> None:
+    """Print asked-for and reached half-widths and seconds."""
+    table = Table(title=f"{scene}: asked for and reached", box=None, padding=(0, 2), title_justify="left")
+    for name in ("asked for", "half-width", "images", "seconds", "predicted s", "reached / asked", "best by hand s"):
+        table.add_column(name, justify="right")
+    for value in accuracy:
+        _accuracy(table, scene, value, hand)
+    for text in budget:
+        _budget(table, scene, text)
+    console().print(table)
+
+
+def _accuracy(table: Table, scene: str, value: float, hand: bool) -> None:
+    loaded = campaign.load(scene)
+    with tempfile.TemporaryDirectory() as folder:
+        _, found = reach(loaded, value, out=Path(folder))
+    took = f"{_by_hand(loaded, value):.1f}" if hand else "-"
+    table.add_row(
+        f"{value:g}", f"{found.widest:.4f}", _count(found.images), f"{found.seconds:.1f}",
+        f"{found.choice.seconds + found.model.seconds:.1f}", f"{found.widest / value:.3f}", took,
+    )  # fmt: skip
+
+
+def _budget(table: Table, scene: str, text: str) -> None:
+    """As a user does: the whole command, start and pictures included."""
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "validate.cli", "validate", scene, "--budget", text, "--out", folder, "--json"]
+        found = json.loads(subprocess.run(command, capture_output=True, check=False, text=True).stdout)["goal"]
+    took = time.perf_counter() - began
+    table.add_row(
+        text, f"{found['half_width']:.4f}", _count(found["images"]), f"{took:.1f}",
+        f"{found['predicted']['seconds']:.1f}", f"{took / seconds(text):.3f}", "-",
+    )  # fmt: skip
+
+
+def _by_hand(loaded: campaign.Campaign, accuracy: float) -> float:
+    """Seconds of the fastest of fixed knobs that reach the accuracy."""
+    took = []
+    for count in _SWEPT:
+        began = time.perf_counter()
+        with tempfile.TemporaryDirectory() as folder:
+            run(loaded, images(accuracy / _PLENTY), 1, folder, quality=Quality(**{KNOB: count}))
+        took.append(time.perf_counter() - began)
+    return min(took)
+
+
+def _count(images: tuple[int, ...]) -> str:
+    return f"{min(images)}-{max(images)}"
+
+
+if __name__ == "__main__":
+    typer.run(main)

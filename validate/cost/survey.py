@@ -1,0 +1,80 @@
+"""All knobs of a scene, one after another."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import render
+from render import variant as variants
+from scenes import InvalidInput
+from validate.campaign import Campaign
+from validate.cost.grid import grid_knob
+from validate.cost.knob import Knob
+from validate.cost.locators import estimators_knob
+from validate.cost.model import CostModel
+from validate.cost.pareto import pareto_knob
+from validate.cost.points import points_knob
+from validate.cost.rays import rays_knob
+from validate.cost.sampling import images_knob
+from validate.cost.scaling import scaling_knob
+from validate.cost.size import size_knob
+from validate.cost.trial import spread_cases, trial
+
+_SETTINGS = 2  # of the knobs that render
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What `survey` has measured; ``omitted`` tells which knobs could not be, and why."""
+
+    scene: str
+    model: CostModel
+    knobs: tuple[Knob, ...]
+    omitted: dict[str, str]
+    seconds: float
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "scene": self.scene,
+            "model": asdict(self.model),
+            "knobs": {knob.name: knob.to_json() for knob in self.knobs},
+            "omitted": self.omitted,
+            "seconds": self.seconds,
+        }
+
+
+def survey(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], None] | None = None) -> Survey:
+    """Measure each knob of a scene on this machine.
+
+    Raises
+    ------
+    InvalidInput
+        If no setting of the scene can be measured.
+    """
+    began, tell = time.perf_counter(), report or (lambda *_: None)
+    tell("trial", 0, 9)
+    model = trial(campaign, seed)
+    variant, cases = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)[1::2]
+    images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]
+    makers: dict[str, Callable[[], Knob]] = {
+        "rays": lambda: rays_knob(cases, variant),
+        "images": lambda: images_knob(cases[0], images[0], seed),
+        "estimators": lambda: estimators_knob(cases, images, seed),
+        "points": lambda: points_knob(cases[0]),
+        "grid": lambda: grid_knob(campaign.scenes[0]),
+        "size": lambda: size_knob(cases[0], variant, seed),
+        "scaling": lambda: scaling_knob(model),
+        "pareto": lambda: pareto_knob(model),
+    }
+    knobs, omitted = [], {}
+    for done, (name, make) in enumerate(makers.items(), 1):
+        tell(name, done, 1 + len(makers))
+        try:
+            knobs.append(make())
+        except InvalidInput as error:
+            omitted[name] = str(error)
+    tell("done", 1 + len(makers), 1 + len(makers))
+    return Survey(campaign.name, model, tuple(knobs), omitted, time.perf_counter() - began)
