@@ -25,7 +25,7 @@ from validate.table import console, report
 def validate_command(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")],
     renders: Annotated[int, typer.Option(help="Noisy images a setting.")] = 1000,
-    seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1,
+    seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1995,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there."),
