@@ -15,11 +15,8 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 from scenes import mesh
 from scenes.errors import InvalidInput
 from scenes.pose import Pose, PoseField
+from scenes.ranges import Darkness, Fraction, Length, Level, Positive, Trace
 from scenes.solid import Solid, block
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class Model(BaseModel):
@@ -32,7 +29,7 @@ class Block(Model):
     """A rectangular block with a corner at the origin and its sides along the axes; ``size`` in cm."""
 
     kind: Literal["block"] = "block"
-    size: tuple[Positive, Positive, Positive]
+    size: tuple[Length, Length, Length]
 
     @cached_property
     def solid(self) -> Solid:
@@ -79,9 +76,9 @@ class Material(Model):
 
     specular_fraction: Fraction = 0.0
     diffuse_reflectance: Fraction = 1.0
-    refractive_index: Positive = 1.0
-    extinction: NotNegative = 0.0
-    roughness: Positive = 0.2
+    refractive_index: Annotated[float, Field(gt=0, le=1e6)] = 1.0  # its square and its square's square must be numbers
+    extinction: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    roughness: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.2
 
     @property
     def is_diffuse(self) -> bool:
@@ -99,17 +96,17 @@ class Camera(Model):
 
     width: Annotated[int, Field(ge=1, le=16384)]
     height: Annotated[int, Field(ge=1, le=16384)]
-    focal_px: Positive
-    distance: Positive
-    blur_px: NotNegative = 0.6
-    exposure: Positive = 200.0
-    black_level: NotNegative = 0.0
+    focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
+    distance: Length
+    blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
+    exposure: Level = 200.0
+    black_level: Darkness = 0.0
 
 
 class Light(Model):
     """An unpolarised point light on a sphere around the origin; ``distance`` in cm."""
 
-    distance: Positive
+    distance: Length
 
 
 class Noise(Model):
@@ -118,7 +115,7 @@ class Noise(Model):
     Without ``bits`` grey levels stay real numbers; with it they are rounded and clipped to 0 .. 2^bits - 1.
     """
 
-    sigma: NotNegative
+    sigma: Trace
     bits: Annotated[int, Field(ge=1, le=16)] | None = None
 
     @property
