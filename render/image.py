@@ -11,6 +11,7 @@ import numpy as np
 from planner.view import direction, frame, project
 from render import variant as variants
 from render.optics import blur_and_bin
+from render.precision import check_precision
 from scenes import InvalidInput, Pose, Scene
 
 
@@ -57,9 +58,10 @@ def image(
     Raises
     ------
     InvalidInput
-        If a pose stands in or on the object, or the material is not purely diffuse.
+        If a pose stands in or on the object, the material is not purely diffuse, or the focal length is too long.
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
+    check_precision(scene.camera)
     if not scene.material.is_diffuse:
         raise InvalidInput(
             "material must be diffuse (specular_fraction 0, or refractive_index 1 and extinction 0) to be rendered, "
@@ -107,9 +109,8 @@ def _description(
             "fov": 2 * math.degrees(math.atan(camera.width / 2 / camera.focal_px)),
             "near_clip": 1e-3 * camera.distance,
             "far_clip": 1e3 * camera.distance,
-            "to_world": transform().look_at(
-                origin=position.tolist(), target=(position + axes.forward).tolist(), up=(-axes.down).tolist()
-            ),
+            # the origin itself: a target one step ahead of a far sensor has lost its direction in single precision
+            "to_world": transform().look_at(origin=position.tolist(), target=[0.0, 0.0, 0.0], up=(-axes.down).tolist()),
             "film": {
                 "type": "hdrfilm",
                 "width": camera.width * k,
