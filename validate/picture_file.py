@@ -15,6 +15,7 @@ from PIL import Image
 from scenes import InvalidInput
 
 _MOST_PIXELS = 40_000_000  # 320 MB as float64
+_TIFF = (b"II*\0", b"MM\0*")
 _SUFFIXES = (".png", ".tif", ".tiff", ".npy")
 
 
@@ -75,7 +76,10 @@ def read(path: Path) -> np.ndarray:
 
 
 def _told_size(data: bytes) -> tuple[int, ...]:
-    """Size of an image by its header alone; () where the header says nothing."""
+    """Size of an image by its header alone; () for a kind of TIFF that only the decoder knows.
+
+    Where the header is broken nothing is decoded: the decoder would believe it, and take gigabytes.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -83,8 +87,10 @@ def _told_size(data: bytes) -> tuple[int, ...]:
                 return header.size
     except Image.DecompressionBombError:
         return (_MOST_PIXELS + 1,)
-    except Exception:  # every format raises its own; the decoder will say what is wrong
-        return ()
+    except Exception:  # every format raises its own
+        if data[:4] in _TIFF:
+            return ()
+        raise ValueError("no header of an image") from None
 
 
 def _check_size(path: Path, shape: tuple[int, ...]) -> None:
