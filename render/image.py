@@ -61,7 +61,6 @@ def image(
         If a pose stands in or on the object, the material is not purely diffuse, or the focal length is too long.
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
-    check_precision(scene.camera)
     if not scene.material.is_diffuse:
         raise InvalidInput(
             "material must be diffuse (specular_fraction 0, or refractive_index 1 and extinction 0) to be rendered, "
@@ -70,6 +69,7 @@ def image(
     picture = np.zeros((scene.camera.height, scene.camera.width))
     rows, columns = window(scene, sensor)
     if picture[rows, columns].size:
+        check_precision(scene.camera)
         mitsuba = variants.use(variant or variants.choose())
         description = _description(mitsuba, scene, sensor, light, quality, rows, columns)
         fine = np.array(mitsuba.render(mitsuba.load_dict(description), seed=quality.seed), dtype=float)[:, :, 0]
