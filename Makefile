@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test lint bench-measure bench-planner reference proof clean
+.PHONY: validate test fuzz lint bench-measure bench-planner reference proof clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -14,6 +14,10 @@ test: lint
 # How near the estimators come to the Cramer-Rao bound, and how fast they are (10 minutes).
 bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
+
+# 10,000 spoilt scene files, mesh files and images: no traceback, no hang, at most 1 GiB (4 minutes).
+fuzz: $(VENV)/.test-installed
+	$(BIN)/python -m tests.hard.fuzz --count 10000
 
 bench-planner: $(VENV)/.installed
 	$(BIN)/python -m planner.benchmark

@@ -12,6 +12,7 @@ from measure.layout import layout_of
 from measure.shape import find_shape
 from scenes import InvalidInput, Scene
 
+_BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
 
@@ -106,8 +107,11 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     images = np.asarray(image, float)
     if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
         raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
-    if not np.isfinite(images.sum()) and not np.isfinite(images).all():  # the sum is finite unless a number is not
+    low, high = float(images.min()), float(images.max())
+    if not np.isfinite([low, high]).all():
         raise InvalidInput("image must be of finite numbers, got NaN or infinity")
+    if max(-low, high) > _BRIGHTEST:
+        raise InvalidInput(f"image must be of grey levels up to {_BRIGHTEST:g}, got {max(-low, high):.3g}")
     return images
 
 

@@ -51,9 +51,10 @@ def fresnel(cosine: np.ndarray, n: float, k: float) -> tuple[np.ndarray, np.ndar
 def beckmann(cosine: np.ndarray, sine: np.ndarray, m: float) -> np.ndarray:
     """Beckmann roughness distribution D, as printed: exp(-(tan/m)^2) / (m^2 cos^4)."""
     cosine = np.asarray(cosine, float)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        exponent = -((np.asarray(sine) / (m * cosine)) ** 2) - 4 * np.log(np.abs(cosine)) - 2 * np.log(m)
-    return np.where(cosine > 0, np.exp(np.where(cosine > 0, exponent, -np.inf)), 0.0)
+    lit = cosine > 1e-100  # below, D is 0 for every roughness
+    safe = np.where(lit, cosine, 1.0)
+    exponent = -((np.asarray(sine) / (m * safe)) ** 2) - 4 * np.log(safe) - 2 * np.log(m)
+    return np.where(lit, np.exp(np.where(lit, exponent, -np.inf)), 0.0)
 
 
 def attenuation(nh: np.ndarray, nv: np.ndarray, nl: np.ndarray, vh: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from render.adaptive import refine
 from render.build import CUSTOM, description, view
 from render.effects import Tolerance, choose
 from render.optics import blur_and_bin, distort, distorted
+from render.precision import check_precision
 from scenes import InvalidInput, Pose, Scene
 
 STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
@@ -93,7 +94,7 @@ def image(
     Raises
     ------
     InvalidInput
-        If a pose stands in or on the object, or an effect is unknown.
+        If a pose stands in or on the object, an effect is unknown, or the focal length is too long.
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
     chosen = choose(scene, effects, tolerance, sensor, light)
@@ -101,6 +102,7 @@ def image(
     picture = np.zeros((camera.height, camera.width))
     rows, columns = window(scene, sensor)
     if picture[rows, columns].size:
+        check_precision(camera)
         crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
         fine = _fine(scene, sensor, light, chosen.active, crop, quality, variant or variants.choose())
         start = crop[1].start, crop[0].start

@@ -11,6 +11,7 @@ from scenes.errors import InvalidInput, describe
 from scenes.model import Scene
 
 BUNDLED = Path(__file__).parent
+_MOST_BYTES = 1 << 20
 
 
 def names() -> tuple[str, ...]:
@@ -39,10 +40,16 @@ def load(source: str | Path) -> Scene:
     """
     path = _find(source)
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            text = file.read(_MOST_BYTES + 1)
+        if len(text) > _MOST_BYTES:
+            raise InvalidInput(f"{path} must be at most {_MOST_BYTES} bytes long, got more")
+        document = tomllib.loads(text.decode().replace("\r\n", "\n"))
     except OSError as error:
         raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except InvalidInput:
+        raise
+    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number too long, nested too deep
         raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
     try:
         return Scene.model_validate({"name": path.stem, **document}, context={"directory": path.parent})
@@ -56,6 +63,10 @@ def _find(source: str | Path) -> Path:
     if str(source) in names():
         return BUNDLED / f"{source}.toml"
     path = Path(source)
-    if path.suffix != ".toml" and not path.exists():
+    try:
+        known = path.suffix == ".toml" or path.exists()
+    except OSError:  # a name too long for the file system
+        known = False
+    if not known:
         raise InvalidInput(f"scene must be a TOML file or one of {', '.join(names())}, got {str(source)!r}")
     return path

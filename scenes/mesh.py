@@ -31,8 +31,11 @@ def read(path: Path) -> Solid:
         raise InvalidInput(f"object.file must be one of {', '.join(FORMATS)}, got {path.name!r}")
     try:
         mesh = trimesh.load_mesh(path)
+    except ImportError:  # the reader's guess at the text's encoding
+        raise InvalidInput(f"object.file must be a readable mesh, got {path} (text that is not UTF-8)") from None
     except Exception as error:  # every reader raises its own
-        raise InvalidInput(f"object.file must be a readable mesh, got {path} ({error})") from None
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InvalidInput(f"object.file must be a readable mesh, got {path} ({reason})") from None
     return solid(mesh)
 
 

@@ -17,11 +17,8 @@ from scenes import mesh
 from scenes.errors import InvalidInput
 from scenes.optics import Floor, Jitter, Lens, Noise, Obstacle
 from scenes.pose import Pose, PoseField
+from scenes.ranges import Darkness, Fraction, Length, Level, Positive
 from scenes.solid import Solid, block
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class Model(BaseModel):
@@ -34,7 +31,7 @@ class Block(Model):
     """A rectangular block with a corner at the origin and its sides along the axes; ``size`` in cm."""
 
     kind: Literal["block"] = "block"
-    size: tuple[Positive, Positive, Positive]
+    size: tuple[Length, Length, Length]
 
     @cached_property
     def solid(self) -> Solid:
@@ -95,10 +92,10 @@ class Material(Model):
 
     specular_fraction: Fraction = 0.0
     diffuse_reflectance: Fraction = 1.0
-    refractive_index: Positive = 1.0
-    extinction: NotNegative = 0.0
-    roughness: Positive = 0.2
-    index_table: tuple[tuple[Positive, Positive, NotNegative], ...] = ()
+    refractive_index: Annotated[float, Field(gt=0, le=1e6)] = 1.0  # its square and its square's square must be numbers
+    extinction: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    roughness: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.2
+    index_table: tuple[tuple[Positive, Positive, Annotated[float, Field(ge=0, le=1e6)]], ...] = ()
 
     @field_validator("index_table")
     @classmethod
@@ -125,11 +122,11 @@ class Camera(Model):
 
     width: Annotated[int, Field(ge=1, le=16384)]
     height: Annotated[int, Field(ge=1, le=16384)]
-    focal_px: Positive
-    distance: Positive
-    blur_px: NotNegative = 0.6
-    exposure: Positive = 200.0
-    black_level: NotNegative = 0.0
+    focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
+    distance: Length
+    blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
+    exposure: Level = 200.0
+    black_level: Darkness = 0.0
     lens: Lens = Lens()
     analyser_deg: float | None = None
     transmission: Curve = ()
@@ -149,8 +146,8 @@ class Light(Model):
     ``spectrum`` is Q of eq. 1, rows [nm, relative value].
     """
 
-    distance: Positive
-    radius: NotNegative = 0.0
+    distance: Length
+    radius: Annotated[float, Field(ge=0)] = 0.0
     polarisation_deg: float | None = None
     spectrum: Curve = ()
 

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.special import ndtr
 
+from scenes.ranges import Trace
 from scenes.solid import Solid, block
 
 Positive = Annotated[float, Field(gt=0)]
@@ -74,7 +75,7 @@ class Noise(Part):
     Without ``bits`` grey levels stay real numbers; with it they are rounded and clipped to 0 .. 2^bits - 1.
     """
 
-    sigma: NotNegative
+    sigma: Trace
     bits: Annotated[int, Field(ge=1, le=16)] | None = None
     gain: NotNegative = 0.0
     dark_level: NotNegative = 0.0

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import io
+import math
+import warnings
 from pathlib import Path
+from tokenize import TokenError
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from scenes import InvalidInput
 
+_MOST_PIXELS = 40_000_000  # 320 MB as float64
+_TIFF = (b"II*\0", b"MM\0*")
 _SUFFIXES = (".png", ".tif", ".tiff", ".npy")
 
 
@@ -45,12 +52,16 @@ def read(path: Path) -> np.ndarray:
         If the file cannot be read as an image.
     """
     try:
-        data = path.read_bytes()
         if path.suffix.lower() == ".npy":
-            image = np.load(path, allow_pickle=False)
+            image = np.load(path, mmap_mode="r", allow_pickle=False)  # a map: what is told of the size is not believed
+            _check_size(path, image.shape)
         else:
+            data = path.read_bytes()
+            _check_size(path, _told_size(data))
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    except (OSError, ValueError, EOFError, cv2.error) as error:
+    except InvalidInput:
+        raise
+    except (OSError, ValueError, EOFError, SyntaxError, TokenError, MemoryError, OverflowError, cv2.error) as error:
         reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
         raise InvalidInput(f"{path} must be a readable image, got: {reason}") from None
     if image is None or image.ndim not in (2, 3) or image.dtype.kind not in "uif":
@@ -62,3 +73,26 @@ def read(path: Path) -> np.ndarray:
             else image[:, :, 0]
         )
     return image.astype(float)
+
+
+def _told_size(data: bytes) -> tuple[int, ...]:
+    """Size of an image by its header alone; () for a kind of TIFF that only the decoder knows.
+
+    Where the header is broken nothing is decoded: the decoder would believe it, and take gigabytes.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data)) as header:
+                return header.size
+    except Image.DecompressionBombError:
+        return (_MOST_PIXELS + 1,)
+    except Exception:  # every format raises its own
+        if data[:4] in _TIFF:
+            return ()
+        raise ValueError("no header of an image") from None
+
+
+def _check_size(path: Path, shape: tuple[int, ...]) -> None:
+    if math.prod(shape) > _MOST_PIXELS:
+        raise InvalidInput(f"{path} must be an image of at most {_MOST_PIXELS} pixels, got more")

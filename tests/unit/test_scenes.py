@@ -23,7 +23,7 @@ def broken(tmp_path, old, new):
     ("old", "new", "line"),
     [
         ("width = 256", "width = 256\nzoom = 2", r"camera\.zoom must be a known key, got 2"),
-        ("size = [12.5,", "size = [-12.5,", r"object(\.block)?\.size\[0\] must be greater than 0, got -12\.5"),
+        ("size = [12.5,", "size = [-12.5,", r"object(\.block)?\.size\[0\] must be at least 1e-12, got -12\.5"),
         ("focal_px = 800.0\n", "", r"camera\.focal_px must be given, got nothing"),
         ("sigma = 2.4", "sigma = nan", r"noise\.sigma must be a finite number, got nan"),
         ("exposure = 200.0", "exposure = inf", r"camera\.exposure must be a finite number, got inf"),

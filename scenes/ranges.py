@@ -1,0 +1,21 @@
+"""Ranges of numbers: wide enough for every use, narrow enough that no square or product leaves floating point."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+
+def _none_or_some(value: float) -> float:
+    if 0 < value < 1e-15:  # its square, and the square of that, would be lost
+        raise ValueError(f"noise.sigma must be 0 or at least 1e-15, got {value:g}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Length = Annotated[float, Field(ge=1e-12, le=1e12)]  # cm
+Level = Annotated[float, Field(ge=1e-15, le=1e15)]  # grey levels
+Darkness = Annotated[float, Field(ge=0, le=1e15)]  # grey levels
+Trace = Annotated[float, Field(ge=0, le=1e15), AfterValidator(_none_or_some)]  # grey levels

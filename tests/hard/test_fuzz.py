@@ -1,0 +1,65 @@
+"""A small run of `tests.hard.fuzz`; ``make fuzz`` feeds 10,000 inputs."""
+
+import numpy as np
+import pytest
+
+import scenes
+from scenes import InvalidInput
+from tests.hard import fuzz
+from validate import picture_file
+
+
+def test_400_spoilt_inputs(tmp_path, capfd):
+    before = fuzz.peak_memory()
+    found = fuzz.run(400, seed=20261121, folder=tmp_path)
+    capfd.readouterr()  # what the image libraries say of spoilt files
+    assert not found.failures
+    assert sum(found.outcomes.values()) == 400
+    assert found.outcomes["scene: predicted"] > 10
+    assert found.outcomes["image: measured"] > 5
+    assert fuzz.peak_memory() < max(fuzz.MOST_MEMORY, before + 1)
+
+
+@pytest.mark.parametrize("broken", [lambda *_: 1 / 0, lambda *_: (_ for _ in ()).throw(MemoryError("much"))])
+def test_a_traceback_would_be_found(broken, tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(scenes, "load", broken)
+    found = fuzz.run(8, seed=1, folder=tmp_path)
+    capfd.readouterr()
+    assert len(found.failures) >= 5
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a = " + "[" * 5000 + "]" * 5000, "must be valid TOML, got"),
+        ("a = " + "9" * 5000, "must be valid TOML, got"),
+        ("#" * (1 << 21), "must be at most 1048576 bytes long, got more"),
+        ("a = \xff", "must be valid TOML, got"),
+    ],
+)
+def test_hostile_scene_files(text, line, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(InvalidInput, match=line):
+        scenes.load(path)
+
+
+def test_a_name_too_long_for_the_file_system():
+    with pytest.raises(InvalidInput, match="scene must be a TOML file or one of"):
+        scenes.load("a" * 5000)
+
+
+def test_an_array_file_that_lies_about_its_size(tmp_path):
+    """The header says 5e11 pixels; nothing of that size may be allocated."""
+    path = tmp_path / "image.npy"
+    np.save(path, np.zeros((240, 256)))
+    path.write_bytes(path.read_bytes().replace(b"(240, 256)", b"(999999999, 512)"))
+    with pytest.raises(InvalidInput, match="must be"):
+        picture_file.read(path)
+
+
+def test_a_picture_of_too_many_pixels(tmp_path):
+    path = tmp_path / "image.pgm"
+    path.write_bytes(b"P5 100000 100000 255\n")
+    with pytest.raises(InvalidInput, match="must be an image of at most 40000000 pixels, got more"):
+        picture_file.read(path)
