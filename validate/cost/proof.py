@@ -21,14 +21,16 @@ from validate.cost.model import KNOB
 from validate.run import run
 from validate.table import console
 
+_ACCURACIES = [0.2, 0.1, 0.05, 0.02]
+_BUDGETS = ["20s", "60s", "180s"]
 _SWEPT = (4, 16, 64)  # rays of a fine pixel at an edge, hand-tuned
 _PLENTY = 1.15  # ratio of the widest setting, which whoever tunes by hand has to find, too
 
 
 def main(
     scene: str = "task1",
-    accuracy: Annotated[list[float], typer.Option(help="To be asked for; may be repeated.")] = [0.2, 0.1, 0.05, 0.02],
-    budget: Annotated[list[str], typer.Option(help="To be asked for; may be repeated.")] = ["20s", "60s", "180s"],
+    accuracy: Annotated[list[float], typer.Option(help="To be asked for; may be repeated.")] = _ACCURACIES,
+    budget: Annotated[list[str], typer.Option(help="To be asked for; may be repeated.")] = _BUDGETS,
     hand: Annotated[bool, typer.Option(help="Also time fixed knobs, the rays swept, for each accuracy.")] = True,
 ) -> None:
     """Print asked-for and reached half-widths and seconds."""
