@@ -27,7 +27,7 @@ _PLENTY = 1.15  # ratio of the widest setting, which whoever tunes by hand has t
 
 
 def main(
-    scene: str = "task1",
+    scene: Annotated[str, typer.Argument(help="A bundled scene or a TOML file.")] = "task1",
     accuracy: Annotated[list[float], typer.Option(help="To be asked for; may be repeated.")] = _ACCURACIES,
     budget: Annotated[list[str], typer.Option(help="To be asked for; may be repeated.")] = _BUDGETS,
     hand: Annotated[bool, typer.Option(help="Also time fixed knobs, the rays swept, for each accuracy.")] = True,
