@@ -22,10 +22,10 @@ from validate.run import run
 from validate.store import RunFile
 from validate.work import methods
 
-_FIRST = 0.5  # part of the images that are taken before the first look
+_FIRST = 0.25  # part of the images that are taken before the first look at the clock
 _FINE = 0.05  # of the accuracy: a render of this sigma adds half a per cent to the half-width
 _USUAL = 0.04  # accuracy, where none is asked for
-_LOOKS = 3  # at the clock
+_LOOKS = 3  # at the clock, at most
 _SPARE_S = 0.3  # left over is not worth another look
 
 
