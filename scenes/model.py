@@ -78,7 +78,7 @@ def _rising(key: str, rows: tuple) -> tuple:
     return rows
 
 
-Curve = tuple[tuple[Positive, NotNegative], ...]
+Curve = tuple[tuple[Positive, Annotated[float, Field(ge=0)]], ...]
 
 
 class Material(Model):

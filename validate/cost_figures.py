@@ -23,7 +23,7 @@ def draw(found: Survey, directory: Path) -> list[Path]:
 
 def _draw(knob: Knob, path: Path) -> Path:
     figure, axes = plt.subplots(figsize=(6.8, 5.4), layout="constrained")
-    joined = knob.name != "estimators"
+    joined = knob.name not in ("estimators", "effects")
     for label, (x, y) in knob.curves().items():
         axes.plot(x, y, "o-" if joined else "o", ms=4, lw=1, label=f"{knob.series} {label}" if label else None)
     if knob.name == "pareto":

@@ -14,20 +14,21 @@ class Stages:
     ----------
     wanted : list of sequence of int
         Images of each setting in all, after the first stage, the second, ...
+
+    Attributes
+    ----------
+    total : int
+        Images of all settings.
     """
 
     def __init__(self, wanted: list[Sequence[int]]) -> None:
         self._wanted = [[int(n) for n in stage] for stage in wanted]
+        self.total = sum(self._wanted[-1])
 
     @property
     def later(self) -> list[list[int]]:
         """All stages but the first."""
         return self._wanted[1:]
-
-    @property
-    def total(self) -> int:
-        """Images of all settings."""
-        return sum(self._wanted[-1])
 
     def extend(self, wanted: Sequence[int]) -> bool:
         """Add a stage; False, and nothing is added, if no setting gets more images than it has."""
@@ -35,6 +36,7 @@ class Stages:
         if grown == self._wanted[-1]:
             return False
         self._wanted.append(grown)
+        self.total = sum(grown)
         return True
 
     def sizes(self, index: int) -> dict[int, int]:

@@ -11,6 +11,7 @@ import render
 from render import variant as variants
 from scenes import InvalidInput
 from validate.campaign import Campaign
+from validate.cost.effects import effects_knob
 from validate.cost.grid import grid_knob
 from validate.cost.knob import Knob
 from validate.cost.locators import estimators_knob
@@ -23,6 +24,7 @@ from validate.cost.scaling import scaling_knob
 from validate.cost.size import size_knob
 from validate.cost.trial import spread_cases, trial
 
+_STEPS = 10  # the trial and nine knobs
 _SETTINGS = 2  # of the knobs that render
 
 
@@ -55,7 +57,7 @@ def survey(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], 
         If no setting of the scene can be measured.
     """
     began, tell = time.perf_counter(), report or (lambda *_: None)
-    tell("trial", 0, 9)
+    tell("trial", 0, _STEPS)
     model = trial(campaign, seed)
     variant, cases = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)[1::2]
     images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]
@@ -66,15 +68,16 @@ def survey(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], 
         "points": lambda: points_knob(cases[0]),
         "grid": lambda: grid_knob(campaign.scenes[0]),
         "size": lambda: size_knob(cases[0], variant, seed),
+        "effects": lambda: effects_knob(cases[0], variant),
         "scaling": lambda: scaling_knob(model),
         "pareto": lambda: pareto_knob(model),
     }
     knobs, omitted = [], {}
     for done, (name, make) in enumerate(makers.items(), 1):
-        tell(name, done, 1 + len(makers))
+        tell(name, done, _STEPS)
         try:
             knobs.append(make())
         except InvalidInput as error:
             omitted[name] = str(error)
-    tell("done", 1 + len(makers), 1 + len(makers))
+    tell("done", _STEPS, _STEPS)
     return Survey(campaign.name, model, tuple(knobs), omitted, time.perf_counter() - began)

@@ -27,7 +27,12 @@ Report = Callable[[str, int, int], None]
 
 
 def trial(
-    campaign: Campaign, seed: int = 1, workers: int | None = None, settings: int = 3, report: Report | None = None
+    campaign: Campaign,
+    seed: int = 1,
+    workers: int | None = None,
+    settings: int = 3,
+    fine: float = 0.0,
+    report: Report | None = None,
 ) -> CostModel:
     """Measure what the run of a campaign will cost, on a few settings spread over it.
 
@@ -40,6 +45,8 @@ def trial(
         Of the run to come; all available cores when not given.
     settings : int
         How many to try.
+    fine : float
+        Relative sigma of a render's variance that is small enough: more rays are not tried.
     report : callable, optional
         As report(what, done, total).
 
@@ -58,25 +65,33 @@ def trial(
     good = [tried for tried in found if tried.usable]
     if not good:
         raise InvalidInput(f"{campaign.name}: settings must be measurable for a trial, got {found[0].status}")
-    rendered = []
-    for quality in qualities(*SAMPLES):
-        seconds, spread = zip(*(tried.rendered(quality) for tried in good), strict=True)
-        rendered.append(Rendered(quality, float(np.mean(seconds)), _rms(spread)))
+    rendered = _ladder(good, fine)
     squares = [tried.linearity() for tried in good]
     model = math.sqrt(max(0.0, float(np.mean([delta**2 - se**2 for delta, se in squares]))))
     return CostModel(
         settings=len(campaign),
         workers=workers or pool.cores(),
         variant=variant,
-        rendered=tuple(rendered),
+        rendered=rendered,
         phase=_rms([tried.phase() for tried in good]),
         model=model,
-        start=imports + max(0.0, warm - rendered[1].seconds),
+        start=imports + max(0.0, warm - found[0].seconds),
         setting=float(np.mean([tried.overhead for tried in good])),
         image=float(np.mean([tried.image_seconds for tried in good])),
         finish=_PICTURE_S * min(len(campaign), 16),
         seconds=time.perf_counter() - started,
     )
+
+
+def _ladder(tried: list[_Tried], fine: float) -> tuple[Rendered, ...]:
+    """From few rays to many, until they are enough."""
+    rendered: list[Rendered] = []
+    for quality in qualities(*SAMPLES):
+        seconds, spread = zip(*(one.rendered(quality) for one in tried), strict=True)
+        rendered.append(Rendered(quality, float(np.mean(seconds)), _rms(spread)))
+        if rendered[-1].sigma <= fine:
+            break
+    return tuple(rendered)
 
 
 def spread_cases(campaign: Campaign, count: int) -> list[Case]:
@@ -98,6 +113,7 @@ class _Tried:
     def __init__(self, case: Case, variant: str, seed: int) -> None:
         self.case, self.variant, self.seed = case, variant, seed
         clean = work.render_setting(case, variant)
+        self.seconds = sum(clean.seconds.values())
         self.image = clean.picture.array()
         self.found = self._propagate(self.image, case.setting.sensor)
         self.status = self.found.status
