@@ -192,7 +192,10 @@ def test_directory_in_use(small, tmp_path):
 def test_signals_stop_with_one_line_and_leave_no_process(small_toml, tmp_path, sent, status, word):
     command = [sys.executable, "-m", "validate.cli", "validate", small_toml, "--renders", "5000", "--workers", "2"]
     with subprocess.Popen(
-        [*map(str, command), "--out", str(tmp_path), "--log-json"], stderr=subprocess.PIPE, text=True
+        [*map(str, command), "--out", str(tmp_path), "--log-json"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job starts with it ignored
     ) as process:
         try:
             while json.loads(process.stderr.readline())["event"] != "committed":
