@@ -18,8 +18,9 @@ import measure
 import planner
 import render
 import scenes
-from render import Quality
+from render import Quality, Tolerance
 from render import variant as variants
+from render.effects import named
 from scenes import InvalidInput, Scene
 from validate import pool as pools
 from validate import work
@@ -29,7 +30,7 @@ from validate.result import Validation, collect
 from validate.stages import Stages
 from validate.stopped import Stopped
 from validate.store import RunFile
-from validate.work import CHUNK, Found, Picture, Task
+from validate.work import CHUNK, Found, Picture, Rendering, Task
 
 log = logging.getLogger("validate")
 _PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
@@ -53,6 +54,8 @@ def run(
     dask: str | None = None,
     quality: Quality = Quality(),
     more: More | None = None,
+    effects: str = "auto",
+    tolerance: Tolerance = Tolerance(),
 ) -> Validation:
     """Validate all settings of a scene or a campaign.
 
@@ -81,6 +84,10 @@ def run(
     more : callable, optional
         Asked as more(run file) whenever all images asked for are measured; answers how many each setting should have,
         or None when it is enough. Its answers are kept, so that a killed run continues with them.
+    effects : str
+        "auto", "all" or names with commas between: what is simulated (`render.image`).
+    tolerance : Tolerance
+        What ``auto`` may leave out.
 
     Raises
     ------
@@ -90,19 +97,17 @@ def run(
     Stopped
         If workers keep dying, the scheduler goes away, or the run file cannot be written. The same call continues.
     """
-    _check(scene, renders, seed, workers)
+    _check(scene, renders, seed, workers, effects)
     started = time.perf_counter()
     campaign, variant = Campaign.of(scene), variants.choose()
-    count = workers or pools.cores()
-    store = RunFile(
-        Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, quality), fresh
-    )
+    count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)
+    store = RunFile(Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how), fresh)
     try:
         store.note(
             "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
         )
-        store.note("effects", {sample.name: work.effects(sample) for sample in campaign.samples()})
-        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), quality, more)
+        store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
+        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more)
         log.info(
             "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
         )
@@ -121,7 +126,9 @@ def run(
         store.close()
 
 
-def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None) -> None:
+def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None, effects: str) -> None:
+    if effects not in ("auto", "all"):
+        named(effects)
     if renders < 2:
         raise InvalidInput(f"renders must be at least 2, got {renders}")
     if seed < 0:
@@ -132,7 +139,7 @@ def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
 
 
-def _identity(campaign: Campaign, renders: int, seed: int, variant: str, quality: Quality) -> dict:
+def _identity(campaign: Campaign, renders: int, seed: int, variant: str, how: Rendering) -> dict:
     """All that the numbers depend on; a directory that holds other ones is refused."""
     return {
         "campaign": campaign.model_dump(mode="json"),
@@ -140,7 +147,7 @@ def _identity(campaign: Campaign, renders: int, seed: int, variant: str, quality
         "renders": renders,
         "chunk": CHUNK,
         "variant": variant,
-        "quality": asdict(quality),
+        **asdict(how),
         "versions": {name: version(name) for name in _PACKAGES},
         "code": _code(),
     }
@@ -169,7 +176,7 @@ class _Batch:
     variant: str
     store: RunFile
     progress: Progress
-    quality: Quality = Quality()
+    how: Rendering = Rendering()
     more: More | None = None
 
     def __post_init__(self) -> None:
@@ -269,7 +276,7 @@ class _Batch:
             except InvalidInput as error:
                 self._commit(index, Found(None, {}, str(error)))
                 continue
-            yield _Setting(case, left, self.seed, self.variant, self.quality, self.store.picture(index))
+            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.picture(index))
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
@@ -284,10 +291,10 @@ class _Setting:
     left: deque[tuple[int, int]]
     seed: int
     variant: str
-    quality: Quality
+    how: Rendering
     picture: Picture | None
 
     def task(self, group: int) -> Task:
         """The next task."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
-        return Task(self.case, chunks, self.seed, self.variant, self.picture, self.quality)
+        return Task(self.case, chunks, self.seed, self.variant, self.picture, self.how)

@@ -16,7 +16,7 @@ from threadpoolctl import ThreadpoolController
 import measure
 import planner
 import render
-from render import Quality
+from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Scene
 from validate.campaign import Case
@@ -88,6 +88,15 @@ class Chunk:
 
 
 @dataclass(frozen=True)
+class Rendering:
+    """How noise-free images are made: rays, which effects, and what ``auto`` may leave out."""
+
+    quality: Quality = Quality()
+    effects: str = "auto"
+    tolerance: Tolerance = Tolerance()
+
+
+@dataclass(frozen=True)
 class Task:
     """Chunks of one setting, (number, images) each; without a picture the worker renders it."""
 
@@ -96,7 +105,7 @@ class Task:
     seed: int
     variant: str
     picture: Picture | None = None
-    quality: Quality = Quality()
+    rendering: Rendering = Rendering()
 
 
 @dataclass(frozen=True)
@@ -129,14 +138,14 @@ def _perform(task: Task) -> Found:
         clean = None
         if task.picture is None:
             with _RENDERER:
-                clean = render_setting(task.case, task.variant, task.quality)
+                clean = render_setting(task.case, task.variant, task.rendering)
         image = (task.picture or clean.picture).array()
         return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, count) for k, count in task.chunks})
     except InvalidInput as error:
         return Found(None, {}, str(error))
 
 
-def render_setting(case: Case, variant: str, quality: Quality = Quality()) -> Clean:
+def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
     """Render a setting, and predict with and without its image."""
     clock = _Clock()
     scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
@@ -144,7 +153,7 @@ def render_setting(case: Case, variant: str, quality: Quality = Quality()) -> Cl
     numbers = {price: found.variance_px2 for price, found in prices.items()}
     numbers["value_px"] = prices["calibrated"].value_px
     clock.lap("predict")
-    image = render.image(scene, sensor, light, quality, variant)
+    image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
     clock.lap("render")
     propagated = {}
     for method in methods(scene):
@@ -183,12 +192,10 @@ def measure_chunk(case: Case, image: np.ndarray, seed: int, chunk: int, count: i
     return Chunk(distances, failures, clock.seconds)
 
 
-def effects(scene: Scene) -> list[dict[str, Any]]:
-    """Which effects the renderer simulates for a scene, and why; empty where it does not say."""
-    ask = getattr(render, "effects", None)
-    if not callable(ask):
-        return []
-    return [{"effect": found.effect.name, "on": found.on, "reason": found.reason} for found in ask(scene)]
+def effects(scene: Scene, how: Rendering = Rendering()) -> list[dict[str, Any]]:
+    """Which effects the renderer simulates for a scene's settings, and why."""
+    found = render.choose(scene, how.effects, how.tolerance).decisions
+    return [{"effect": each.effect.name, "on": each.on, "reason": each.reason} for each in found]
 
 
 class _Clock:

@@ -44,7 +44,7 @@ class Decision:
     on : bool
     reason : str
     influence : Influence
-        Estimated bound; exactly zero where the effect cannot matter.
+        Estimated bound; exactly zero where the effect cannot matter, and not estimated where the user decided.
     """
 
     effect: Effect
@@ -105,8 +105,6 @@ def choose(
     InvalidInput
         If an effect is unknown.
     """
-    if wanted == "all":
-        return Choice(scene, frozenset(REGISTER), ())
     if wanted == "auto":
         here = (
             scene if sensor is None else scene.model_copy(update={"settings": (Setting(sensor=sensor, light=light),)})
@@ -114,19 +112,32 @@ def choose(
         decisions = effects(here, tolerance)
         active = frozenset(decision.effect.name for decision in decisions if decision.on)
     else:
-        decisions, active = (), _named(wanted)
+        active = frozenset(REGISTER) if wanted == "all" else named(wanted)
+        decisions = tuple(_asked(effect, effect.name in active) for effect in REGISTER.values())
     reduced = scene
     for name in REGISTER.keys() - active:
         reduced = REGISTER[name].without(reduced)
     return Choice(reduced, active, decisions)
 
 
-def _named(wanted: str | Iterable[str]) -> frozenset[str]:
+def named(wanted: str | Iterable[str]) -> frozenset[str]:
+    """Names of effects, from a list or from text with commas.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such effect.
+    """
     names = frozenset(wanted.split(",") if isinstance(wanted, str) else wanted) - {""}
     unknown = sorted(names - REGISTER.keys())
     if unknown:
         raise InvalidInput(f"effects must be auto, all or some of {', '.join(REGISTER)}, got {unknown[0]!r}")
     return names
+
+
+def _asked(effect: Effect, on: bool) -> Decision:
+    """What the user decided, whose influence is not asked."""
+    return Decision(effect, on, "asked for" if on else "not asked for", NOTHING)
 
 
 def _decide(effect: Effect, scene: Scene, poses: Poses, tolerance: Tolerance) -> Decision:

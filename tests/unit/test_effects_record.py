@@ -2,26 +2,30 @@
 
 from types import SimpleNamespace
 
-import render
-from validate import report, work
+import pytest
+
+from render.effects import REGISTER
+from scenes import InvalidInput
+from validate import report, run, work
+from validate.work import Rendering
 
 
-def test_effects_are_recorded_and_shown(task1, monkeypatch):
-    def effects(scene):
-        assert scene is task1
-        return [SimpleNamespace(effect=SimpleNamespace(name=n), on=n == "fog", reason="dim") for n in ("fog", "rain")]
-
-    monkeypatch.setattr(render, "effects", effects, raising=False)
+def test_effects_are_recorded_and_shown(task1):
     recorded = work.effects(task1)
-    assert recorded == [
-        {"effect": "fog", "on": True, "reason": "dim"},
-        {"effect": "rain", "on": False, "reason": "dim"},
-    ]
-    table = report._effects(SimpleNamespace(fact=lambda _key, _default: {"task1": recorded}))
+    assert {line["effect"]: line["on"] for line in recorded}["floor"] is False
+    table = report._effects(SimpleNamespace(fact=lambda _key, _default: {"task1": recorded[:2]}))
     assert table.columns == ["scene", "effect", "on", "reason"]
-    assert table.rows == [["task1", "fog", "on", "dim"], ["task1", "rain", "off", "dim"]]
+    assert [row[:3] for row in table.rows] == [["task1", "attached_shadow", "on"], ["task1", "cast_shadow", "off"]]
 
 
-def test_a_renderer_that_says_nothing(task1, monkeypatch):
-    monkeypatch.setattr(render, "effects", None, raising=False)
-    assert work.effects(task1) == []
+def test_effects_that_were_asked_for_are_recorded_as_such(task1):
+    every = work.effects(task1, Rendering(effects="all"))
+    assert all(line["on"] for line in every) and len(every) == len(REGISTER)
+    named = {line["effect"]: line["on"] for line in work.effects(task1, Rendering(effects="floor,lens_blur"))}
+    assert {name for name, on in named.items() if on} == {"floor", "lens_blur"}
+
+
+def test_an_unknown_effect_is_refused_before_anything_is_written(task1, tmp_path):
+    with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .* got 'fog'"):
+        run(task1, 2, out=tmp_path / "run", effects="fog")
+    assert not (tmp_path / "run").exists()

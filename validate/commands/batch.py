@@ -12,9 +12,10 @@ from typing import Annotated
 
 import typer
 
+from render import Tolerance
 from scenes import InvalidInput
 from validate import campaign, export
-from validate.commands.common import Json, app, progress, stoppable
+from validate.commands.common import Effects, Json, LeaveOutPx, LeaveOutVariance, app, progress, stoppable
 from validate.cost.goal import check_accuracy, reach, seconds
 from validate.run import run
 from validate.store import RunFile
@@ -42,6 +43,9 @@ def validate_command(
     budget: Annotated[
         str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")
     ] = None,
+    effects: Effects = "auto",
+    bias_px: LeaveOutPx = 0.005,
+    variance: LeaveOutVariance = 0.02,
     log_json: Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -55,14 +59,16 @@ def validate_command(
     loaded = campaign.load(scene)
     directory = out or Path("runs") / loaded.name
     title = f"{loaded.name}: {len(loaded)} settings"
+    simulated = {"effects": effects, "tolerance": Tolerance(bias_px, variance)}
     with stoppable(log_json):
         with nullcontext() if log_json else progress(title) as shown:
             if accuracy is None and limit is None:
-                found, goal = run(loaded, renders, seed, directory, workers, fresh, shown, dask=dask), None
+                found, goal = run(loaded, renders, seed, directory, workers, fresh, shown, dask=dask, **simulated), None
             else:
                 found, goal = reach(
                     loaded, accuracy, limit, seed=seed, out=directory, workers=workers, fresh=fresh, dask=dask,
                     say=lambda line: print(line, file=sys.stderr), progress=shown, started=started,
+                    **simulated,
                 )  # fmt: skip
         _write(loaded, found, directory)
     if goal:

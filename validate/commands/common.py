@@ -24,6 +24,15 @@ SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
 LightPose = Annotated[str, typer.Option(metavar="P,A", help="Light pose: polar angle and azimuth, degrees.")]
 
+Effects = Annotated[
+    str, typer.Option("--effects", metavar="WHICH", help="What is simulated: auto, all, or names with commas between.")
+]
+LeaveOutPx = Annotated[
+    float, typer.Option("--leave-out-px", help="auto leaves out what changes the mean distance by at most this, px.")
+]
+LeaveOutVariance = Annotated[
+    float, typer.Option("--leave-out-variance", help="... and its variance by at most this part.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 

@@ -11,7 +11,7 @@ from rich.table import Table
 import scenes
 from render.effects import Decision, Effect, Tolerance, effects
 from render.effects.base import RANDOM
-from validate.commands.common import Json, SceneName, app, progress, say
+from validate.commands.common import Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
 from validate.effects_check import RENDERED, Switched, check
 from validate.table import console
 
@@ -22,8 +22,8 @@ def effects_command(
     check_them: Annotated[
         bool, typer.Option("--check", help="Render with each left-out effect, and with all, and compare.")
     ] = False,
-    bias_px: Annotated[float, typer.Option(help="Change of the distance that may be left out, px.")] = 0.005,
-    variance: Annotated[float, typer.Option(help="Relative change of its variance that may be left out.")] = 0.02,
+    bias_px: LeaveOutPx = 0.005,
+    variance: LeaveOutVariance = 0.02,
     as_json: Json = False,
 ) -> None:
     """Which effects a scene calls for, why, their influence and cost. Exit status 1 if --check contradicts."""

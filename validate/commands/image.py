@@ -11,9 +11,21 @@ import typer
 import measure
 import render
 import scenes
+from render import Tolerance
 from scenes import InvalidInput
 from validate import picture_file
-from validate.commands.common import Json, LightPose, SceneName, Sensor, app, parse_pose, say
+from validate.commands.common import (
+    Effects,
+    Json,
+    LeaveOutPx,
+    LeaveOutVariance,
+    LightPose,
+    SceneName,
+    Sensor,
+    app,
+    parse_pose,
+    say,
+)
 
 
 @app.command("render")
@@ -23,11 +35,15 @@ def render_command(
     light: LightPose,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
     noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
+    effects: Effects = "auto",
+    bias_px: LeaveOutPx = 0.005,
+    variance: LeaveOutVariance = 0.02,
     as_json: Json = False,
 ) -> None:
     """Render one image of a scene."""
     loaded = scenes.load(scene)
-    image = render.image(loaded, parse_pose("--sensor", sensor), parse_pose("--light", light))
+    poses, tolerance = (parse_pose("--sensor", sensor), parse_pose("--light", light)), Tolerance(bias_px, variance)
+    image = render.image(loaded, *poses, effects=effects, tolerance=tolerance)
     if noise_seed is not None:
         image = render.expose(image, loaded.noise, np.random.default_rng(noise_seed), 1)[0]
     picture_file.write(output, image)

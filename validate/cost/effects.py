@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import import_module, util
-
 from scenes import InvalidInput
 from validate.campaign import Case
 from validate.cost.knob import Knob
-
-_CHECK = "validate.effects_check"
+from validate.effects_check import RENDERED, check
 
 
 def effects_knob(case: Case, variant: str) -> Knob:
@@ -17,14 +14,11 @@ def effects_knob(case: Case, variant: str) -> Knob:
     Raises
     ------
     InvalidInput
-        If the renderer has no effects to choose, or is so slow that they would take longer than all other knobs.
+        If the renderer is so slow that they would take longer than all other knobs.
     """
-    if util.find_spec(_CHECK) is None:
-        raise InvalidInput("effects must be known to the renderer, got a renderer that has none")
     if variant.startswith("scalar"):
         raise InvalidInput(f"effects must be timed in a compiled variant of Mitsuba, got {variant}")
-    check = import_module(_CHECK)
-    found = check.check(case.scene, settings=(case.setting,), only=check.RENDERED)
+    found = check(case.scene, settings=(case.setting,), only=RENDERED)
     rows = tuple(
         (s.name, s.seconds, s.seconds / s.seconds_auto, abs(s.bias_px), s.resolution_px, abs(s.variance),
          s.resolution_variance)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from render import Quality
+from render import Quality, Tolerance
 from scenes import InvalidInput
 from validate.campaign import Campaign
 from validate.cost.interval import LEAST, wanted
@@ -20,7 +20,7 @@ from validate.cost.trial import trial
 from validate.result import Validation
 from validate.run import run
 from validate.store import RunFile
-from validate.work import methods
+from validate.work import Rendering, methods
 
 _FIRST = 0.25  # part of the images that are taken before the first look at the clock
 _FINE = 0.05  # of the accuracy: a render of this sigma adds half a per cent to the half-width
@@ -110,6 +110,8 @@ def reach(
     progress=None,
     dask: str | None = None,
     started: float | None = None,
+    effects: str = "auto",
+    tolerance: Tolerance = Tolerance(),
 ) -> tuple[Validation, Reached]:
     """Run to an accuracy, or for a time.
 
@@ -124,6 +126,8 @@ def reach(
         Given one line about what was chosen, before the run.
     started : float, optional
         When the budget began to run, `time.perf_counter`; now when not given.
+    effects, tolerance
+        What is simulated (`validate.run`).
 
     Raises
     ------
@@ -132,7 +136,8 @@ def reach(
     """
     started = time.perf_counter() if started is None else started
     tried = 3 if budget is None or budget > 30 else 2
-    model = trial(campaign, seed, workers, tried, _FINE * (accuracy or _USUAL))
+    how = Rendering(effects=effects, tolerance=tolerance)
+    model = trial(campaign, seed, workers, tried, _FINE * (accuracy or _USUAL), how=how)
     if accuracy is not None:
         choice = model.for_accuracy(check_accuracy(accuracy))
         more = _Narrower(campaign, model, choice, accuracy)
@@ -143,7 +148,10 @@ def reach(
         first = max(LEAST, int(_FIRST * choice.renders))
     say(f"{choice.text}; trial {model.seconds:.1f} s")
     first, quality = _begun(out, fresh) or (first, choice.rendered.quality)
-    found = run(campaign, first, seed, out, workers, fresh, progress, dask=dask, quality=quality, more=more)
+    found = run(
+        campaign, first, seed, out, workers, fresh, progress,
+        dask=dask, quality=quality, more=more, effects=effects, tolerance=tolerance,
+    )  # fmt: skip
     asked, unit = (accuracy, "half-width") if budget is None else (budget, "seconds")
     widths, counts = _widths(found, model, choice)
     return found, Reached(asked, unit, model, choice, widths, counts, time.perf_counter() - started)

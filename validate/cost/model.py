@@ -149,7 +149,7 @@ class Choice:
         )
 
 
-KNOB = "edge_samples" if hasattr(Quality(), "edge_samples") else "samples"  # what the noise at an edge depends on
+KNOB = "edge_samples"  # what the noise at an edge depends on
 
 
 def qualities(*samples: int) -> tuple[Quality, ...]:

@@ -18,6 +18,7 @@ from scenes import InvalidInput, Pose
 from validate import pool, work
 from validate.campaign import Campaign, Case
 from validate.cost.model import CostModel, Rendered, qualities
+from validate.work import Rendering
 
 SAMPLES = (4, 16, 64)
 _IMAGES = 100  # a setting
@@ -33,6 +34,7 @@ def trial(
     settings: int = 3,
     fine: float = 0.0,
     report: Report | None = None,
+    how: Rendering = Rendering(),
 ) -> CostModel:
     """Measure what the run of a campaign will cost, on a few settings spread over it.
 
@@ -49,6 +51,8 @@ def trial(
         Relative sigma of a render's variance that is small enough: more rays are not tried.
     report : callable, optional
         As report(what, done, total).
+    how : Rendering
+        Which effects are simulated.
 
     Raises
     ------
@@ -57,11 +61,11 @@ def trial(
     """
     imports, started = time.process_time(), time.perf_counter()  # so far this process has done little but import
     variant, cases = variants.choose(), spread_cases(campaign, settings)
-    warm = _timed(lambda: work.render_setting(cases[0], variant))
+    warm = _timed(lambda: work.render_setting(cases[0], variant, how))
     found = []
     for done, case in enumerate(cases):
         (report or (lambda *_: None))("trial", done, len(cases))
-        found.append(_Tried(case, variant, seed))
+        found.append(_Tried(case, variant, seed, how))
     good = [tried for tried in found if tried.usable]
     if not good:
         raise InvalidInput(f"{campaign.name}: settings must be measurable for a trial, got {found[0].status}")
@@ -110,9 +114,9 @@ def spread_cases(campaign: Campaign, count: int) -> list[Case]:
 class _Tried:
     """One setting of the trial."""
 
-    def __init__(self, case: Case, variant: str, seed: int) -> None:
-        self.case, self.variant, self.seed = case, variant, seed
-        clean = work.render_setting(case, variant)
+    def __init__(self, case: Case, variant: str, seed: int, how: Rendering) -> None:
+        self.case, self.variant, self.seed, self.how = case, variant, seed, how
+        clean = work.render_setting(case, variant, how)
         self.seconds = sum(clean.seconds.values())
         self.image = clean.picture.array()
         self.found = self._propagate(self.image, case.setting.sensor)
@@ -125,9 +129,9 @@ class _Tried:
     def rendered(self, quality: Quality) -> tuple[float, float]:
         """Seconds of a render, and relative sigma of the predicted variance from two seeds."""
         began, variances = time.perf_counter(), []
-        sensor, light = self.case.setting.sensor, self.case.setting.light
+        sensor = self.case.setting.sensor
         for seed in (1, 2):
-            image = render.image(self.case.scene, sensor, light, replace(quality, seed=seed), self.variant)
+            image = self._image(sensor, replace(quality, seed=seed))
             if seed == 1:
                 seconds = time.perf_counter() - began
             variances.append(self._propagate(image, sensor).variance_px2)
@@ -139,7 +143,7 @@ class _Tried:
         for shift in (0.0, *_SHIFT_DEG):
             moved = Pose(abs(sensor.polar_deg + shift), sensor.azimuth_deg)
             try:
-                image = self.image if not shift else render.image(self.case.scene, moved, light, variant=self.variant)
+                image = self.image if not shift else self._image(moved, self.how.quality)
                 smooth = planner.predict(self.case.scene, moved, light).variance_px2
                 logs.append(math.log(self._propagate(image, moved).variance_px2 / smooth))
             except (InvalidInput, ValueError):
@@ -164,6 +168,10 @@ class _Tried:
         pair = np.cov(values[good], linear[good])
         unexplained = max(0.0, 1 - pair[0, 1] ** 2 / (pair[0, 0] * pair[1, 1]))
         return float(pair[0, 0] / pair[1, 1] - 1), 2 * math.sqrt(unexplained / (good.sum() - 1))
+
+    def _image(self, sensor: Pose, quality: Quality) -> np.ndarray:
+        how, light = self.how, self.case.setting.light
+        return render.image(self.case.scene, sensor, light, quality, self.variant, how.effects, how.tolerance)
 
     def _propagate(self, image: np.ndarray, sensor: Pose) -> measure.Propagated:
         return measure.propagate(image, self.case.scene, sensor)
