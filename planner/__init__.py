@@ -3,6 +3,7 @@
 from planner.alternating import alternate
 from planner.constraints import Constraints
 from planner.exhaustive import exhaustive
+from planner.jitter import PoseSpread, pose_spread
 from planner.maps import variance_map
 from planner.outline import outline
 from planner.plan import Candidate, Plan, plan
@@ -12,7 +13,7 @@ from planner.robust import Robust, Tolerances, robust
 from planner.viewing import ViewingSpace, local_minima
 
 __all__ = [
-    "Candidate", "Constraints", "EdgePrediction", "Plan", "Prediction", "Robust", "Tolerances", "ViewingSpace",
-    "alternate", "exhaustive", "local_minima", "outline", "plan", "predict", "required_edges", "robust",
-    "variance_map", "variances",
+    "Candidate", "Constraints", "EdgePrediction", "Plan", "PoseSpread", "Prediction", "Robust", "Tolerances",
+    "ViewingSpace", "alternate", "exhaustive", "local_minima", "outline", "plan", "pose_spread", "predict",
+    "required_edges", "robust", "variance_map", "variances",
 ]  # fmt: skip

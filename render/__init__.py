@@ -4,5 +4,6 @@ from render.effects import Tolerance, choose, effects
 from render.effects.pose import shaken
 from render.image import Quality, image
 from render.sensor import expose, variance
+from render.shots import shots
 
-__all__ = ["Quality", "Tolerance", "choose", "effects", "expose", "image", "shaken", "variance"]
+__all__ = ["Quality", "Tolerance", "choose", "effects", "expose", "image", "shaken", "shots", "variance"]

@@ -2,65 +2,77 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from planner import outline
+from render.rays import Rays
+from scenes import Pose, Scene
+
 _STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 _TILE = 8  # fine pixels
-_AT_ONCE = 1 << 25  # rays in one call, which bounds the memory
 
 
-def crossed(fine: np.ndarray) -> np.ndarray:
-    """Fine pixels that differ from one of their eight neighbours, as a mask.
+def crossed(fine: np.ndarray, reach: int = 0) -> np.ndarray:
+    """Fine pixels that differ from one of their eight neighbours, as a mask; with others within ``reach`` of them.
 
     >>> crossed(np.array([[0.0, 0, 0, 1, 1, 1]])).astype(int)
     array([[0, 0, 1, 1, 0, 0]])
     """
     span = maximum_filter(fine, 3, mode="nearest") - minimum_filter(fine, 3, mode="nearest")
-    return span > _STEP * max(float(fine.max()), np.finfo(float).tiny)
+    marked = span > _STEP * max(float(fine.max()), np.finfo(float).tiny)
+    return maximum_filter(marked, 2 * reach + 1) if reach else marked
 
 
-def refine(
-    mitsuba: Any,
-    scene: Any,
-    sensor: Callable[[int, tuple[slice, slice]], dict],
-    fine: np.ndarray,
-    samples: int,
-    seed: int,
-) -> np.ndarray:
-    """The image with its crossed fine pixels rendered again, ``samples`` (a square number) stratified rays each.
+def near_edges(scene: Scene, sensor: Pose, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
+    """Fine pixels of the crop that the task's straight edges are located from, and their surroundings, as a mask."""
+    locator, shape = scene.locator, [(part.stop - part.start) // supersample for part in crop]
+    rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
+    pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
+    found = np.zeros(shape, bool)
+    for start, stop in outline(scene, np.array(list(sensor))).ends:
+        along = stop - start
+        part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
+        away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)
+        found |= away <= locator.window_px + 4 * locator.scale_px + 1
+    return found.repeat(supersample, 0).repeat(supersample, 1)
 
-    Compiled variants trace all rays as one array. A scalar one can only render rectangles: tiles that hold a crossed
-    pixel.
+
+def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:
+    """The image with its marked fine pixels rendered again, ``samples`` (a square number) stratified rays each.
 
     Parameters
     ----------
     scene : mitsuba.Scene
-    sensor : callable
-        ``sensor(samples, crop)`` describes the sensor for rows and columns of ``fine``.
+        Of a compiled variant, which traces all rays as one array.
+    rays : Rays
     fine : ndarray
         The image as rendered so far.
-    samples, seed : int
+    marked : ndarray of bool
+    samples : int
     """
-    if "scalar" in mitsuba.variant():
-        return _tiles(mitsuba, scene, sensor, fine, samples, seed)
-    rows, columns = np.nonzero(crossed(fine))
-    result, share = fine.copy(), max(_AT_ONCE // samples, 1)
-    for first in range(0, rows.size, share):
-        part = slice(first, first + share)
-        result[rows[part], columns[part]] = _radiance(
-            mitsuba, scene, rows[part], columns[part], fine.shape, samples, seed + 1 + first
-        )
+    result, places = fine.copy(), np.nonzero(marked)
+    result[places] = rays.radiance(scene, *places, fine.shape, samples)
     return result
 
 
-def _tiles(mitsuba, scene, sensor, fine: np.ndarray, samples: int, seed: int) -> np.ndarray:
-    """The image with every tile that holds a crossed pixel rendered again."""
-    result, marked = fine.copy(), crossed(fine)
+def refine_tiles(
+    mitsuba: Any,
+    scene: Any,
+    sensor: Callable[[int, tuple[slice, slice]], dict],
+    fine: np.ndarray,
+    marked: np.ndarray,
+    samples: int,
+    seed: int,
+) -> np.ndarray:
+    """As `refine`, by a scalar variant, which can only render rectangles: tiles that hold a marked pixel.
+
+    ``sensor(samples, crop)`` describes the sensor for rows and columns of ``fine``.
+    """
+    result = fine.copy()
     for top in range(0, fine.shape[0], _TILE):
         for left in range(0, fine.shape[1], _TILE):
             tile = slice(top, min(top + _TILE, fine.shape[0])), slice(left, min(left + _TILE, fine.shape[1]))
@@ -69,25 +81,3 @@ def _tiles(mitsuba, scene, sensor, fine: np.ndarray, samples: int, seed: int) ->
                 view = mitsuba.load_dict(sensor(samples, tile))
                 result[tile] = np.array(mitsuba.render(scene, sensor=view, seed=seed), float)[:, :, 0]
     return result
-
-
-def _radiance(mitsuba, scene, rows, columns, shape, samples: int, seed: int) -> np.ndarray:
-    """Mean radiance of single fine pixels of the crop, shape (n,)."""
-    import drjit as dr
-
-    side = math.isqrt(samples)
-    sensor, ray_index = scene.sensors()[0], dr.arange(mitsuba.UInt32, rows.size * samples)
-    pixel, stratum = ray_index // samples, ray_index % samples
-    sampler = mitsuba.load_dict({"type": "independent"})
-    sampler.seed(seed, rows.size * samples)
-    x, y = (dr.gather(mitsuba.Float, mitsuba.Float(axis.astype(np.float32)), pixel) for axis in (columns, rows))
-    jitter = sampler.next_2d()
-    place = mitsuba.Point2f(
-        (x + (mitsuba.Float(stratum % side) + jitter.x) / side) / shape[1],
-        (y + (mitsuba.Float(stratum // side) + jitter.y) / side) / shape[0],
-    )
-    ray, weight = sensor.sample_ray(0.0, sampler.next_1d(), place, sampler.next_2d())
-    radiance, _, _ = scene.integrator().sample(scene, sampler, ray)
-    total = dr.zeros(mitsuba.Float, rows.size)
-    dr.scatter_reduce(dr.ReduceOp.Add, total, (weight * radiance)[0], pixel)
-    return np.array(total, float) / samples

@@ -13,9 +13,9 @@ from render.mesh import mesh
 from render.reflectance import indices
 from scenes import Floor, Pose, Scene
 
-BOUNCES = 4  # surfaces a ray may meet with interreflection; the fifth would add less than reflectance^4 of the first
+BOUNCES = 8  # surfaces a ray may meet with interreflection; the fifth would add less than reflectance^4 of the first
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
-_TINY_LIGHT = 1e-2  # of the distance: in single precision Mitsuba samples a smaller sphere wrongly
+_SMALL_LIGHT = 1e-2  # of the distance: in single precision Mitsuba samples a smaller sphere wrongly, but not a disc
 CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
 
 
@@ -60,7 +60,7 @@ def description(
 
 def light_radius(scene: Scene, active: frozenset[str]) -> float:
     """Radius of the light as it is simulated, cm."""
-    return max(scene.light.radius, _TINY_LIGHT * scene.light.distance) if "light_size" in active else 0.0
+    return scene.light.radius if "light_size" in active else 0.0
 
 
 def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
@@ -146,17 +146,21 @@ def _light(mitsuba, scene: Scene, light: Pose, active) -> dict:
 
     Such a surface sends albedo / pi of its irradiance, which is intensity / distance^2.
     """
-    position = scene.light.distance * direction(np.array(list(light)))
-    intensity = math.pi * scene.camera.exposure * scene.light.distance**2
-    if "light_size" not in active:
+    position = (scene.light.distance * direction(np.array(list(light)))).tolist()
+    intensity, radius = math.pi * scene.camera.exposure * scene.light.distance**2, light_radius(scene, active)
+    if radius == 0:
         value = {"type": "spectrum", "value": intensity}
-        return {"type": "point", "position": position.tolist(), "intensity": value}
-    radius = light_radius(scene, active)
+        return {"type": "point", "position": position, "intensity": value}
     radiance = {"type": "spectrum", "value": intensity / (math.pi * radius**2)}
+    shape = {"type": "sphere", "center": position, "radius": radius}
+    if radius < _SMALL_LIGHT * scene.light.distance:
+        transform, up = mitsuba.ScalarTransform4f(), frame(np.array(list(light))).right.tolist()
+        shape = {
+            "type": "disk",
+            "to_world": transform.look_at(origin=position, target=[0, 0, 0], up=up).scale(radius),
+        }
     return {
-        "type": "sphere",
-        "center": position.tolist(),
-        "radius": radius,
+        **shape,
         "bsdf": {"type": "diffuse", "reflectance": {"type": "spectrum", "value": 0.0}},
         "emitter": {"type": "area", "radiance": radiance},
     }

@@ -12,11 +12,12 @@ import numpy as np
 
 from planner.view import depth, project
 from render import variant as variants
-from render.adaptive import refine
-from render.build import CUSTOM, description, view
+from render.adaptive import crossed, near_edges, refine, refine_tiles
+from render.build import BOUNCES, CUSTOM, description, view
 from render.effects import Tolerance, choose
 from render.optics import blur_and_bin, distort, distorted
 from render.precision import check_precision
+from render.rays import Rays
 from scenes import InvalidInput, Pose, Scene
 
 STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
@@ -36,8 +37,8 @@ class Quality:
         Rays of a fine pixel that an edge crosses, a square number; 256 in compiled variants and 64 in scalar ones when
         not given.
     random_samples : int, optional
-        Rays of each fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a light of
-        finite size), a square number; 64 and 16 when not given.
+        Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
+        light of finite size), a square number; 16 when not given.
     seed : int
 
     In a scalar variant the paper's reflectance runs as interpreted Python, about 20 times slower: there a fine pixel
@@ -136,24 +137,32 @@ def _defocus(scene: Scene, sensor: Pose) -> float:
 
 def _fine(scene, sensor, light, active, crop, quality: Quality, variant: str) -> np.ndarray:
     """Image of fine pixels, before lens and pixel aperture."""
-    mitsuba, scalar = variants.use(variant), variant.startswith("scalar")
-    random, interpreted = bool(active & STOCHASTIC), scalar and bool(active & CUSTOM)
-    samples = quality.random_samples or (16 if scalar else 64) if random else 1 if interpreted else quality.samples
-    size = scene.camera.width * quality.supersample, scene.camera.height * quality.supersample
-    loaded = mitsuba.load_dict(description(mitsuba, scene, sensor, light, active, size, crop, samples), parallel=False)
-    fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
-    if random:
-        return fine
+    mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
+    sharp, interpreted = active - STOCHASTIC, scalar and bool(active & CUSTOM)
+    size = scene.camera.width * k, scene.camera.height * k
 
-    def part(samples: int, tile: tuple[slice, slice]) -> dict:
+    def load(active, samples):
+        parts = description(mitsuba, scene, sensor, light, active, size, crop, samples)
+        return mitsuba.load_dict(parts, parallel=False)
+
+    def tile(samples: int, tile: tuple[slice, slice]) -> dict:
         shifted = tuple(slice(a.start + b.start, a.start + b.stop) for a, b in zip(crop, tile, strict=True))
         return view(mitsuba, scene, sensor, active, size, shifted, samples)
 
-    return refine(
-        mitsuba,
-        loaded,
-        part,
-        fine,
-        quality.edge_samples or (16 if interpreted else 64 if scalar else 256),
-        quality.seed,
-    )
+    loaded = load(sharp, 1 if interpreted else quality.samples)
+    fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
+    marked = crossed(fine, math.ceil(k * _defocus(scene, sensor)))
+    many = quality.edge_samples or (16 if interpreted else 64 if scalar else 256)
+    few = quality.random_samples or 16
+    bounces = BOUNCES - 1 if "interreflection" in active else 0
+    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed)
+    if sharp != active:
+        loaded = load(active, few)
+        marked |= near_edges(scene, sensor, crop, k)
+        if scalar:
+            fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
+        else:
+            fine = refine(loaded, rays, fine, np.ones_like(marked), few)
+    if scalar:
+        return refine_tiles(mitsuba, loaded, tile, fine, marked, many, quality.seed)
+    return refine(loaded, rays, fine, marked, many)

@@ -6,6 +6,7 @@ import functools
 import threading
 import time
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from validate.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time
+Shots = Callable[[np.random.Generator, int], np.ndarray]  # stacks of pictures
 _RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
 
 
@@ -140,9 +142,23 @@ def _perform(task: Task) -> Found:
             with _RENDERER:
                 clean = render_setting(task.case, task.variant, task.rendering)
         image = (task.picture or clean.picture).array()
-        return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, count) for k, count in task.chunks})
+        shots = _shots(task)
+        return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, n, shots) for k, n in task.chunks})
     except InvalidInput as error:
         return Found(None, {}, str(error))
+
+
+def _shots(task: Task) -> Shots | None:
+    """Takes pictures from poses that are set anew each time; None where that does not matter."""
+    scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
+    if "pose_jitter" not in render.choose(scene, how.effects, how.tolerance, sensor, light).active:
+        return None
+
+    def take(rng: np.random.Generator, count: int) -> np.ndarray:
+        with _RENDERER:
+            return render.shots(scene, sensor, light, rng, count, how.quality, task.variant, how.effects, how.tolerance)
+
+    return take
 
 
 def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
@@ -155,16 +171,22 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     clock.lap("predict")
     image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
     clock.lap("render")
+    chosen = render.choose(scene, how.effects, how.tolerance, sensor, light)
+    spread = float(planner.pose_spread(chosen.scene, np.array([list(sensor)])).variance[0])
     propagated = {}
     for method in methods(scene):
         found = measure.propagate(image, scene, sensor, light, method.locator, method.threshold)
-        propagated[method.name] = found.variance_px2, found.value_px, found.status
+        propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
     clock.lap("propagate")
     return Clean(Picture.of(image), propagated, numbers, clock.seconds)
 
 
-def measure_chunk(case: Case, image: np.ndarray, seed: int, chunk: int, count: int) -> Chunk:
+def measure_chunk(
+    case: Case, image: np.ndarray, seed: int, chunk: int, count: int, shots: Shots | None = None
+) -> Chunk:
     """Expose ``count`` images of a setting and measure each with every method.
+
+    ``shots`` takes the pictures where exposing the one noise-free image is not enough.
 
     The random numbers depend on seed, setting, chunk and batch alone, so a run gives the same numbers in any order and
     with any number of workers, and a longer run begins with the shorter one's.
@@ -177,7 +199,8 @@ def measure_chunk(case: Case, image: np.ndarray, seed: int, chunk: int, count: i
     parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
     for batch, first in enumerate(range(0, count, _BATCH)):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
-        pictures = render.expose(image, scene.noise, rng, min(_BATCH, count - first), where)
+        many = min(_BATCH, count - first)
+        pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
         clock.lap("expose")
         for method in methods(scene):
             found = measure.distance(pictures, scene, sensor, None, method.locator, method.threshold)

@@ -129,7 +129,7 @@ class LightSize(Effect):
     name = "light_size"
     cost = 11.0
     random = True
-    switch = "a sphere instead of a point"
+    switch = "a sphere or a disc instead of a point"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
         return "the light is a point" if scene.light.radius == 0 else None
@@ -143,7 +143,7 @@ class LightSize(Effect):
         found = sides(scene, poses)
         towards = _light_positions(scene, poses)[:, None, None, None] - found.points[:, None]
         sine = np.einsum("sefni,efi->sefn", towards, found.normals) / np.linalg.norm(towards, axis=-1)
-        if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles:
+        if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
             return EVERYTHING
         share = 2 * angle**2 + (0 if scene.material.is_diffuse else (angle / scene.material.roughness) ** 2)
         moved = np.abs(found.shift(total_variance(scene))).max(-1) * share

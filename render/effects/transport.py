@@ -17,14 +17,14 @@ class CastShadow(Effect):
     switch = "obstacles in the scene; every hit is tested against the light anyway, so it costs nothing"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
-        if scene.obstacles:
+        if _bodies(scene) or (scene.floor is not None and scene.floor.reflectance > 0):
             return None
-        if scene.floor is None or scene.floor.reflectance == 0:
-            return "one convex body before darkness: nothing to fall on"
-        return None
+        return "one convex body before darkness: nothing to fall on"
 
     def influence(self, scene: Scene, poses: Poses) -> Influence:
-        """Everything where an obstacle hides a required edge from the light; the floor's own step otherwise."""
+        """Everything where a body hides a required edge from the light; the floor's own step otherwise."""
+        if not scene.solid.is_convex:
+            return EVERYTHING
         lights = scene.light.distance * direction(poses.lights)
         points = sides(scene, poses).points.reshape(-1, 3)
         for obstacle in scene.obstacles:
@@ -64,26 +64,29 @@ class Interreflection(Effect):
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
-        if scene.obstacles or (scene.floor is not None and scene.floor.reflectance > 0):
+        if _bodies(scene) or (scene.floor is not None and scene.floor.reflectance > 0):
             return None
         return "one convex body before darkness: no surface sees another"
 
     def influence(self, scene: Scene, poses: Poses) -> Influence:
         """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height."""
-        own, albedo = sides(scene, poses), _albedo(scene)
+        own, albedo, bodies = sides(scene, poses), _albedo(scene), _bodies(scene)
         reflectance = scene.floor.reflectance if scene.floor else 0.0
         down = np.broadcast_to(((1 - own.normals[..., 2]) / 2)[..., None], own.levels.shape[1:])
         brightest = scene.camera.exposure * _gain(scene)
-        rest = [_form_factor(obstacle.solid, own.points, own.normals) for obstacle in scene.obstacles]
+        rest = [_form_factor(body, own.points, own.normals) for body in bodies]
         to_solids = np.minimum(sum(rest), 1.0) if rest else np.zeros(own.levels.shape[1:])
-        multiple = 1 / (1 - albedo * max(reflectance, albedo if scene.obstacles else 0.0) * 0.5)
+        multiple = 1 / (1 - albedo * max(reflectance, albedo if bodies else 0.0) * 0.5)
         faces = albedo * (down * reflectance + to_solids * albedo) * brightest
         behind = reflectance * 0.5 * albedo * brightest
         levels = multiple * (faces.max(1) + behind)
-        near = min(
-            [_clearance(own.points, obstacle.solid) for obstacle in scene.obstacles] + _above_floor(scene, own.points)
-        )
+        near = min([_clearance(own.points, body) for body in bodies] + _above_floor(scene, own.points))
         return added_light(scene, poses, np.broadcast_to(levels, own.contrast.shape), max(near, 1e-3))
+
+
+def _bodies(scene: Scene) -> list[Solid]:
+    """What stands in the way of light: the obstacles, and the object itself if it is hollow."""
+    return [obstacle.solid for obstacle in scene.obstacles] + ([] if scene.solid.is_convex else [scene.solid])
 
 
 def _albedo(scene: Scene) -> float:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-import render
 from planner.reflectance import fresnel, reflected
 from render import bsdf, variant
 from render.reflectance import NUMPY, Index, brightness, indices
@@ -122,53 +121,9 @@ def test_the_spectrum_weighs_the_indices(task1):
     assert [i.n for i in index] == [1.52, 1.48]
 
 
-def test_rendered_face_has_the_formulas_intensity(task1):
-    """A pixel of the top face in glossy and in polarised light, against numpy, to 2e-3 (its rays are few)."""
-    from planner.view import direction, project
-
-    small = task1.camera.model_copy(update={"width": 16, "height": 16, "focal_px": 80.0, "blur_px": 0.1})
-    for update in ({}, {"analyser_deg": 30.0}):
-        scene = task1.model_copy(update={"material": METAL, "camera": small.model_copy(update=update)})
-        if update:
-            scene = scene.model_copy(update={"light": scene.light.model_copy(update={"polarisation_deg": 60.0})})
-        pose, lamp = np.array([40.0, 225.0]), np.array([30.0, 60.0])
-        point = np.array([6.0, 3.5, 2.5])
-        x, y = np.rint(project(point[None], pose, small)[0]).astype(int)
-        point = _behind(small, pose, np.array([x, y]), 2.5)
-        picture = render.image(scene, pose, lamp, render.Quality(3, 4, 4)) - 20
-        away = [100 * direction(angles) - point for angles in (lamp, pose)]
-        distance = np.linalg.norm(away[0])
-        light, sensor = (a / np.linalg.norm(a) for a in away)
-        axes = _axes(scene, pose, lamp, light, sensor)
-        expected = 200 * seen(METAL, light, sensor, *axes) * (100 / distance) ** 2
-        assert picture[y, x] == pytest.approx(expected, rel=2e-3)
-
-
-def _behind(camera, pose, pixel, height):
-    from planner.view import frame
-
-    axes = frame(pose)
-    u, v = (pixel - (np.array([camera.width, camera.height]) - 1) / 2) / camera.focal_px
-    direction = axes.forward + u * axes.right + v * axes.down
-    start = -camera.distance * axes.forward
-    return start + direction * (height - start[2]) / direction[2]
-
-
-def _axes(scene, pose, lamp, light, sensor):
-    from render.build import polariser_axes
-    from render.reflectance import polarised_across
-    from scenes import Pose
-
-    found = polariser_axes(scene, Pose(*pose.tolist()), Pose(*lamp.tolist()))
-    return [
-        None if a is None else polarised_across(NUMPY, tuple(a), tuple(b))
-        for a, b in zip(found, (light, sensor), strict=True)
-    ]
-
-
 def test_polarised_light_is_known_by_the_size_it_is_simulated_with(task1):
-    """A light that `all` makes 1 cm large still swings: its angle is that of the simulated sphere."""
     from render.build import light_radius
 
-    assert light_radius(task1, frozenset({"light_size"})) == 1.0
-    assert light_radius(task1, frozenset()) == 0.0
+    large = task1.model_copy(update={"light": task1.light.model_copy(update={"radius": 0.4})})
+    assert light_radius(large, frozenset({"light_size"})) == 0.4
+    assert light_radius(large, frozenset()) == light_radius(task1, frozenset({"light_size"})) == 0.0

@@ -1,0 +1,136 @@
+"""Rays of single fine pixels, traced as one array in a compiled variant of Mitsuba.
+
+Where a ray goes within its fine pixel is random and independent. All that is random behind that (place on the aperture
+and on the light, directions of reflected light) is the same in every pixel: a table of low-discrepancy points, of which
+each fine pixel of a pixel has its own block. What such a table gets wrong it gets wrong nearly alike on both sides of
+an edge and all along it, and in two renders of the same seed that differ in an effect.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+_AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
+_DIMENSIONS = 4  # of a reflection: where on the light, which way to the next surface
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Random numbers of an image's rays.
+
+    Attributes
+    ----------
+    mitsuba : module
+        With a compiled variant set.
+    supersample : int
+        Fine pixels that divide a pixel, each way.
+    most : int
+        Rays of a fine pixel, at most.
+    bounces : int
+        Surfaces that light may meet before the one that is seen.
+    seed : int
+    """
+
+    mitsuba: Any
+    supersample: int
+    most: int
+    bounces: int
+    seed: int
+
+    def radiance(
+        self, scene: Any, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int], samples: int
+    ) -> np.ndarray:
+        """Mean radiance of fine pixels of the sensor's crop.
+
+        Parameters
+        ----------
+        scene : mitsuba.Scene
+            With one sensor.
+        rows, columns : ndarray of int, shape (n,)
+        shape : tuple of int
+            Rows and columns of the crop.
+        samples : int
+            Rays a fine pixel, a square number.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        share = max(_AT_ONCE // samples, 1)
+        parts = [slice(first, first + share) for first in range(0, rows.size, share)]
+        found = [self._part(scene, rows[part], columns[part], shape, samples, part.start) for part in parts]
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def _part(self, scene, rows, columns, shape, samples: int, start: int) -> np.ndarray:
+        import drjit as dr
+
+        mi, k, side = self.mitsuba, self.supersample, math.isqrt(samples)
+        index = dr.arange(mi.UInt32, rows.size * samples)
+        pixel, number = index // samples, index % samples
+        cells = (rows % k) * k + columns % k
+        cell, x, y = (dr.gather(kind, kind(values), pixel) for kind, values in (
+            (mi.UInt32, cells.astype(np.uint32)), (mi.Float, columns.astype(np.float32)),
+            (mi.Float, rows.astype(np.float32)),
+        ))  # fmt: skip
+        stratum = dr.gather(mi.UInt32, mi.UInt32(self._strata(samples)), cell * samples + number)
+        point = cell * self._block + number
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(self.seed + 1 + start, rows.size * samples)
+        jitter = sampler.next_2d()
+        place = mi.Point2f(
+            (x + (mi.Float(stratum % side) + jitter.x) / side) / shape[1],
+            (y + (mi.Float(stratum // side) + jitter.y) / side) / shape[0],
+        )
+        ray, weight = scene.sensors()[0].sample_ray(0.0, 0.5, place, self._pair(point, 0))
+        radiance = weight[0] * self._follow(scene, ray, point)
+        return np.array(dr.block_sum(radiance, samples), float) / samples
+
+    def _follow(self, scene, ray, point):
+        """Light that comes along rays, the light itself left out: from the first surface, and by way of others."""
+        import drjit as dr
+
+        mi, context = self.mitsuba, self.mitsuba.BSDFContext()
+        total, passed = dr.zeros(mi.Float, dr.width(point)), mi.Float(1.0)
+        hit = scene.ray_intersect(ray)
+        for bounce in range(self.bounces + 1):
+            alive, column = hit.is_valid(), 2 + _DIMENSIONS * bounce
+            surface = hit.bsdf(ray)
+            light, arriving = scene.sample_emitter_direction(hit, self._pair(point, column), True, alive)
+            lit = alive & (light.pdf != 0)
+            total += passed * (surface.eval(context, hit, hit.to_local(light.d), lit) * arriving)[0]
+            if bounce < self.bounces:
+                sent, value = surface.sample(context, hit, 0.5, self._pair(point, column + 2), alive)
+                passed *= value[0]
+                ray = hit.spawn_ray(hit.to_world(sent.wo))
+                hit = scene.ray_intersect(ray, alive & (passed > 0))
+        return total
+
+    def _pair(self, point, column: int):
+        """Two columns of the table."""
+        import drjit as dr
+
+        mi = self.mitsuba
+        return mi.Point2f(*(dr.gather(mi.Float, mi.Float(self._table[column + i]), point) for i in range(2)))
+
+    @property
+    def _block(self) -> int:
+        return 1 << math.ceil(math.log2(self.most))
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        """Sobol points, shape (dimensions, fine pixels of a pixel x block)."""
+        power = math.ceil(math.log2(self.supersample**2 * self._block))
+        points = qmc.Sobol(2 + _DIMENSIONS * (self.bounces + 1), rng=self.seed).random_base2(power)
+        return np.minimum(points.T.astype(np.float32), np.float32(1) - np.finfo(np.float32).epsneg)
+
+    def _strata(self, samples: int) -> np.ndarray:
+        """Which stratum of its fine pixel each ray crosses: shuffled, as consecutive points are not independent."""
+        rng = np.random.default_rng(self.seed)
+        order = np.tile(np.arange(samples, dtype=np.uint32), (self.supersample**2, 1))
+        return rng.permuted(order, axis=1).ravel()

@@ -1,0 +1,96 @@
+"""The rendered face has the intensity of the closed form: diffuse, glossy and polarised, from normal to 80 degrees."""
+
+import math
+
+import numpy as np
+import pytest
+
+import render
+from planner.view import direction, frame
+from render import variant
+from render.build import polariser_axes
+from render.reflectance import NUMPY, Index, brightness, polarised_across
+from scenes import Material, Pose
+
+pytestmark = pytest.mark.render
+MATERIALS = {
+    "diffuse": Material(specular_fraction=0.1, diffuse_reflectance=1.0),
+    "metal": Material(
+        specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.8, extinction=2.0, roughness=0.2
+    ),
+    "glass": Material(specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.5, roughness=0.3),
+}
+ANGLES = [(0, 0), (80, 0), (0, 80), (30, 60), (80, 75)]  # of sensor and light with the face's normal, degrees
+FREE = ("attached_shadow", "fall_off", "lens_blur")
+
+
+@pytest.mark.parametrize("name", sorted({variant.SCALAR, variant.choose()}))
+@pytest.mark.parametrize("material", MATERIALS)
+def test_rendered_face_has_the_formulas_intensity(task1, name, material):
+    """Every pixel inside the face x = 0: within 1e-4 of the value."""
+    specular = () if material == "diffuse" else ("specular_lobe",)
+    for sensor, light in ANGLES:
+        scene = close(task1, MATERIALS[material])
+        compare(scene, upright(sensor, 170), upright(light, 195), name, (*FREE, *specular))
+
+
+def test_polarised_face_has_the_formulas_intensity(task1):
+    scene = close(task1, MATERIALS["metal"], analyser_deg=30.0)
+    scene = scene.model_copy(update={"light": scene.light.model_copy(update={"polarisation_deg": 60.0})})
+    compare(scene, upright(50, 170), upright(40, 195), None, (*FREE, "specular_lobe", "polarisation", "analyser"))
+
+
+def close(task1, material, **camera):
+    """Few pixels of 0.05 cm: brightness hardly changes within one, so its centre's is its mean's."""
+    camera = {"width": 16, "height": 16, "focal_px": 2000.0, "blur_px": 0.1, **camera}
+    return task1.model_copy(update={"material": material, "camera": task1.camera.model_copy(update=camera)})
+
+
+def upright(angle, azimuth):
+    """A pose at an angle to the normal of the face x = 0, turned out of the plane of incidence a little."""
+    return Pose(90.0 - angle, azimuth if 0 < angle < 80 else 180.0)
+
+
+def compare(scene, sensor, light, name, effects):
+    points = behind(scene, sensor)
+    inside = (points[..., 1] > 0.12) & (points[..., 2] > 0.12) & (points[..., 2] < 2.38)
+    assert inside.sum() > 10
+    picture = render.image(scene, sensor, light, render.Quality(2, 1, 1), name, effects) - scene.camera.black_level
+    assert picture[inside] == pytest.approx(closed_form(scene, sensor, light, points)[inside], rel=1e-4)
+
+
+def behind(scene, sensor):
+    """Points of the plane x = 0 behind the pixels' centres, cm, shape (height, width, 3)."""
+    camera, axes = scene.camera, frame(np.array(list(sensor)))
+    x, y = np.meshgrid(np.arange(camera.width) - (camera.width - 1) / 2, np.arange(camera.height) - 7.5)
+    rays = axes.forward + (x[..., None] * axes.right + y[..., None] * axes.down) / camera.focal_px
+    start = scene.position("sensor", sensor)
+    return start - rays * (start[0] / rays[..., 0])[..., None]
+
+
+def closed_form(scene, sensor, light, points):
+    """Grey levels above darkness."""
+    away = [scene.position(role, pose) - points for role, pose in (("light", light), ("sensor", sensor))]
+    distance = [np.linalg.norm(part, axis=-1, keepdims=True) for part in away]
+    beams = [tuple(np.moveaxis(part / far, -1, 0)) for part, far in zip(away, distance, strict=True)]
+    axes = [
+        None if axis is None else polarised_across(NUMPY, tuple(axis), beam)
+        for axis, beam in zip(polariser_axes(scene, sensor, light), beams, strict=True)
+    ]
+    material, zero = scene.material, np.zeros(points.shape[:2])
+    normal = zero - 1.0, zero, zero
+    if material.is_diffuse or scene.camera.analyser_deg is None:
+        assert axes == [None, None]
+    index = (Index(material.refractive_index, material.extinction, 1.0),)
+    value = brightness(NUMPY, material, index, normal, *beams, *axes)
+    return scene.camera.exposure * value * (scene.light.distance / distance[0][..., 0]) ** 2
+
+
+def test_the_closed_form_here_is_lamberts_for_a_matt_face(task1):
+    """The reference itself: cosine, albedo and inverse square, written out."""
+    scene, sensor, light = close(task1, MATERIALS["diffuse"]), upright(0, 170), upright(60, 180)
+    (point,) = points = np.array([[[0.0, 0.5, 0.5]]])
+    to_light = 100 * direction(np.array(list(light))) - point[0]
+    far = np.linalg.norm(to_light)
+    expected = 200 * 0.9 * (-to_light[0] / far) * (100 / far) ** 2
+    assert math.isclose(closed_form(scene, sensor, light, points)[0, 0], expected, rel_tol=1e-12)
