@@ -36,7 +36,7 @@ def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
     >>> import scenes
     >>> scene = scenes.load("task1").model_copy(update={"jitter": scenes.Jitter(sensor_deg=0.1)})
     >>> pose_spread(scene, np.array([[30.0, 135.0]])).variance.round(4)
-    array([0.0075])
+    array([0.0137])
     """
     sigma = scene.jitter.sensor_deg
     if sigma == 0:

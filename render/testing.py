@@ -86,8 +86,9 @@ def _p_values(image: np.ndarray, reference: np.ndarray, variance: np.ndarray | f
     if variance is None:
         if image.ndim != 3 or reference.ndim != 3 or min(len(image), len(reference)) < 2:
             raise AssertionError("without a variance both must be stacks of at least two renders")
+        facts = [fact for stack in (image, reference) for fact in (stack.mean(0), stack.std(0, ddof=1), len(stack))]
         with np.errstate(divide="ignore", invalid="ignore"):
-            p = stats.ttest_ind(image, reference, axis=0, equal_var=False).pvalue
+            p = stats.ttest_ind_from_stats(*facts, equal_var=False).pvalue
         return np.where(np.isnan(p), image.mean(0) == reference.mean(0), p)
     difference = np.abs(_mean(image) - _mean(reference))
     sigma = np.sqrt(np.broadcast_to(variance, difference.shape))

@@ -27,7 +27,7 @@ FREE = ("attached_shadow", "fall_off", "lens_blur")
 @pytest.mark.parametrize("name", sorted({variant.SCALAR, variant.choose()}))
 @pytest.mark.parametrize("material", MATERIALS)
 def test_rendered_face_has_the_formulas_intensity(task1, name, material):
-    """Every pixel inside the face x = 0: within 1e-4 of the value."""
+    """36 pixels inside the face x = 0, whose corner is in the image's middle: within 1e-4 of the value."""
     specular = () if material == "diffuse" else ("specular_lobe",)
     for sensor, light in ANGLES:
         scene = close(task1, MATERIALS[material])
@@ -41,8 +41,8 @@ def test_polarised_face_has_the_formulas_intensity(task1):
 
 
 def close(task1, material, **camera):
-    """Few pixels of 0.05 cm: brightness hardly changes within one, so its centre's is its mean's."""
-    camera = {"width": 16, "height": 16, "focal_px": 2000.0, "blur_px": 0.1, **camera}
+    """Few pixels of 0.005 cm: brightness hardly changes within one, so its centre's is its mean's."""
+    camera = {"width": 16, "height": 16, "focal_px": 20000.0, "blur_px": 0.1, **camera}
     return task1.model_copy(update={"material": material, "camera": task1.camera.model_copy(update=camera)})
 
 
@@ -53,9 +53,9 @@ def upright(angle, azimuth):
 
 def compare(scene, sensor, light, name, effects):
     points = behind(scene, sensor)
-    inside = (points[..., 1] > 0.12) & (points[..., 2] > 0.12) & (points[..., 2] < 2.38)
-    assert inside.sum() > 10
-    picture = render.image(scene, sensor, light, render.Quality(2, 1, 1), name, effects) - scene.camera.black_level
+    inside = np.s_[:6, :6]
+    assert (points[inside][..., 1:] > 0).all()
+    picture = render.image(scene, sensor, light, render.Quality(4, 16, 16), name, effects) - scene.camera.black_level
     assert picture[inside] == pytest.approx(closed_form(scene, sensor, light, points)[inside], rel=1e-4)
 
 
