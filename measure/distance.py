@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from measure import status
-from measure.layout import layout_of
+from measure.layout import Layout, layout_of
 from measure.shape import find_shape
 from scenes import InvalidInput, Scene
 
@@ -83,17 +83,22 @@ def distance(
     InvalidInput
         If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
     """
-    sensor = scene.check_pose("sensor", sensor)
-    light = None if light is None else scene.check_pose("light", light)
+    layout, threshold = sought(scene, sensor, light, threshold)
     images = checked_image(image, (scene.camera.height, scene.camera.width))
-    threshold = scene.locator.thresholds[0] if threshold is None else threshold
-    stack, layout = images.reshape(-1, *images.shape[-2:]), layout_of(scene, sensor, light)
+    stack = images.reshape(-1, *images.shape[-2:])
     parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
     lead = images.shape[:-2]
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
     )
+
+
+def sought(scene: Scene, sensor: Any, light: Any, threshold: float | None) -> tuple[Layout, float]:
+    """Where the edges should be, and Canny's threshold: arguments of `distance`, checked."""
+    sensor = scene.check_pose("sensor", sensor)
+    light = None if light is None else scene.check_pose("light", light)
+    return layout_of(scene, sensor, light), scene.locator.thresholds[0] if threshold is None else threshold
 
 
 def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:

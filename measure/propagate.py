@@ -9,8 +9,7 @@ import numpy as np
 
 from measure import status
 from measure.corners import corner_response
-from measure.distance import distance, separation
-from measure.layout import layout_of
+from measure.distance import distance, separation, sought
 from measure.shape import prepared
 from scenes import Scene
 
@@ -66,9 +65,8 @@ def propagate(
     if str(found.status) not in status.MEASURED:
         nothing = np.full((4, 4), np.inf), np.zeros(clean.shape)
         return Propagated(float("nan"), float("inf"), *nothing, str(found.status))
-    light = None if light is None else scene.check_pose("light", light)
-    layout = layout_of(scene, scene.check_pose("sensor", sensor), light)
-    tool = prepared(layout, estimator, scene.locator.thresholds[0] if threshold is None else threshold)
+    layout, threshold = sought(scene, sensor, light, threshold)
+    tool = prepared(layout, estimator, threshold)
     response = np.concatenate([corner_response(tool.frames, pair) for pair in layout.corners])
     ends = response @ tool.respond(clean).lines
     _, gradient = separation(found.corners[None])
