@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from scenes.load import BUNDLED
@@ -77,6 +78,11 @@ def test_render_then_measure(tmp_path):
             ("measure", "/no/x.png", "task1", "--sensor", "30,20"),
             "/no/x.png must be a readable image, got: No such file",
         ),
+        (("validate", "task1", "--effects", "fog"), "effects must be auto, all or some of"),
+        (
+            ("render", "task1", "--sensor", "30,20", "--light", "1,2", "-o", "x.png", "--leave-out-px", "-1"),
+            "tolerance bias_px must be at least 0, got -1",
+        ),
         (("paint",), "command must be a known one (see --help), got 'paint'"),
     ],
 )
@@ -86,6 +92,22 @@ def test_bad_input_is_one_line_and_exit_status_2(arguments, line, tmp_path):
     assert done.stderr.count("\n") == 1
     assert line in done.stderr
     assert done.stdout == ""
+
+
+def test_effects_and_tolerance_decide_what_is_rendered(tmp_path):
+    """A dark floor: seen by default, not where more may be left out, and not where only shading is asked for."""
+    scene = tmp_path / "dark.toml"
+    scene.write_text((BUNDLED / "task1.toml").read_text().replace("[noise]", "[floor]\nreflectance = 0.01\n\n[noise]"))
+
+    def greatest_beside_the_block(*options):
+        out = tmp_path / "a.npy"
+        done = ice("render", scene, "--sensor", "30,135", "--light", "15,315", "-o", out, *options)
+        assert done.returncode == 0, done.stderr
+        return np.load(out)[:20].max()
+
+    assert greatest_beside_the_block() > 21
+    assert greatest_beside_the_block("--leave-out-px", 1, "--leave-out-variance", 1) == 20
+    assert greatest_beside_the_block("--effects", "attached_shadow,fall_off") == 20
 
 
 def test_bad_scene_value_names_file_and_key(tmp_path):
