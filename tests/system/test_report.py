@@ -134,6 +134,19 @@ def test_in_a_browser(found, page, tmp_path):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
+def test_nothing_is_cut_off_on_a_phone(page, tmp_path):
+    """In a frame 390 px wide, for no window is as narrow: wide tables scroll in their own box, the page does not."""
+    phone = tmp_path / "phone.html"
+    look = "const d = this.contentDocument.documentElement; document.title = [d.scrollWidth, d.clientWidth]"
+    phone.write_text(
+        f'<title></title><iframe src="{page.as_uri()}" width=390 height=800 style="border:0" onload="{look}"></iframe>'
+    )
+    dom = browse(tmp_path, phone, 800, "--allow-file-access-from-files", "--dump-dom")
+    wide, window = map(int, re.search("<title>([0-9,]+)</title>", dom.stdout)[1].split(","))
+    assert wide <= window <= 390
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
 def test_the_console_check_sees_an_error(tmp_path):
     """Negative control."""
     bad = tmp_path / "bad.html"

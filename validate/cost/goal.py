@@ -24,6 +24,7 @@ from validate.work import Rendering, methods
 
 _FIRST = 0.25  # part of the images that are taken before the first look at the clock
 _FINE = 0.05  # of the accuracy: a render of this sigma adds half a per cent to the half-width
+_SHORT_S, _COARSE = 30.0, 0.15  # budget and accuracy of runs so short that a longer trial would be much of them
 _USUAL = 0.04  # accuracy, where none is asked for
 _LOOKS = 3  # at the clock, at most
 _SPARE_S = 0.3  # left over is not worth another look
@@ -135,7 +136,8 @@ def reach(
         If the accuracy cannot be reached whatever the time, or the budget is too short.
     """
     started = time.perf_counter() if started is None else started
-    tried = 3 if budget is None or budget > 30 else 2
+    short = (budget or np.inf) <= _SHORT_S or (accuracy or 0.0) >= _COARSE
+    tried = 2 if short else 3
     how = Rendering(effects=effects, tolerance=tolerance)
     model = trial(campaign, seed, workers, tried, _FINE * (accuracy or _USUAL), how=how)
     if accuracy is not None:
