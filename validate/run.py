@@ -127,7 +127,7 @@ def run(
 
 
 def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None, effects: str) -> None:
-    if effects not in ("auto", "all"):
+    if effects != "auto":
         named(effects)
     if renders < 2:
         raise InvalidInput(f"renders must be at least 2, got {renders}")

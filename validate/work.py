@@ -19,7 +19,7 @@ import planner
 import render
 from render import Quality, Tolerance
 from render import variant as variants
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Jitter, Scene
 from validate.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
@@ -151,7 +151,7 @@ def _perform(task: Task) -> Found:
 def _shots(task: Task) -> Shots | None:
     """Takes pictures from poses that are set anew each time; None where that does not matter."""
     scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
-    if "pose_jitter" not in render.choose(scene, how.effects, how.tolerance, sensor, light).active:
+    if render.choose(scene, how.effects, how.tolerance, sensor, light).scene.jitter == Jitter():
         return None
 
     def take(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -217,7 +217,7 @@ def measure_chunk(
 
 def effects(scene: Scene, how: Rendering = Rendering()) -> list[dict[str, Any]]:
     """Which effects the renderer simulates for a scene's settings, and why."""
-    found = render.choose(scene, how.effects, how.tolerance).decisions
+    found = render.effects(scene, how.tolerance, how.effects)
     return [{"effect": each.effect.name, "on": each.on, "reason": each.reason} for each in found]
 
 

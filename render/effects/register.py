@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class Decision:
     on : bool
     reason : str
     influence : Influence
-        Estimated bound; exactly zero where the effect cannot matter, and not estimated where the user decided.
+        Estimated bound; exactly zero where the effect cannot matter.
     """
 
     effect: Effect
@@ -62,8 +62,10 @@ class Choice:
     decisions: tuple[Decision, ...]
 
 
-def effects(scene: Scene, tolerance: Tolerance = Tolerance()) -> tuple[Decision, ...]:
-    """Which effects the scene's settings call for, all settings together.
+def effects(
+    scene: Scene, tolerance: Tolerance = Tolerance(), wanted: str | Iterable[str] = "auto"
+) -> tuple[Decision, ...]:
+    """Which effects the scene's settings call for, all settings together, or which the user wants instead.
 
     Examples
     --------
@@ -74,13 +76,15 @@ def effects(scene: Scene, tolerance: Tolerance = Tolerance()) -> tuple[Decision,
     Raises
     ------
     InvalidInput
-        If the scene has no settings.
+        If the scene has no settings, or an effect is unknown.
     """
+    asked = None if wanted == "auto" else named(wanted)
     if not scene.settings:
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
     pairs = np.array([[list(setting.sensor), list(setting.light)] for setting in scene.settings])
     poses = Poses(pairs[:, 0], pairs[:, 1])
-    return tuple(_decide(effect, scene, poses, tolerance) for effect in REGISTER.values())
+    found = tuple(_decide(effect, scene, poses, tolerance) for effect in REGISTER.values())
+    return found if asked is None else tuple(_overruled(decision, asked) for decision in found)
 
 
 def choose(
@@ -112,8 +116,7 @@ def choose(
         decisions = effects(here, tolerance)
         active = frozenset(decision.effect.name for decision in decisions if decision.on)
     else:
-        active = frozenset(REGISTER) if wanted == "all" else named(wanted)
-        decisions = tuple(_asked(effect, effect.name in active) for effect in REGISTER.values())
+        decisions, active = (), named(wanted)
     reduced = scene
     for name in REGISTER.keys() - active:
         reduced = REGISTER[name].without(reduced)
@@ -121,13 +124,15 @@ def choose(
 
 
 def named(wanted: str | Iterable[str]) -> frozenset[str]:
-    """Names of effects, from a list or from text with commas.
+    """Names of effects, from a list or from text: "all", or names with commas between.
 
     Raises
     ------
     InvalidInput
         If there is no such effect.
     """
+    if wanted == "all":
+        return frozenset(REGISTER)
     names = frozenset(wanted.split(",") if isinstance(wanted, str) else wanted) - {""}
     unknown = sorted(names - REGISTER.keys())
     if unknown:
@@ -135,9 +140,9 @@ def named(wanted: str | Iterable[str]) -> frozenset[str]:
     return names
 
 
-def _asked(effect: Effect, on: bool) -> Decision:
-    """What the user decided, whose influence is not asked."""
-    return Decision(effect, on, "asked for" if on else "not asked for", NOTHING)
+def _overruled(decision: Decision, asked: frozenset[str]) -> Decision:
+    on = decision.effect.name in asked
+    return replace(decision, on=on, reason="asked for" if on else "not asked for")
 
 
 def _decide(effect: Effect, scene: Scene, poses: Poses, tolerance: Tolerance) -> Decision:

@@ -11,7 +11,7 @@ from rich.table import Table
 import scenes
 from render.effects import Decision, Effect, Tolerance, effects
 from render.effects.base import RANDOM
-from validate.commands.common import Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
+from validate.commands.common import Effects, Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
 from validate.effects_check import RENDERED, Switched, check
 from validate.table import console
 
@@ -22,13 +22,14 @@ def effects_command(
     check_them: Annotated[
         bool, typer.Option("--check", help="Render with each left-out effect, and with all, and compare.")
     ] = False,
+    which: Effects = "auto",
     bias_px: LeaveOutPx = 0.005,
     variance: LeaveOutVariance = 0.02,
     as_json: Json = False,
 ) -> None:
     """Which effects a scene calls for, why, their influence and cost. Exit status 1 if --check contradicts."""
     loaded, tolerance = scenes.load(scene), Tolerance(bias_px, variance)
-    decisions = effects(loaded, tolerance)
+    decisions = effects(loaded, tolerance, which)
     rows = []
     if check_them:
         with progress(f"{loaded.name}: effects") as shown:
