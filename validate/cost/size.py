@@ -47,7 +47,7 @@ def size_knob(case: Case, variant: str, seed: int) -> Knob:
         x="width",
         y="relative error",
         fits=fits,
-        note="Theory: rendering goes with the pixels where all get equal rays; here those at an edge get most, and their "
+        note="Theory: rendering goes with the pixels where all get equal rays; here those at an edge get most, whose "
         "number goes with the root of the pixels, so the slope lies between 1/2 and 1. Noise is drawn only beside the "
         "edges (1/2), but every image is copied whole (1). An edge has points in proportion to its length, hence -3/2 "
         "for the relative error; trimmed ends weigh more in small images.",
