@@ -105,7 +105,7 @@ def test_directory_of_another_run_is_refused(few, tmp_path):
     noisier = one.model_copy(update={"noise": one.noise.model_copy(update={"sigma": 3.0})})
     with pytest.raises(InvalidInput, match=refused.format(r"campaign.scenes\[0\].noise.sigma is 2.4, not 3.0")):
         validate.run(noisier, renders=20, seed=1, out=tmp_path, workers=1)
-    with pytest.raises(InvalidInput, match=refused.format("effects is auto, not floor")):
+    with pytest.raises(InvalidInput, match=refused.format('effects is "auto", not "floor"')):
         validate.run(one, renders=20, seed=1, out=tmp_path, workers=1, effects="floor")
     assert validate.run(one, renders=20, seed=2, out=tmp_path, workers=1, fresh=True).seed == 2
 
