@@ -132,6 +132,8 @@ class PointEstimator:
         points, response = self.locator.linear_response(clean)
         count = response.shape[0]
         keep = points.valid[0, :count]
+        if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
+            return Response(self.estimate(clean[None]), np.full((2, clean.size), np.nan))
         along, weights = points.along[0, :count][keep], np.broadcast_to(self.weights, keep.shape)[keep]
         mean, slope = (sparse.csr_array(response)[np.flatnonzero(keep)].T @ regression(along, weights).T).T
         middle = weights @ along / weights.sum()

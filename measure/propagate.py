@@ -63,14 +63,15 @@ def propagate(
     clean = scene.noise.mean_at(clean)
     found = distance(clean, scene, sensor, light, estimator, threshold)
     if str(found.status) not in status.MEASURED:
-        nothing = np.full((4, 4), np.inf), np.zeros(clean.shape)
-        return Propagated(float("nan"), float("inf"), *nothing, str(found.status))
+        return _nothing(clean, str(found.status))
     layout, threshold = sought(scene, sensor, light, threshold)
     tool = prepared(layout, estimator, threshold)
     response = np.concatenate([corner_response(tool.frames, pair) for pair in layout.corners])
     ends = response @ tool.respond(clean).lines
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends
+    if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is
+        return _nothing(clean, status.ILL_CONDITIONED)
     return Propagated(
         float(found.value_px),
         float(noise @ (g * g)),
@@ -78,3 +79,7 @@ def propagate(
         g.reshape(clean.shape),
         str(found.status),
     )
+
+
+def _nothing(clean: np.ndarray, state: str) -> Propagated:
+    return Propagated(float("nan"), float("inf"), np.full((4, 4), np.inf), np.zeros(clean.shape), state)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import measure
+import render
 from measure import status
 from measure.estimators import ESTIMATORS
 from measure.layout import Optics, layout_of, polygon_layout
@@ -187,3 +188,14 @@ def test_angle_between_two_lines(rng, estimator):
     ratio = found.var(ddof=1) / predicted[0]
     assert abs(ratio - 1) < 4 * np.sqrt(2 / 1999)
     assert abs(ratio / 1.3 - 1) > 4 * np.sqrt(2 / 1999)
+
+
+@pytest.mark.render
+def test_an_edge_found_only_at_anothers_place_has_no_prediction(task1):
+    """A block so small in the image that a required edge lies within the window of another: infinite, not NaN."""
+    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
+    scene = task1.model_copy(update={"camera": camera})
+    image = render.image(scene, (20, 160), (40, 180))
+    found = measure.propagate(image, scene, (20, 160), (40, 180))
+    assert found.variance_px2 == np.inf
+    assert found.status == status.ILL_CONDITIONED
