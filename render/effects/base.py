@@ -10,7 +10,6 @@ import numpy as np
 
 from scenes import InvalidInput, Scene
 
-RANDOM = 4.0  # time of a render in which every pixel gets many rays, over one in which only edges do
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
 
 
@@ -64,7 +63,8 @@ class Effect(ABC):
         Time of a render with this effect alone over that without, compiled variant, about (measured by ``ice effects
         --check``). 1 is free: it is then never left out where it can matter.
     random : bool
-        Whether single rays become random, so that all pixels need `RANDOM` times the rays; included in the cost.
+        Whether single rays become random, so that all pixels need more of them; several such effects share the rays,
+        and what the costliest costs is paid once.
     switch : str
         How it is simulated.
     """

@@ -65,7 +65,7 @@ class DepthOfField(Effect):
     """A thin lens blurs what is out of focus."""
 
     name = "depth_of_field"
-    cost = 4.0
+    cost = 9.0
     random = True
     switch = "a thin lens instead of a pinhole; random, so edge pixels cannot be singled out"
 

@@ -127,7 +127,7 @@ class LightSize(Effect):
     """A light of finite radius: softer shading, lobes and shadows."""
 
     name = "light_size"
-    cost = 11.0
+    cost = 9.0
     random = True
     switch = "a sphere or a disc instead of a point"
 

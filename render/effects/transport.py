@@ -59,7 +59,7 @@ class Interreflection(Effect):
     """Light that one surface sends to another."""
 
     name = "interreflection"
-    cost = 6.5
+    cost = 25.0
     random = True
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 

@@ -10,7 +10,6 @@ from rich.table import Table
 
 import scenes
 from render.effects import Decision, Effect, Tolerance, effects
-from render.effects.base import RANDOM
 from validate.commands.common import Effects, Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
 from validate.effects_check import RENDERED, Switched, check
 from validate.table import console
@@ -56,8 +55,8 @@ def _saving(decisions: tuple[Decision, ...]) -> float:
     """Time of a render with everything over that of this choice: excesses add up, random rays are paid for once."""
 
     def time(effects: list[Effect]) -> float:
-        alone = [effect.cost / (RANDOM if effect.random else 1.0) - 1 for effect in effects]
-        return (RANDOM if any(effect.random for effect in effects) else 1.0) * (1 + sum(alone))
+        random = max((effect.cost - 1 for effect in effects if effect.random), default=0.0)
+        return 1 + random + sum(effect.cost - 1 for effect in effects if not effect.random)
 
     rendered = [decision for decision in decisions if decision.effect.name in RENDERED]
     return time([d.effect for d in rendered]) / time([d.effect for d in rendered if d.on])
