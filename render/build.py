@@ -10,10 +10,10 @@ import numpy as np
 from planner.view import direction, frame
 from render import bsdf
 from render.mesh import mesh
+from render.rays import SURFACES
 from render.reflectance import indices
 from scenes import Floor, Pose, Scene
 
-BOUNCES = 8  # surfaces a ray may meet with interreflection; the fifth would add less than reflectance^4 of the first
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _SMALL_LIGHT = 1e-2  # of the distance: in single precision Mitsuba samples a smaller sphere wrongly, but not a disc
 CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
@@ -42,7 +42,7 @@ def description(
     samples : int
         Rays a fine pixel.
     """
-    integrator = {"type": "path", "max_depth": BOUNCES + 1, "rr_depth": 99} if "interreflection" in active else {}
+    integrator = {"type": "path", "max_depth": SURFACES + 1, "rr_depth": 99} if "interreflection" in active else {}
     surface = _surface(mitsuba, scene, sensor, light, active)
     parts = {
         "type": "scene",

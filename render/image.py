@@ -13,11 +13,11 @@ import numpy as np
 from planner.view import depth, project
 from render import variant as variants
 from render.adaptive import crossed, near_edges, refine, refine_tiles
-from render.build import BOUNCES, CUSTOM, description, view
+from render.build import CUSTOM, description, view
 from render.effects import Tolerance, choose
 from render.optics import blur_and_bin, distort, distorted
 from render.precision import check_precision
-from render.rays import Rays
+from render.rays import SURFACES, Rays
 from scenes import InvalidInput, Pose, Scene
 
 STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
@@ -154,7 +154,7 @@ def _fine(scene, sensor, light, active, crop, quality: Quality, variant: str) ->
     marked = crossed(fine, math.ceil(k * _defocus(scene, sensor)))
     many = quality.edge_samples or (16 if interpreted else 64 if scalar else 256)
     few = quality.random_samples or 16
-    bounces = BOUNCES - 1 if "interreflection" in active else 0
+    bounces = SURFACES - 1 if "interreflection" in active else 0
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed)
     if sharp != active:
         loaded = load(active, few)

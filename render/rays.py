@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import qmc
 
 _AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
+SURFACES = 8  # that light may meet; the ninth would add less than reflectance^8 of the first
 _DIMENSIONS = 4  # of a reflection: where on the light, which way to the next surface
 
 
@@ -33,7 +34,7 @@ class Rays:
     most : int
         Rays of a fine pixel, at most.
     bounces : int
-        Surfaces that light may meet before the one that is seen.
+        Surfaces that light may meet before the one that is seen, less than `SURFACES`.
     seed : int
     """
 
@@ -126,7 +127,8 @@ class Rays:
     def _table(self) -> np.ndarray:
         """Sobol points, shape (dimensions, fine pixels of a pixel x block)."""
         power = math.ceil(math.log2(self.supersample**2 * self._block))
-        points = qmc.Sobol(2 + _DIMENSIONS * (self.bounces + 1), rng=self.seed).random_base2(power)
+        dimensions = 2 + _DIMENSIONS * SURFACES  # whatever the bounces: the scrambling depends on their number
+        points = qmc.Sobol(dimensions, rng=self.seed).random_base2(power)
         return np.minimum(points.T.astype(np.float32), np.float32(1) - np.finfo(np.float32).epsneg)
 
     def _strata(self, samples: int) -> np.ndarray:
