@@ -35,7 +35,7 @@ class Quality:
         Rays a fine pixel, a square number.
     edge_samples : int, optional
         Rays of a fine pixel that an edge crosses, a square number; 256 in compiled variants and 64 in scalar ones when
-        not given.
+        not given. Where single rays are random all pixels that the task's edges are located from get as many.
     random_samples : int, optional
         Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
         light of finite size), a square number; 16 when not given.

@@ -21,7 +21,7 @@ RENDERED = (
 _SAMPLING_N = 1000  # renders of `ice validate`, whose variance is known to sqrt(2 / (n - 1))
 _SEEDS = (0, 1, 2, 3, 4)
 _FALSE_ALARM = 1e-3  # of one comparison whose estimate is true
-_ROUNDING = Influence(2e-4, 1e-3)  # single precision, in which the smallest light that can be sampled is no point
+_ROUNDING = Influence(2e-4, 1e-3)  # of single precision, in which the smallest aperture is no pinhole
 
 
 @dataclass(frozen=True)
