@@ -175,7 +175,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     spread = float(planner.pose_spread(chosen.scene, np.array([list(sensor)])).variance[0])
     propagated = {}
     for method in methods(scene):
-        found = measure.propagate(image, scene, sensor, light, method.locator, method.threshold)
+        found = measure.propagate(image, scene, sensor, None, method.locator, method.threshold)  # as it is measured
         propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
     clock.lap("propagate")
     return Clean(Picture.of(image), propagated, numbers, clock.seconds)

@@ -10,7 +10,9 @@ import measure
 import render
 import scenes
 import validate
+from render import variant
 from scenes import InvalidInput
+from validate import work
 from validate.campaign import Campaign, Grid
 from validate.store import RunFile
 from validate.work import measure_chunk
@@ -94,6 +96,28 @@ def test_interrupted_run_continues_with_the_same_numbers(few, found, tmp_path):
     assert 0 < before.images() < 2000
     before.close()
     assert numbers(validate.run(few, renders=500, seed=11, out=tmp_path, workers=1)) == numbers(found)
+
+
+def test_what_is_predicted_is_what_is_measured(task1):
+    """The same lines from the same pixels: one image, both without knowing the light.
+
+    Knowing the light moves the ends of the lines, and would change the prediction by 4 %.
+    """
+    case = Campaign.of(task1).case(10)
+    clean = work.render_setting(case, variant.choose())
+    image, sensor = clean.picture.array(), case.setting.sensor
+    response = measure.propagate(image, task1, sensor).response
+    chunk = measure_chunk(case, image, 1, 0, 200)
+    pictures = render.expose(
+        image, task1.noise, np.random.default_rng(np.random.SeedSequence(1, spawn_key=(10, 0, 0))), 50
+    )
+    linear = np.einsum("nij,ij->n", pictures - image, response)
+    measured = chunk.distances["gradient"][:50]
+    assert np.corrcoef(linear, measured)[0, 1] > 0.999
+    noise = task1.noise.variance_at(image)
+    assert clean.propagated["gradient"][0] == pytest.approx(float((noise * response**2).sum()), rel=1e-9)
+    known = measure.propagate(image, task1, sensor, case.setting.light).variance_px2
+    assert abs(clean.propagated["gradient"][0] / known - 1) > 0.02  # negative control
 
 
 def test_directory_of_another_run_is_refused(few, tmp_path):
