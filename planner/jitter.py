@@ -9,7 +9,7 @@ import numpy as np
 from planner.view import project
 from scenes import Scene
 
-_LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
+LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
 
 
 class PoseSpread(NamedTuple):
@@ -44,7 +44,7 @@ def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
     step = max(sigma, 1e-3)
     here = _distance(scene, sensors)
     variance, bias = np.zeros(len(here)), np.zeros(len(here))
-    sine = np.maximum(np.sin(np.radians(sensors[:, 0])), _LEAST_SINE)
+    sine = np.maximum(np.sin(np.radians(sensors[:, 0])), LEAST_SINE)
     for axis in (np.stack([np.ones_like(sine), 0 * sine], -1), np.stack([0 * sine, 1 / sine], -1)):
         ahead, behind = (_distance(scene, sensors + sign * step * axis) for sign in (1, -1))
         variance += ((ahead - behind) / 2 * (sigma / step)) ** 2

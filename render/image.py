@@ -145,8 +145,8 @@ def _fine(scene, sensor, light, active, crop, quality: Quality, variant: str) ->
         parts = description(mitsuba, scene, sensor, light, active, size, crop, samples)
         return mitsuba.load_dict(parts, parallel=False)
 
-    def tile(samples: int, tile: tuple[slice, slice]) -> dict:
-        shifted = tuple(slice(a.start + b.start, a.start + b.stop) for a, b in zip(crop, tile, strict=True))
+    def tile(samples: int, part: tuple[slice, slice]) -> dict:
+        shifted = tuple(slice(a.start + b.start, a.start + b.stop) for a, b in zip(crop, part, strict=True))
         return view(mitsuba, scene, sensor, active, size, shifted, samples)
 
     loaded = load(sharp, 1 if interpreted else quality.samples)

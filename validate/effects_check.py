@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -96,10 +96,7 @@ class _Runs:
         found, self.seconds = [], float("inf")
         for seed in _SEEDS:
             started = time.perf_counter()
-            fine = render.Quality(
-                quality.supersample, quality.samples, quality.edge_samples, quality.random_samples, seed
-            )
-            image = render.image(scene, setting.sensor, setting.light, fine, effects=effects)
+            image = render.image(scene, setting.sensor, setting.light, replace(quality, seed=seed), effects=effects)
             self.seconds = min(self.seconds, time.perf_counter() - started)  # the first compiles
             result = measure.propagate(image, scene, setting.sensor)
             found.append((result.value_px, result.variance_px2))

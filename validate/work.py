@@ -151,7 +151,7 @@ def _perform(task: Task) -> Found:
 def _shots(task: Task) -> Shots | None:
     """Takes pictures from poses that are set anew each time; None where that does not matter."""
     scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
-    if render.choose(scene, how.effects, how.tolerance, sensor, light).scene.jitter == Jitter():
+    if _jitter(task.case, how) == Jitter():
         return None
 
     def take(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -159,6 +159,14 @@ def _shots(task: Task) -> Shots | None:
             return render.shots(scene, sensor, light, rng, count, how.quality, task.variant, how.effects, how.tolerance)
 
     return take
+
+
+def _jitter(case: Case, how: Rendering) -> Jitter:
+    """How exactly poses are set, as far as it is simulated."""
+    scene, setting = case.scene, case.setting
+    if scene.jitter == Jitter():  # nearly always: spare the choice
+        return scene.jitter
+    return render.choose(scene, how.effects, how.tolerance, setting.sensor, setting.light).scene.jitter
 
 
 def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
@@ -171,8 +179,8 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     clock.lap("predict")
     image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
     clock.lap("render")
-    chosen = render.choose(scene, how.effects, how.tolerance, sensor, light)
-    spread = float(planner.pose_spread(chosen.scene, np.array([list(sensor)])).variance[0])
+    shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
+    spread = float(planner.pose_spread(shaken, np.array([list(sensor)])).variance[0])
     propagated = {}
     for method in methods(scene):
         found = measure.propagate(image, scene, sensor, None, method.locator, method.threshold)  # as it is measured

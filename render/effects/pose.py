@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import pose_spread, variances
+from planner.jitter import LEAST_SINE
 from render.effects.base import SAFETY, Effect, Influence, Poses, changed
 from scenes import Pose, Scene
 
@@ -36,5 +37,5 @@ def shaken(scene: Scene, role: str, pose: Pose, rng: np.random.Generator) -> Pos
     sigma = scene.jitter.sensor_deg if role == "sensor" else scene.jitter.light_deg
     away, around = sigma * rng.standard_normal(2)
     polar = pose.polar_deg + away
-    turn = around / max(np.sin(np.radians(pose.polar_deg)), 1e-2)
+    turn = around / max(np.sin(np.radians(pose.polar_deg)), LEAST_SINE)
     return Pose(abs(polar), pose.azimuth_deg + turn + (180.0 if polar < 0 else 0.0))

@@ -17,9 +17,7 @@ class CastShadow(Effect):
     switch = "obstacles in the scene; every hit is tested against the light anyway, so it costs nothing"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
-        if _bodies(scene) or (scene.floor is not None and scene.floor.reflectance > 0):
-            return None
-        return "one convex body before darkness: nothing to fall on"
+        return "one convex body before darkness: nothing to fall on" if _alone(scene) else None
 
     def influence(self, scene: Scene, poses: Poses) -> Influence:
         """Everything where a body hides a required edge from the light; the floor's own step otherwise."""
@@ -64,9 +62,7 @@ class Interreflection(Effect):
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
-        if _bodies(scene) or (scene.floor is not None and scene.floor.reflectance > 0):
-            return None
-        return "one convex body before darkness: no surface sees another"
+        return "one convex body before darkness: no surface sees another" if _alone(scene) else None
 
     def influence(self, scene: Scene, poses: Poses) -> Influence:
         """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height."""
@@ -82,6 +78,11 @@ class Interreflection(Effect):
         levels = multiple * (faces.max(1) + behind)
         near = min([_clearance(own.points, body) for body in bodies] + _above_floor(scene, own.points))
         return added_light(scene, poses, np.broadcast_to(levels, own.contrast.shape), max(near, 1e-3))
+
+
+def _alone(scene: Scene) -> bool:
+    """Whether the object is one convex body before darkness."""
+    return not _bodies(scene) and (scene.floor is None or scene.floor.reflectance == 0)
 
 
 def _bodies(scene: Scene) -> list[Solid]:

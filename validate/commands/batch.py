@@ -15,7 +15,7 @@ import typer
 from render import Tolerance
 from scenes import InvalidInput
 from validate import campaign, export
-from validate.commands.common import Effects, Json, LeaveOutPx, LeaveOutVariance, app, progress, stoppable
+from validate.commands.common import AUTO, Effects, Json, LeaveOutPx, LeaveOutVariance, app, progress, stoppable
 from validate.cost.goal import check_accuracy, reach, seconds
 from validate.run import run
 from validate.store import RunFile
@@ -44,8 +44,8 @@ def validate_command(
         str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")
     ] = None,
     effects: Effects = "auto",
-    bias_px: LeaveOutPx = 0.005,
-    variance: LeaveOutVariance = 0.02,
+    bias_px: LeaveOutPx = AUTO.bias_px,
+    variance: LeaveOutVariance = AUTO.variance,
     log_json: Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")] = False,
     as_json: Json = False,
 ) -> None:

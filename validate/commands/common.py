@@ -13,6 +13,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from render import Tolerance
 from scenes import InvalidInput, Pose
 from validate.run import Progress as Report
 from validate.stopped import Interrupted
@@ -24,6 +25,7 @@ SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
 LightPose = Annotated[str, typer.Option(metavar="P,A", help="Light pose: polar angle and azimuth, degrees.")]
 
+AUTO = Tolerance()  # what auto leaves out unless told otherwise
 Effects = Annotated[
     str, typer.Option("--effects", metavar="WHICH", help="What is simulated: auto, all, or names with commas between.")
 ]

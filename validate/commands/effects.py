@@ -10,7 +10,7 @@ from rich.table import Table
 
 import scenes
 from render.effects import Decision, Effect, Tolerance, effects
-from validate.commands.common import Effects, Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
+from validate.commands.common import AUTO, Effects, Json, LeaveOutPx, LeaveOutVariance, SceneName, app, progress, say
 from validate.effects_check import RENDERED, Switched, check
 from validate.table import console
 
@@ -22,8 +22,8 @@ def effects_command(
         bool, typer.Option("--check", help="Render with each left-out effect, and with all, and compare.")
     ] = False,
     which: Effects = "auto",
-    bias_px: LeaveOutPx = 0.005,
-    variance: LeaveOutVariance = 0.02,
+    bias_px: LeaveOutPx = AUTO.bias_px,
+    variance: LeaveOutVariance = AUTO.variance,
     as_json: Json = False,
 ) -> None:
     """Which effects a scene calls for, why, their influence and cost. Exit status 1 if --check contradicts."""

@@ -15,6 +15,7 @@ from render import Tolerance
 from scenes import InvalidInput
 from validate import picture_file
 from validate.commands.common import (
+    AUTO,
     Effects,
     Json,
     LeaveOutPx,
@@ -36,8 +37,8 @@ def render_command(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
     noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
     effects: Effects = "auto",
-    bias_px: LeaveOutPx = 0.005,
-    variance: LeaveOutVariance = 0.02,
+    bias_px: LeaveOutPx = AUTO.bias_px,
+    variance: LeaveOutVariance = AUTO.variance,
     as_json: Json = False,
 ) -> None:
     """Render one image of a scene."""

@@ -149,19 +149,16 @@ class Choice:
         )
 
 
-KNOB = "edge_samples"  # what the noise at an edge depends on
-
-
 def qualities(*samples: int) -> tuple[Quality, ...]:
     """Qualities by rays a fine pixel (at an edge)."""
-    return tuple(Quality(**{KNOB: count}) for count in samples)
+    return tuple(Quality(edge_samples=count) for count in samples)
 
 
 def rays(quality: Quality) -> int:
     """Rays of a pixel at an edge."""
-    return quality.supersample**2 * getattr(quality, KNOB)
+    return quality.supersample**2 * quality.edge_samples
 
 
 def quality_name(quality: Quality) -> str:
     k = quality.supersample
-    return f"{k} x {k} x {getattr(quality, KNOB)} rays a pixel"
+    return f"{k} x {k} x {quality.edge_samples} rays a pixel"

@@ -16,7 +16,6 @@ from render import Quality
 from validate import campaign
 from validate.cost.goal import reach, seconds
 from validate.cost.interval import images
-from validate.cost.model import KNOB
 from validate.run import run
 
 _ACCURACIES = [0.2, 0.1, 0.05, 0.02]
@@ -74,7 +73,7 @@ def _by_hand(loaded: campaign.Campaign, accuracy: float) -> float:
     for count in _SWEPT:
         began = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
-            run(loaded, images(accuracy / _PLENTY), 1, folder, quality=Quality(**{KNOB: count}))
+            run(loaded, images(accuracy / _PLENTY), 1, folder, quality=Quality(edge_samples=count))
         took.append(time.perf_counter() - began)
     return min(took)
 
