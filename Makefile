@@ -20,11 +20,11 @@ fuzz: $(VENV)/.test-installed
 	$(BIN)/python -m tests.hard.fuzz --count 10000
 
 bench-planner: $(VENV)/.installed
-	$(BIN)/python -m planner.benchmark
+	$(BIN)/python -m tests.benchmarks.search
 
 # Accuracies and budgets asked for and reached, beside knobs set by hand (40 minutes).
 bench-cost: $(VENV)/.installed
-	$(BIN)/python -m validate.cost.proof task1
+	$(BIN)/python -m tests.proofs.cost task1
 
 lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .
@@ -38,7 +38,7 @@ reference: $(VENV)/.installed
 
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed
-	$(BIN)/python -m validate.proof kill --times 20
+	$(BIN)/python -m tests.proofs kill --times 20
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -1,14 +1,14 @@
 """An image becomes edge points, lines, corners and a distance, each with its covariance and a status."""
 
-from measure.bound import bound, image_bound
-from measure.conic import Ellipse, find_ellipse, fit_ellipse
-from measure.distance import Measurement, distance
-from measure.estimators import ESTIMATORS
-from measure.footprint import footprint
-from measure.lens import Lens, load_lens
-from measure.photo import Quadrilateral, Quantity, measure_quadrilateral
-from measure.propagate import Propagated, propagate
-from measure.relations import line_angle, point_distance
+from measure.bounds import bound, image_bound
+from measure.estimators.registry import ESTIMATORS
+from measure.features.conic import Ellipse, find_ellipse, fit_ellipse
+from measure.features.relations import line_angle, point_distance
+from measure.measurement import Measurement, distance
+from measure.photo.lens import Lens, load_lens
+from measure.photo.quadrilateral import Quadrilateral, Quantity, measure_quadrilateral
+from measure.propagation import Propagated, propagate
+from measure.region import footprint
 
 __all__ = [
     "ESTIMATORS", "Ellipse", "Lens", "Measurement", "Propagated", "Quadrilateral", "Quantity", "bound", "distance",

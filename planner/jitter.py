@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.view import project
+from planner.imaging.projection import project
 from scenes import Scene
 
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.predict import Objective, Price, check_objective, evaluator, in_units
-from planner.viewing import ViewingSpace
+from planner.prediction import Objective, Price, check_objective, evaluator, in_units
+from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene
 
 _CHUNK = 4096  # directions at a time, which bounds the memory

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.view import direction, frame
+from planner.imaging.projection import direction, frame
 from render import bsdf
-from render.mesh import mesh
+from render.meshes import mesh
 from render.rays import SURFACES
 from render.reflectance import indices
 from scenes import Floor, Pose, Scene

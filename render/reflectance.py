@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planner.illumination import bands
+from planner.imaging.illumination import bands
 from scenes import Material, Scene
 
 Vector = tuple[Any, Any, Any]

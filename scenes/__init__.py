@@ -1,23 +1,19 @@
 """What is to be measured, with what: object, material, camera, light, noise, task and poses."""
 
+from scenes.camera import Camera
 from scenes.errors import InvalidInput
+from scenes.lens import Lens
+from scenes.lights import Light
 from scenes.load import load, names
-from scenes.model import (
-    Block,
-    Camera,
-    Centre,
-    Corner,
-    Light,
-    Locator,
-    Material,
-    Mesh,
-    Scene,
-    Setting,
-    Task,
-)
-from scenes.optics import Floor, Jitter, Lens, Noise, Obstacle
+from scenes.materials import Material
+from scenes.measurands import Centre, Corner, Locator, Task
+from scenes.noise import Noise
+from scenes.parts.block import Block
+from scenes.parts.mesh_file import Mesh
+from scenes.parts.solid import Circle, Edge, Solid, block
 from scenes.pose import Pose
-from scenes.solid import Circle, Edge, Solid, block
+from scenes.scene import Scene, Setting
+from scenes.surroundings import Floor, Jitter, Obstacle
 
 __all__ = [
     "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",

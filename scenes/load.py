@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from scenes.errors import InvalidInput, describe
-from scenes.model import Scene
+from scenes.scene import Scene
 
 BUNDLED = Path(__file__).parent
 _MOST_BYTES = 1 << 20

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
@@ -19,3 +20,14 @@ Length = Annotated[float, Field(ge=1e-12, le=1e12)]  # cm
 Level = Annotated[float, Field(ge=1e-15, le=1e15)]  # grey levels
 Darkness = Annotated[float, Field(ge=0, le=1e15)]  # grey levels
 Trace = Annotated[float, Field(ge=0, le=1e15), AfterValidator(_none_or_some)]  # grey levels
+
+
+NotNegative = Annotated[float, Field(ge=0)]
+Curve = tuple[tuple[Positive, NotNegative], ...]
+
+
+def rising(key: str, rows: tuple) -> tuple:
+    """The rows of a table, once their wavelengths are known to rise."""
+    if any(a[0] >= b[0] for a, b in pairwise(rows)):
+        raise ValueError(f"{key} must be rows of rising wavelength, got {[row[0] for row in rows]}")
+    return rows

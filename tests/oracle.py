@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.special import ndtr
 
-from planner.reflectance import reflected
-from planner.view import direction, facing, frame, project
-from validate.hard.polygon import _scan_lines, _spans, polygon_image
+from planner.imaging.projection import direction, facing, frame, project
+from planner.imaging.reflectance import reflected
+from validation.hard.polygon import _scan_lines, _spans, polygon_image
 
 __all__ = ["block_image", "polygon_image", "shaded_image"]
 

@@ -18,12 +18,12 @@ from scipy.ndimage import map_coordinates
 from scipy.optimize import curve_fit
 from scipy.special import ndtr
 
-from measure.bound import corner_bound
-from measure.distance import separation
-from measure.estimators import ESTIMATORS
-from measure.layout import Layout, Optics, polygon_layout
-from measure.shape import find_shape, prepared
-from planner.view import project
+from measure.bounds import corner_bound
+from measure.estimators.registry import ESTIMATORS
+from measure.features.layout import Layout, Optics, polygon_layout
+from measure.features.shape import find_shape, prepared
+from measure.measurement import separation
+from planner.imaging.projection import project
 from tests.oracle import polygon_image
 
 SHAPE = (112, 152)

@@ -6,7 +6,7 @@ import numpy as np
 
 import planner
 import scenes
-from planner import benchmark
+from tests.benchmarks import search as benchmark
 from tests.scalar import variance_evaluate
 
 _SAMPLE = 100  # directions that the scalar version prices; it is the same work for each that can be seen

@@ -27,7 +27,7 @@ import planner
 import scenes
 from scenes import InvalidInput
 from scenes.load import BUNDLED
-from validate import picture_file
+from validation import picture_file
 
 MOST_SECONDS = 10
 MOST_MEMORY = 2**30

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from validate.hard import Answer, Case, Reference, catalogue, run
-from validate.hard.case import EPSILON, TIGHT, judge
+from validation.hard import Answer, Case, Reference, catalogue, run
+from validation.hard.case import EPSILON, TIGHT, judge
 
 CASES = catalogue()
 

@@ -6,7 +6,7 @@ import pytest
 import scenes
 from scenes import InvalidInput
 from tests.hard import fuzz
-from validate import picture_file
+from validation import picture_file
 
 
 def test_400_spoilt_inputs(tmp_path, capfd):

@@ -5,11 +5,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from planner.propagation import LineFit
-from planner.reflectance import beckmann
-from validate.hard import Answer, Case, Reference, fit_cases, planner_cases, precise, run
-from validate.hard.case import EPSILON
-from validate.hard.scenes_for import task1
+from planner.features.propagation import LineFit
+from planner.imaging.reflectance import beckmann
+from validation.hard import Answer, Case, Reference, fit_cases, planner_cases, precise, run
+from validation.hard.case import EPSILON
+from validation.hard.scenes_for import task1
 
 FAR_LINES = (1e6, 1e9)
 
@@ -86,7 +86,7 @@ def test_lengths_from_image_coordinates_fail_for_a_tiny_object(monkeypatch):
     """The image's middle added before the difference is taken, as it once was."""
     case = planner_cases.price("", task1(object={"size": [1.25e-8, 7.5e-9, 2.5e-9]}), (30, 135), (15, 315), "paper")
     assert run(case).verdict == "right"
-    outline = import_module("planner.outline")
+    outline = import_module("planner.features.projected_edges")
     plain = outline.from_axis
     monkeypatch.setattr(outline, "from_axis", lambda *args: (plain(*args) + 127.5) - 127.5)
     assert run(case).verdict == "WRONG"

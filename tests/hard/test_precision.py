@@ -8,9 +8,9 @@ import render
 from planner import ViewingSpace
 from render.precision import LONGEST_PX
 from scenes import InvalidInput
-from validate.hard import scenes_for
-from validate.hard.precision import SAFE, error_of_single, paper_in
-from validate.hard.precision_figure import draw
+from validation.hard import scenes_for
+from validation.hard.precision import SAFE, error_of_single, paper_in
+from validation.report.precision_figure import draw
 
 POSES = ViewingSpace(6, (0, 90)).poses
 

@@ -8,13 +8,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import planner
-from measure.estimators import ESTIMATORS
-from measure.layout import Optics, polygon_layout
-from measure.shape import find_shape
+from measure.estimators.registry import ESTIMATORS
+from measure.features.layout import Optics, polygon_layout
+from measure.features.shape import find_shape
 from scenes import InvalidInput, Task
-from scenes.solid import Solid
-from validate.hard.polygon import polygon_image
-from validate.hard.scenes_for import task1, with_solid
+from scenes.parts.solid import Solid
+from validation.hard.polygon import polygon_image
+from validation.hard.scenes_for import task1, with_solid
 
 RELATIVE = 1e-10
 PRICES = ("paper", "calibrated", "bound")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from scenes.load import BUNDLED
-from validate import comparison
+from validation import comparison
 
 pytestmark = pytest.mark.render
 
@@ -18,7 +18,7 @@ REFERENCE = Path(__file__).with_name("reference.json")
 def ice(*arguments):
     """With the variant of the reference: the rays of another one shift the means by some 0.005 px."""
     environment = {**os.environ, "ICE_VARIANT": comparison.read(REFERENCE)["variant"]}
-    command = [sys.executable, "-m", "validate.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
 
 

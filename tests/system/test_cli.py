@@ -13,7 +13,7 @@ pytestmark = pytest.mark.render
 
 
 def ice(*arguments, cwd=None):
-    command = [sys.executable, "-m", "validate.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import measure
 from measure import status
-from measure.layout import Optics
+from measure.features.layout import Optics
 from scenes import InvalidInput
 from tests.oracle import polygon_image
 

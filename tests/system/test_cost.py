@@ -7,16 +7,16 @@ import sys
 import numpy as np
 import pytest
 
-import validate
-from validate import campaign
-from validate.cost.goal import reach
-from validate.cost.trial import trial
+import validation
+from validation.batch import campaign
+from validation.cost.goal import reach
+from validation.cost.trial import trial
 
 pytestmark = pytest.mark.render
 
 
 def ice(*arguments):
-    command = [sys.executable, "-m", "validate.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
@@ -36,8 +36,8 @@ def test_accuracy_asked_for_is_reached_in_every_setting(small_toml, tmp_path):
 
 def test_images_of_a_later_stage_change_nothing_before(small_toml, tmp_path):
     loaded = campaign.load(small_toml)
-    grown = validate.run(loaded, 60, 1, tmp_path / "grown", 1, more=lambda store: [90, 60, 60, 60])
-    plain = validate.run(loaded, 60, 1, tmp_path / "plain", 1)
+    grown = validation.run(loaded, 60, 1, tmp_path / "grown", 1, more=lambda store: [90, 60, 60, 60])
+    plain = validation.run(loaded, 60, 1, tmp_path / "plain", 1)
     assert [row.main.n for row in grown.rows] == [90, 60, 60, 60]
     assert [r.main.empirical for r in grown.rows[1:]] == [r.main.empirical for r in plain.rows[1:]]
     assert grown.rows[0].main.empirical != plain.rows[0].main.empirical

@@ -5,9 +5,9 @@ import pytest
 import render
 import scenes
 from render import variant
-from render.effects import Tolerance
+from render.phenomena import Tolerance
 from scenes import Floor, Lens
-from validate.effects_check import RENDERED, Switched, check
+from validation.effects_check import RENDERED, Switched, check
 
 pytestmark = pytest.mark.render
 SLOW = variant.choose().startswith("scalar")  # everything on runs as interpreted Python there

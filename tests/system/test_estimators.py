@@ -6,9 +6,9 @@ import pytest
 import measure
 import render
 from measure import status
-from measure.estimators import ESTIMATORS
-from measure.layout import Optics, layout_of, polygon_layout
-from measure.shape import find_shape, prepared
+from measure.estimators.registry import ESTIMATORS
+from measure.features.layout import Optics, layout_of, polygon_layout
+from measure.features.shape import find_shape, prepared
 from scenes import Pose
 from tests.benchmarks.estimators import SHAPE, random_block, rectangle, trial, worst_bias
 from tests.oracle import polygon_image

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import render
-from planner.view import direction, frame
+from planner.imaging.projection import direction, frame
 from render import variant
 from render.build import polariser_axes
 from render.reflectance import NUMPY, Index, brightness, polarised_across

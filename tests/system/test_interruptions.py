@@ -13,12 +13,12 @@ import sys
 import pytest
 
 import scenes
-import validate
+import validation
 from scenes import InvalidInput
-from validate import pool, store
-from validate.proof.kill import same
-from validate.store import RunFile
-from validate.work import CHUNK
+from tests.proofs.kill import same
+from validation.batch import pool, store
+from validation.batch.store import RunFile
+from validation.batch.work import CHUNK
 
 pytestmark = pytest.mark.render
 
@@ -40,7 +40,7 @@ def unbroken(small, tmp_path_factory):
 
 def run(scene, directory, **options):
     """Also writes the final table, as the command does."""
-    found = validate.run(scene, **{"renders": RENDERS, "seed": 5, "out": directory, "workers": 1, **options})
+    found = validation.run(scene, **{"renders": RENDERS, "seed": 5, "out": directory, "workers": 1, **options})
     (directory / "result.json").write_text(json.dumps(found.to_json()))
     return found
 
@@ -66,7 +66,7 @@ def images(directory):
 
 def test_killed_three_times(small_toml, tmp_path):
     """The proof of the README, reduced: SIGKILL at random moments, and the final tables equal bit for bit."""
-    command = [sys.executable, "-m", "validate.proof", "kill", "--times", "3", "--scene", small_toml, "--out", tmp_path]
+    command = [sys.executable, "-m", "tests.proofs", "kill", "--times", "3", "--scene", small_toml, "--out", tmp_path]
     done = subprocess.run([*map(str, command), "--renders", "750"], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "3 of 3 kills hit a running process; final tables, 3000 images" in done.stdout
@@ -98,7 +98,7 @@ def test_dead_worker_process_is_replaced(small, unbroken, tmp_path):
 
 def test_workers_that_keep_dying_stop_the_run(small, tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "_begin", operator.index)  # fails in every worker
-    with pytest.raises(validate.Stopped, match=r"^stopped: workers died 3 times in a row; .*; the same command cont"):
+    with pytest.raises(validation.Stopped, match=r"^stopped: workers died 3 times in a row; .*; the same command cont"):
         run(small, tmp_path, workers=2)
 
 
@@ -128,7 +128,7 @@ def test_dask_worker_killed_midway(small, unbroken, tmp_path, cluster):
 
 
 def test_dask_scheduler_gone(small, unbroken, tmp_path, cluster):
-    with pytest.raises(validate.Stopped, match=r"^stopped: the Dask scheduler at tcp://127.0.0.1:\d+ is gone"):
+    with pytest.raises(validation.Stopped, match=r"^stopped: the Dask scheduler at tcp://127.0.0.1:\d+ is gone"):
         run(small, tmp_path, dask=cluster.scheduler_address, progress=after(CHUNK, cluster.close))
     assert 0 < images(tmp_path) < 4 * RENDERS
     run(small, tmp_path)
@@ -154,7 +154,7 @@ def test_full_disk(small, unbroken, tmp_path, monkeypatch):
 
     monkeypatch.setattr(store.sqlite3, "connect", tight)
     with pytest.raises(
-        validate.Stopped, match=r"run.sqlite could not be written \(database or disk is full\); what is"
+        validation.Stopped, match=r"run.sqlite could not be written \(database or disk is full\); what is"
     ):
         run(small, tmp_path)
     monkeypatch.undo()
@@ -171,7 +171,7 @@ def test_locked_database(small, unbroken, tmp_path, monkeypatch):
         others.append(sqlite3.connect(tmp_path / "run.sqlite"))
         others[0].execute("BEGIN IMMEDIATE")
 
-    with pytest.raises(validate.Stopped, match=r"run.sqlite could not be written \(database is locked\)"):
+    with pytest.raises(validation.Stopped, match=r"run.sqlite could not be written \(database is locked\)"):
         run(small, tmp_path, progress=after(CHUNK, lock))
     others[0].close()
     run(small, tmp_path)
@@ -190,7 +190,7 @@ def test_directory_in_use(small, tmp_path):
     ("sent", "status", "word"), [(signal.SIGTERM, 143, "terminated"), (signal.SIGINT, 130, "interrupted")]
 )
 def test_signals_stop_with_one_line_and_leave_no_process(small_toml, tmp_path, sent, status, word):
-    command = [sys.executable, "-m", "validate.cli", "validate", small_toml, "--renders", "5000", "--workers", "2"]
+    command = [sys.executable, "-m", "validation.cli", "validate", small_toml, "--renders", "5000", "--workers", "2"]
     with subprocess.Popen(
         [*map(str, command), "--out", str(tmp_path), "--log-json"],
         stderr=subprocess.PIPE,
@@ -211,7 +211,7 @@ def test_signals_stop_with_one_line_and_leave_no_process(small_toml, tmp_path, s
 
 
 def test_log_json(small_toml, tmp_path):
-    command = [sys.executable, "-m", "validate.cli", "validate", small_toml, "--renders", "20", "--workers", "1"]
+    command = [sys.executable, "-m", "validation.cli", "validate", small_toml, "--renders", "20", "--workers", "1"]
     done = subprocess.run([*map(str, command), "--out", str(tmp_path), "--log-json"], capture_output=True, text=True)
     events = [json.loads(line) for line in done.stderr.splitlines()]
     assert [event["event"] for event in events] == ["started", *["committed"] * 4, "finished"]

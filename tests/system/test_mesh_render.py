@@ -5,7 +5,7 @@ import pytest
 
 import render
 import scenes
-from planner.view import project
+from planner.imaging.projection import project
 
 pytestmark = pytest.mark.render
 

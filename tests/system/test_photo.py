@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import measure
-from measure.find import edge_sigma, find_quadrilateral, noise_sigma
-from measure.lens import Lens
+from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
+from measure.photo.lens import Lens
 from scenes import InvalidInput
 from tests.benchmarks.estimators import random_block
 from tests.oracle import polygon_image

@@ -8,10 +8,10 @@ import pytest
 
 import planner
 import scenes
-from planner.exhaustive import price_pairs
-from planner.robust import altered
+from planner.search.exhaustive import price_pairs
+from planner.search.robustness import altered
 from scenes import InvalidInput
-from validate import cli
+from validation import cli
 
 
 def ice(monkeypatch, capsys, *arguments):

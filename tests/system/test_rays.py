@@ -7,8 +7,8 @@ import render
 import scenes
 from render import variant
 from render.build import description
-from render.image import Quality, window
 from render.optics import blur_and_bin
+from render.renderer import Quality, window
 from render.testing import assert_images_agree
 
 pytestmark = [

@@ -5,10 +5,10 @@ import pytest
 
 import measure
 import render
-from measure.layout import layout_of
-from measure.shape import prepared
-from planner.view import direction, frame, project
-from render.image import window
+from measure.features.layout import layout_of
+from measure.features.shape import prepared
+from planner.imaging.projection import direction, frame, project
+from render.renderer import window
 from scenes import InvalidInput, Pose
 from tests.oracle import block_image, polygon_image
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import scenes
-import validate
-from validate.campaign import Campaign
-from validate.cli import app
+import validation
+from validation.batch.campaign import Campaign
+from validation.cli.main import app
 
 pytestmark = pytest.mark.render
 
@@ -59,7 +59,7 @@ def campaign(small_toml):
 @pytest.fixture(scope="module")
 def found(campaign, tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
-    return validate.run(campaign, renders=250, seed=1, out=out, workers=1), out
+    return validation.run(campaign, renders=250, seed=1, out=out, workers=1), out
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from planner.reflectance import fresnel, reflected
+from planner.imaging.reflectance import fresnel, reflected
 from render import bsdf, variant
 from render.reflectance import NUMPY, Index, brightness, indices
 from render.reflectance import fresnel as complex_fresnel

@@ -9,13 +9,13 @@ import pytest
 import measure
 import render
 import scenes
-import validate
+import validation
 from render import variant
 from scenes import InvalidInput
-from validate import work
-from validate.campaign import Campaign, Grid
-from validate.store import RunFile
-from validate.work import measure_chunk
+from validation.batch import work
+from validation.batch.campaign import Campaign, Grid
+from validation.batch.store import RunFile
+from validation.batch.work import measure_chunk
 
 pytestmark = pytest.mark.render
 
@@ -28,7 +28,7 @@ def few(task1):
 
 @pytest.fixture(scope="module")
 def found(few, tmp_path_factory):
-    return validate.run(few, renders=500, seed=11, out=tmp_path_factory.mktemp("run"), workers=1)
+    return validation.run(few, renders=500, seed=11, out=tmp_path_factory.mktemp("run"), workers=1)
 
 
 def test_predictions_agree(found):
@@ -47,14 +47,14 @@ def test_wrong_predictions_are_rejected_by_the_same_verdict(found):
     counts = [row.main.n for row in found.rows]
     for factor in (1.3, 1 / 1.3, 1e-6):
         ratios = [row.main.empirical / (factor * row.main.propagated) for row in found.rows]
-        assert not validate.verdict(ratios, counts).agrees
+        assert not validation.verdict(ratios, counts).agrees
 
 
 def test_independent_errors_would_be_rejected(found, few):
     """What the paper assumes: edge points 1 px apart with independent errors. They are correlated over 3.5 px."""
     correlation_length = 2 * np.sqrt(np.pi) * few.locator.scale_px
     ratios = [correlation_length * row.main.empirical / row.calibrated for row in found.rows]
-    assert not validate.verdict(ratios, [row.main.n for row in found.rows]).agrees
+    assert not validation.verdict(ratios, [row.main.n for row in found.rows]).agrees
 
 
 def test_json_document(found):
@@ -72,13 +72,13 @@ def numbers(result):
 
 
 def test_any_number_of_workers_gives_the_same_numbers(few, found, tmp_path):
-    again = validate.run(few, renders=500, seed=11, out=tmp_path, workers=2)
+    again = validation.run(few, renders=500, seed=11, out=tmp_path, workers=2)
     assert numbers(again) == numbers(found)
 
 
 def test_another_seed_gives_other_numbers(few, found, tmp_path):
     one = few.model_copy(update={"settings": few.settings[:1]})
-    other = validate.run(one, renders=50, seed=12, out=tmp_path, workers=1)
+    other = validation.run(one, renders=50, seed=12, out=tmp_path, workers=1)
     assert other.rows[0].main.empirical != found.rows[0].main.empirical
 
 
@@ -91,11 +91,11 @@ def test_interrupted_run_continues_with_the_same_numbers(few, found, tmp_path):
             raise Stop
 
     with pytest.raises(Stop):
-        validate.run(few, renders=500, seed=11, out=tmp_path, workers=1, progress=stop_midway)
+        validation.run(few, renders=500, seed=11, out=tmp_path, workers=1, progress=stop_midway)
     before = RunFile.reopen(tmp_path)
     assert 0 < before.images() < 2000
     before.close()
-    assert numbers(validate.run(few, renders=500, seed=11, out=tmp_path, workers=1)) == numbers(found)
+    assert numbers(validation.run(few, renders=500, seed=11, out=tmp_path, workers=1)) == numbers(found)
 
 
 def test_what_is_predicted_is_what_is_measured(task1):
@@ -122,16 +122,16 @@ def test_what_is_predicted_is_what_is_measured(task1):
 
 def test_directory_of_another_run_is_refused(few, tmp_path):
     one = few.model_copy(update={"settings": few.settings[:1]})
-    validate.run(one, renders=20, seed=1, out=tmp_path, workers=1)
+    validation.run(one, renders=20, seed=1, out=tmp_path, workers=1)
     refused = r"--out must be a new directory or hold this run, got .*, where {} \(--fresh starts anew\)"
     with pytest.raises(InvalidInput, match=refused.format("seed is 1, not 2")):
-        validate.run(one, renders=20, seed=2, out=tmp_path, workers=1)
+        validation.run(one, renders=20, seed=2, out=tmp_path, workers=1)
     noisier = one.model_copy(update={"noise": one.noise.model_copy(update={"sigma": 3.0})})
     with pytest.raises(InvalidInput, match=refused.format(r"campaign.scenes\[0\].noise.sigma is 2.4, not 3.0")):
-        validate.run(noisier, renders=20, seed=1, out=tmp_path, workers=1)
+        validation.run(noisier, renders=20, seed=1, out=tmp_path, workers=1)
     with pytest.raises(InvalidInput, match=refused.format('effects is "auto", not "floor"')):
-        validate.run(one, renders=20, seed=1, out=tmp_path, workers=1, effects="floor")
-    assert validate.run(one, renders=20, seed=2, out=tmp_path, workers=1, fresh=True).seed == 2
+        validation.run(one, renders=20, seed=1, out=tmp_path, workers=1, effects="floor")
+    assert validation.run(one, renders=20, seed=2, out=tmp_path, workers=1, fresh=True).seed == 2
 
 
 def test_every_failed_measurement_is_a_row(task1, tmp_path):
@@ -139,7 +139,7 @@ def test_every_failed_measurement_is_a_row(task1, tmp_path):
     dim = task1.model_copy(update={
         "camera": task1.camera.model_copy(update={"exposure": 40.0}), "settings": task1.settings[4:5], "same_scale": ()
     })  # fmt: skip
-    result = validate.run(dim, renders=100, seed=3, out=tmp_path, workers=1)
+    result = validation.run(dim, renders=100, seed=3, out=tmp_path, workers=1)
     strict, loose = result.rows[0].classic
     assert strict.failed > 0
     assert strict.failed >= loose.failed
@@ -169,13 +169,13 @@ def test_partial_noise_gives_the_numbers_of_full_frames(few):
 )
 def test_bad_arguments(few, tmp_path, arguments, line):
     with pytest.raises(InvalidInput, match=line):
-        validate.run(few, out=tmp_path, **arguments)
+        validation.run(few, out=tmp_path, **arguments)
 
 
 def test_scene_without_settings(tmp_path):
     empty = scenes.load("task1").model_copy(update={"settings": ()})
     with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
-        validate.run(empty, out=tmp_path)
+        validation.run(empty, out=tmp_path)
 
 
 def test_setting_that_cannot_be_is_told_of_and_the_others_are_worked_on(few, tmp_path):
@@ -183,9 +183,11 @@ def test_setting_that_cannot_be_is_told_of_and_the_others_are_worked_on(few, tmp
     grid = Grid(sensor_polar=(25, 80), sensor_azimuth=(45,), light_polar=(15,), light_azimuth=(0,))
     camera = few.camera.model_copy(update={"distance": 6.0, "focal_px": 20.0})
     near = few.model_copy(update={"camera": camera, "same_scale": ()})
-    result = validate.run(Campaign(name="near", scenes=(near,), grid=grid), renders=20, seed=1, out=tmp_path, workers=1)
+    result = validation.run(
+        Campaign(name="near", scenes=(near,), grid=grid), renders=20, seed=1, out=tmp_path, workers=1
+    )
     assert [row.index for row in result.rows] == [0]
     assert result.refused == {1: "sensor must be outside the object, got (80, 45) at 6 cm"}
     only = grid.model_copy(update={"sensor_polar": (80.0,)})
     with pytest.raises(InvalidInput, match="sensor must be outside the object"):
-        validate.run(Campaign(name="near", scenes=(near,), grid=only), renders=20, out=tmp_path / "only", workers=1)
+        validation.run(Campaign(name="near", scenes=(near,), grid=only), renders=20, out=tmp_path / "only", workers=1)

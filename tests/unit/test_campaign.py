@@ -7,8 +7,8 @@ import pytest
 
 import scenes
 from scenes import InvalidInput
-from validate import campaign
-from validate.campaign import Campaign, Grid
+from validation.batch import campaign
+from validation.batch.campaign import Campaign, Grid
 
 
 @pytest.fixture

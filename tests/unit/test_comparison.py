@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from scenes import InvalidInput
-from validate import comparison
+from validation import comparison
 
 
 def document(rng, settings=4, n=1000, factor=1.0, shift=0.0, failed=0):

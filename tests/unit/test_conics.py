@@ -6,8 +6,8 @@ import pytest
 import measure
 import planner
 import scenes
-from planner.circles import fisher_centre, rim
-from planner.prices import PAPER_KAPPA2, paper
+from planner.features.circles import fisher_centre, rim
+from planner.models.models import PAPER_KAPPA2, paper
 
 COUNT = 1500
 TOLERANCE = 4 * np.sqrt(2 / (COUNT - 1))  # four standard errors of a variance

@@ -8,13 +8,13 @@ import pytest
 import scenes
 from render import Quality
 from scenes import InvalidInput
-from validate.campaign import Campaign
-from validate.cost import goal, interval
-from validate.cost.knob import slope
-from validate.cost.model import CostModel, Rendered, combined, qualities
-from validate.cost.points import points_knob
-from validate.stages import Stages
-from validate.statistics import ratio_interval
+from validation.batch.campaign import Campaign
+from validation.batch.stages import Stages
+from validation.cost import goal, interval
+from validation.cost.model import CostModel, Rendered, combined, qualities
+from validation.cost.parameter import slope
+from validation.cost.points import points_knob
+from validation.statistics import ratio_interval
 
 REPETITIONS = 2000
 

@@ -5,7 +5,7 @@ import pytest
 
 import render
 import scenes
-from render.effects import REGISTER, Tolerance, choose
+from render.phenomena import REGISTER, Tolerance, choose
 from scenes import Floor, InvalidInput, Noise, Obstacle, Pose
 from scenes.load import load, names
 
@@ -60,7 +60,7 @@ def test_decision_is_made_for_the_setting(task1):
     """An upright that shades a required edge from one light and not from the other."""
     scene = task1.model_copy(update={"obstacles": (Obstacle(corner=(14, 0, 0), size=(1, 7.5, 10)),)})
     shades = REGISTER["cast_shadow"]
-    from render.effects.base import Poses
+    from render.phenomena.base import Poses
 
     def influence(light):
         return shades.influence(scene, Poses(np.array([[30.0, 135.0]]), np.array([light], float)))

@@ -4,10 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from render.effects import REGISTER
+from render.phenomena import REGISTER
 from scenes import InvalidInput
-from validate import report, run, work
-from validate.work import Rendering
+from validation import run
+from validation.batch import work
+from validation.batch.work import Rendering
+from validation.report import page as report
 
 
 def test_effects_are_recorded_and_shown(task1):

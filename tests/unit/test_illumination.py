@@ -6,8 +6,8 @@ import pytest
 
 import planner
 import scenes
-from planner.illumination import bands, electric_field, level
-from planner.reflectance import attenuation, beckmann, fresnel, perpendicular_share, reflected
+from planner.imaging.illumination import bands, electric_field, level
+from planner.imaging.reflectance import attenuation, beckmann, fresnel, perpendicular_share, reflected
 from scenes import Material
 from tests.unit.test_reflectance import textbook_fresnel, unit
 

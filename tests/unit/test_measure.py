@@ -6,12 +6,12 @@ import pytest
 import measure
 import scenes
 from measure import status
-from measure.corners import intersect, line_equations
-from measure.layout import layout_of
-from measure.lines import fit_lines, regression
-from measure.points import EdgePoints
-from measure.shape import prepared
-from planner.view import project
+from measure.features.corners import intersect, line_equations
+from measure.features.layout import layout_of
+from measure.features.lines import fit_lines, regression
+from measure.features.points import EdgePoints
+from measure.features.shape import prepared
+from planner.imaging.projection import project
 from scenes import InvalidInput, Noise
 from tests.oracle import polygon_image
 

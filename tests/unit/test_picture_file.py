@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenes import InvalidInput
-from validate import picture_file
+from validation import picture_file
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("a.png", 0.5), ("a.tif", 1e-5), ("a.npy", 0.0)])

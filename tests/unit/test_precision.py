@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import planner
-from planner.prices import paper
-from planner.propagation import corner_covariance, distance_variance, fit_line, offset_variance
+from planner.features.propagation import corner_covariance, distance_variance, fit_line, offset_variance
+from planner.models.models import paper
 
 mp.mp.dps = 50
 

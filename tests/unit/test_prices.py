@@ -7,11 +7,11 @@ import pytest
 
 import planner
 import scenes
-from planner.contrast import contrast, side_levels
-from planner.locator import correlation, kappa2
-from planner.outline import outline
-from planner.propagation import corner_covariance, distance_variance
-from planner.view import edge_points, project
+from planner.features.projected_edges import outline
+from planner.features.propagation import corner_covariance, distance_variance
+from planner.imaging.contrast import contrast, side_levels
+from planner.imaging.projection import edge_points, project
+from planner.models.locator import correlation, kappa2
 from scenes import InvalidInput
 
 

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from planner.propagation import corner_covariance, distance_variance, fit_line, line_covariance, offset_variance
+from planner.features.propagation import (
+    corner_covariance,
+    distance_variance,
+    fit_line,
+    line_covariance,
+    offset_variance,
+)
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ import pytest
 
 import planner
 import scenes
-from planner.outline import outline
-from planner.prices import paper
-from planner.quantity import jacobian, quantity, required_edges
-from planner.view import edge_points, project
+from planner.features.measurand import jacobian, quantity, required_edges
+from planner.features.projected_edges import outline
+from planner.imaging.projection import edge_points, project
+from planner.models.models import paper
 from scenes import InvalidInput
 
 SENSOR, LIGHT = np.array([35.0, 70.0]), np.array([20.0, 200.0])
@@ -124,7 +124,7 @@ def test_paper_price_by_monte_carlo(name, angle, rng):
     fractions = np.linspace(0, 1, 100)
     points = edge_points(scene.solid, view.names, fractions)
     image = project(points.reshape(-1, 3), SENSOR, scene.camera).reshape(len(view.names), 100, 2)
-    from planner.contrast import squared_contrast
+    from planner.imaging.contrast import squared_contrast
 
     squared = squared_contrast(scene, view.names, fractions, SENSOR, LIGHT, fall_off=False)
     sigma = np.sqrt(8.697) * scene.noise.sigma / np.sqrt(squared)

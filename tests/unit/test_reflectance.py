@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from planner.reflectance import attenuation, beckmann, fresnel, reflected
+from planner.imaging.reflectance import attenuation, beckmann, fresnel, reflected
 from scenes import Material
 
 mp.mp.dps = 50

@@ -5,10 +5,10 @@ import pytest
 
 import planner
 import scenes
-from planner.alternating import alternate
-from planner.exhaustive import _blocks, exhaustive, price_pairs
-from planner.separable import separable
-from planner.viewing import ViewingSpace, local_minima
+from planner.search.alternating import alternate
+from planner.search.exhaustive import _blocks, exhaustive, price_pairs
+from planner.search.separable import separable
+from planner.search.viewing import ViewingSpace, local_minima
 from scenes import InvalidInput
 from tests.scalar import variance_evaluate
 

@@ -8,9 +8,10 @@ import trimesh
 
 import planner
 import scenes
-from planner.view import direction
-from planner.visibility import seen, turned, visible_spans
-from scenes import InvalidInput, mesh
+from planner.imaging.projection import direction
+from planner.imaging.visibility import seen, turned, visible_spans
+from scenes import InvalidInput
+from scenes.parts import mesh
 
 BLOCK = scenes.block((12.5, 7.5, 2.5))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from validate.statistics import correlation, p_value, ratio_interval, verdict
+from validation.statistics import correlation, p_value, ratio_interval, verdict
 
 
 def tables(rng, count, rows, n, factor=1.0):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.view import depth, direction, facing, frame, project
+from planner.imaging.projection import depth, direction, facing, frame, project
 
 
 @pytest.mark.parametrize("pose", [(0, 0), (0, 130), (30, 90), (90, 200), (180, 45), (1e-9, 12)])

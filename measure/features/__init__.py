@@ -1,0 +1,1 @@
+"""Lines, corners, circles: what is found in an image, with its covariance."""

@@ -1,0 +1,268 @@
+"""What a measurement expects to see: the required edges in the image, their neighbours, and the faces beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from skimage.draw import polygon2mask
+
+from measure.estimators.shading import Shading, face_shadings
+from planner.features.projected_edges import outline
+from planner.imaging.projection import depth, direction, facing, project
+from scenes import Corner, InvalidInput, Pose, Scene
+
+BACKGROUND = -1
+
+
+@dataclass(frozen=True)
+class Optics:
+    """What the estimators have to know of the image: its size, blur and noise, and the locators' settings.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (height, width), px.
+    blur_px : float
+        Standard deviation of the lens' blur, px; the pixels' own box comes on top.
+    noise_variance : float
+        Variance of a grey level.
+    scale_px, window_px : float
+        Smoothing scale and half search window of the point locators, px.
+    """
+
+    shape: tuple[int, int]
+    blur_px: float = 0.6
+    noise_variance: float = 1.0
+    scale_px: float = 1.0
+    window_px: float = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Expected image of E edges.
+
+    Attributes
+    ----------
+    names : tuple of str
+    ends : ndarray, shape (E, 2, 2)
+        End points (x, y) of each edge, px; NaN where it is not in front of the sensor.
+    visible : ndarray of bool, shape (E,)
+    shown : ndarray, shape (E, 2)
+        The piece of each edge that nothing hides, as fractions (from, to) of its length.
+    corners : tuple of (int, int)
+        Pairs of edges whose lines are intersected.
+    joints : tuple of ((int, int), (int, int))
+        (edge, end) pairs that meet in one vertex.
+    beside : tuple
+        For each edge and each of its ends the unit directions (k, 2) of all other visible edges that start there.
+    apart : tuple
+        For each edge the segments (k, 2, 2) of the visible edges that share no end with it.
+    others : ndarray, shape (k, 2, 2)
+        Visible edges that are not among the E.
+    faces : tuple of ndarray
+        Visible faces as polygons (k, 2), the farthest first.
+    sides : ndarray of int, shape (E, 2)
+        Index of the face on the side the normal (-t_y, t_x) points to and on the other; BACKGROUND where there is none.
+    shadings : tuple
+        For each of the faces its `Shading`, or None where the light is not known.
+    optics : Optics
+    """
+
+    names: tuple[str, ...]
+    ends: np.ndarray
+    visible: np.ndarray
+    shown: np.ndarray
+    corners: tuple[tuple[int, int], ...]
+    joints: tuple[tuple[tuple[int, int], tuple[int, int]], ...]
+    beside: tuple[tuple[np.ndarray, np.ndarray], ...]
+    apart: tuple[np.ndarray, ...]
+    others: np.ndarray
+    faces: tuple[np.ndarray, ...]
+    sides: np.ndarray
+    shadings: tuple[Shading | None, ...]
+    optics: Optics
+
+    def moved(self, shift: tuple[float, float], turn: float) -> Layout:
+        """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
+        middle = self.ends.reshape(-1, 2).mean(0)
+        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+        def move(points: np.ndarray) -> np.ndarray:
+            return (points - middle) @ rotation.T + middle + np.asarray(shift)
+
+        return replace(
+            self,
+            ends=move(self.ends),
+            beside=tuple(tuple(away @ rotation.T for away in pair) for pair in self.beside),
+            apart=tuple(move(segments) for segments in self.apart),
+            others=move(self.others),
+            faces=tuple(move(face) for face in self.faces),
+        )
+
+    def shifted(self, offsets: np.ndarray) -> Layout:
+        """The layout with each edge's two ends moved along its normal by offsets (E, 2), px."""
+        return replace(self, ends=self.ends + offsets[..., None] * self.normals[:, None])
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Unit direction of each edge, shape (E, 2)."""
+        along = self.ends[:, 1] - self.ends[:, 0]
+        return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Unit normal (-t_y, t_x) of each edge, shape (E, 2)."""
+        directions = self.directions
+        return np.stack([-directions[:, 1], directions[:, 0]], 1)
+
+    def without_slivers(self, width: float) -> Layout:
+        """The layout without faces that reach less than ``width`` px beyond an edge: too thin to show a level.
+
+        What lies beyond them counts as background; that such an edge is crowded still shows in `apart`.
+        """
+        thin = set()
+        for (start, _), normal, pair in zip(self.ends, self.normals, self.sides, strict=True):
+            reach = [np.abs((self.faces[f] - start) @ normal).max() if f != BACKGROUND else np.inf for f in pair]
+            thin |= {int(f) for f, far in zip(pair, reach, strict=True) if far < width}
+        if not thin:
+            return self
+        edges = [(self.ends, normal) for normal in self.normals]
+
+        def hugs(segment: np.ndarray) -> bool:
+            return any(
+                (np.abs((segment - ends[i, 0]) @ normal) < width).all() for i, (ends, normal) in enumerate(edges)
+            )
+
+        kept = [segment for segment in self.others if not hugs(segment)]
+        outside = np.full((2, 2), -1e9)
+        return replace(
+            self,
+            sides=np.where(np.isin(self.sides, list(thin)), BACKGROUND, self.sides),
+            faces=tuple(outside if i in thin else face for i, face in enumerate(self.faces)),
+            others=np.array(kept).reshape(-1, 2, 2),
+            apart=tuple(np.array([s for s in a if not hugs(s)]).reshape(-1, 2, 2) for a in self.apart),
+        )
+
+    def shade(self, face: int, points: np.ndarray) -> np.ndarray:
+        """Brightness of a face relative to its mean at places (..., 2), px; 1 where nothing is known."""
+        known = face != BACKGROUND and self.shadings[face] is not None
+        return self.shadings[face](points) if known else np.ones(points.shape[:-1])
+
+    def labels(self) -> np.ndarray:
+        """Which face each pixel belongs to, int, shape (height, width)."""
+        found = np.full(self.optics.shape, BACKGROUND)
+        for index, face in enumerate(self.faces):
+            found[polygon2mask(self.optics.shape, face[:, ::-1])] = index
+        return found
+
+
+def optics_of(scene: Scene) -> Optics:
+    """The scene's camera, noise and locator settings."""
+    camera, locator = scene.camera, scene.locator
+    shape = camera.height, camera.width
+    return Optics(shape, camera.blur_px, scene.noise.variance, locator.scale_px, locator.window_px)
+
+
+@lru_cache(maxsize=64)
+def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
+    """The task's edges as a sensor pose projects them.
+
+    Raises
+    ------
+    InvalidInput
+        If the task is not the distance between two corners.
+
+    With the light known, the shading of each face is known too, and a face that is not lit is background.
+    """
+    if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
+        raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
+    solid, pose = scene.solid, np.array(list(sensor))
+    view = outline(scene, pose)
+    points = project(solid.vertices, pose, scene.camera)
+    seen = facing(solid, scene.camera.distance * direction(pose))
+    shadings = [None] * len(solid.faces) if light is None else face_shadings(scene, sensor, light)
+    if light is not None and any(shadings):
+        seen = seen & np.array([shading is not None for shading in shadings])
+    required = [solid.edge(name) for name in view.names]
+    shown = [edge for edge in solid.edges if seen[list(edge.faces)].any()]
+    order = sorted(
+        np.flatnonzero(seen), key=lambda f: -depth(solid.vertices[list(solid.faces[f])], pose, scene.camera).mean()
+    )
+    place = {int(f): i for i, f in enumerate(order)}
+    faces = tuple(points[list(solid.faces[f])] for f in order)
+    ends = np.array([points[list(edge.ends)] for edge in required])
+    return Layout(
+        names=view.names,
+        ends=ends,
+        visible=view.visible & np.isfinite(ends).all((1, 2)),
+        shown=view.shown,
+        corners=tuple((2 * k, 2 * k + 1) for k in range(2)),
+        joints=_joints([edge.ends for edge in required]),
+        beside=tuple(tuple(_away(points, edge, end, shown) for end in (0, 1)) for edge in required),
+        apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),
+        others=_segments(points, [e for e in shown if e not in required]),
+        faces=faces,
+        sides=np.array([_sides(points, edge, solid.faces, place) for edge in required]),
+        shadings=tuple(shadings[f] for f in order),
+        optics=optics_of(scene),
+    )
+
+
+def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
+    """Layout of a convex polygon alone on a background, from its corners (k, 2), px, in order around it.
+
+    Edge i runs from corner i to corner i + 1; corner i is where the edges i - 1 and i meet.
+    """
+    corners = np.asarray(corners, float)
+    count = len(corners)
+    ends = np.stack([corners, np.roll(corners, -1, 0)], 1)
+    unit = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True)
+    indices = [(i, (i + 1) % count) for i in range(count)]
+    x, y = corners.T
+    clockwise = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0  # as seen, with y down
+    return Layout(
+        names=tuple(f"s{i + 1}" for i in range(count)),
+        ends=ends,
+        visible=np.ones(count, bool),
+        shown=np.tile([0.0, 1.0], (count, 1)),
+        corners=tuple(((i - 1) % count, i) for i in range(count)),
+        joints=_joints(indices),
+        beside=tuple((-unit[[(i - 1) % count]], unit[[(i + 1) % count]]) for i in range(count)),
+        apart=tuple(ends[[j for j in range(count) if not set(indices[i]) & set(indices[j])]] for i in range(count)),
+        others=np.empty((0, 2, 2)),
+        faces=(corners,),
+        sides=np.tile([0, BACKGROUND] if clockwise else [BACKGROUND, 0], (count, 1)),
+        shadings=(Shading.uniform(corners),),
+        optics=optics,
+    )
+
+
+def _joints(ends: list[tuple[int, int]]) -> tuple:
+    """Pairs of (edge, end) that share a vertex."""
+    flat = [(vertex, (i, end)) for i, pair in enumerate(ends) for end, vertex in enumerate(pair)]
+    return tuple((a, b) for k, (v, a) in enumerate(flat) for w, b in flat[k + 1 :] if v == w)
+
+
+def _away(points: np.ndarray, edge, end: int, shown) -> np.ndarray:
+    here = edge.ends[end]
+    found = [points[e.ends[1 - e.ends.index(here)]] - points[here] for e in shown if e is not edge and here in e.ends]
+    found = np.array(found).reshape(-1, 2)
+    length = np.linalg.norm(found, axis=1, keepdims=True)
+    return found / np.where(length > 0, length, 1)
+
+
+def _segments(points: np.ndarray, edges) -> np.ndarray:
+    return np.array([points[list(edge.ends)] for edge in edges]).reshape(-1, 2, 2)
+
+
+def _sides(points: np.ndarray, edge, faces, place: dict[int, int]) -> list[int]:
+    """Seen faces on the normal's side and on the other, told by the face's middle."""
+    start, stop = points[list(edge.ends)]
+    normal = np.array([-(stop - start)[1], (stop - start)[0]])
+    sides = [BACKGROUND, BACKGROUND]
+    for face in edge.faces:
+        if face in place:
+            sides[0 if (points[list(faces[face])].mean(0) - start) @ normal > 0 else 1] = place[face]
+    return sides

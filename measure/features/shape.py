@@ -1,0 +1,177 @@
+"""Lines and corners of a layout in a stack of images: the estimator, brought to where the edges really are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from measure import status
+from measure.estimators.estimate import Estimate, Estimator
+from measure.estimators.registry import CAPTURE, estimator
+from measure.features.alignment import align
+from measure.features.corners import corner_response, intersect, line_equations
+from measure.features.layout import Layout
+
+_MIN_SINE = 0.02  # of the angle between the lines of a corner: about a degree
+_GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
+_PASSES = 6
+_LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Lines and corners in n images.
+
+    Attributes
+    ----------
+    corners : ndarray, shape (n, C, 2)
+        (x, y), px; NaN where `status` is neither ``ok`` nor ``clutter``.
+    covariance : ndarray, shape (n, 2 C, 2 C)
+        Joint covariance of all corners' (x, y), px^2.
+    normals, points : ndarray, shape (n, E, 2)
+        Unit normal and one point of each line, px.
+    tilt_covariance : ndarray, shape (n, E, E)
+        Covariance of the lines' angles, rad^2.
+    status : ndarray of str, shape (n,)
+    edge_status : ndarray of str, shape (n, E)
+    edge_contrast : ndarray, shape (n, E)
+        Contrast at the middle of the edge, absolute, grey levels.
+    used, rejected : ndarray of int, shape (n, E)
+        Edge points, or pixels for the likelihood estimators.
+    """
+
+    corners: np.ndarray
+    covariance: np.ndarray
+    normals: np.ndarray
+    points: np.ndarray
+    tilt_covariance: np.ndarray
+    status: np.ndarray
+    edge_status: np.ndarray
+    edge_contrast: np.ndarray
+    used: np.ndarray
+    rejected: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def prepared(layout: Layout, name: str, threshold: float) -> Estimator:
+    """The estimator of a layout, made once."""
+    return estimator(layout, name, threshold)
+
+
+@lru_cache(maxsize=256)
+def _moved(layout: Layout, shift: tuple[float, float], turn: float) -> Layout:
+    return layout.moved(shift, turn)
+
+
+@lru_cache(maxsize=256)
+def _shifted(layout: Layout, offsets: tuple[float, ...]) -> Layout:
+    return layout.shifted(np.reshape(offsets, (-1, 2)))
+
+
+def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float = 12.0) -> Shape:
+    """Find the lines and corners of a layout in images, shape (n, height, width).
+
+    Each image is measured by itself: its result does not depend on the others of the stack. Where the edges are not
+    within the estimator's capture of their expected place, the layout is moved there first.
+    """
+    return _find(images, layout, name, threshold, _PASSES)
+
+
+def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passes: int) -> Shape:
+    tool = prepared(layout, name, threshold)
+    estimate = tool.estimate(images)
+    shape = _assemble(tool, layout, estimate)
+    frames = tool.frames
+    if any(frame.status not in status.MEASURED for frame in frames):
+        return shape
+    lengths = np.array([frame.length for frame in frames])
+    offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
+    limit = np.maximum(CAPTURE[name], 5 * _end_errors(tool, layout, estimate))
+    far = ~(np.abs(offsets) <= limit).all((1, 2))
+    lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
+    if not far.any() or passes == 0:
+        return _refuse(shape, far)
+    parts = [shape]
+    rows = np.arange(len(images))
+    source = np.zeros(len(images), int)
+    for move, which in _expectations(images, layout, offsets, far, lost, passes == _PASSES):
+        source[which], rows[which] = len(parts), np.arange(len(which))
+        parts.append(_find(images[which], move, name, threshold, passes - 1))
+    return _gather(parts, source, rows)
+
+
+def _expectations(images, layout, offsets, far, lost, first):
+    """(layout, images' indices) for the images whose edges are elsewhere: sought anew, or moved to where they seem."""
+    if first and lost.any():
+        which = np.flatnonzero(lost)
+        poses = align(images[which], layout)
+        for pose in np.unique(poses, axis=0):
+            if pose.any():
+                yield _moved(layout, tuple(pose[:2].tolist()), float(pose[2])), which[(poses == pose).all(1)]
+        far = far & ~lost
+    which = np.flatnonzero(far & np.isfinite(offsets).all((1, 2)))
+    keys = np.round(np.clip(offsets[which], -1, 1) / _GRID) * _GRID
+    for key in np.unique(keys, axis=0):
+        yield _shifted(layout, tuple(key.ravel().tolist())), which[(keys == key).all((1, 2))]
+
+
+def _end_errors(tool: Estimator, layout: Layout, estimate: Estimate) -> np.ndarray:
+    """Standard deviation of each line's offset at its two ends, px, (n, E, 2)."""
+    covariance = tool.covariance(estimate) * layout.optics.noise_variance
+    lengths = np.array([frame.length for frame in tool.frames])
+    a, b, ab = (np.einsum("nee->ne", covariance[:, i::2, j::2]) for i, j in ((0, 0), (1, 1), (0, 1)))
+    return np.nan_to_num(np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1)))
+
+
+def _assemble(tool: Estimator, layout: Layout, estimate: Estimate) -> Shape:
+    frames = tool.frames
+    normals, points = line_equations(frames, estimate.level, estimate.slope)
+    crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]
+    corners, sines = np.stack([c for c, _ in crossings], 1), np.stack([s for _, s in crossings], 1)
+    fixed = np.array([frame.status for frame in frames])
+    edge_status = np.where(fixed == status.OK, estimate.state, np.where(
+        (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
+    joint = np.where(sines < _MIN_SINE, status.ILL_CONDITIONED, status.OK)
+    state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
+    measured = np.isin(state, status.MEASURED)
+    lines = tool.covariance(estimate) * layout.optics.noise_variance
+    covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
+    if measured.any():
+        response = np.concatenate([corner_response(frames, pair) for pair in layout.corners])
+        covariance[measured] = response @ lines[measured] @ response.T
+    middle = estimate.contrast[..., 0] + estimate.contrast[..., 1] * np.array([f.length / 2 for f in frames])
+    return Shape(
+        corners=np.where(measured[:, None, None], corners, np.nan),
+        covariance=covariance,
+        normals=normals,
+        points=points,
+        tilt_covariance=lines[:, 1::2, 1::2],
+        status=state,
+        edge_status=edge_status,
+        edge_contrast=np.abs(middle),
+        used=estimate.used,
+        rejected=estimate.rejected,
+    )
+
+
+def _refuse(shape: Shape, lost: np.ndarray) -> Shape:
+    """A line that still runs away after all passes is no measurement."""
+    if not lost.any():
+        return shape
+    state = np.where(lost & np.isin(shape.status, status.MEASURED), status.LOW_CONTRAST, shape.status)
+    gone = ~np.isin(state, status.MEASURED)
+    corners = np.where(gone[:, None, None], np.nan, shape.corners)
+    return Shape(**{**vars(shape), "status": state, "corners": corners})
+
+
+def _gather(parts: list[Shape], source: np.ndarray, rows: np.ndarray) -> Shape:
+    """One Shape of which image i is row ``rows[i]`` of part ``source[i]``."""
+    columns = {}
+    for name in vars(parts[0]):
+        column = np.array(getattr(parts[0], name), dtype=object if name.endswith("status") else None)
+        for k, part in enumerate(parts[1:], 1):
+            column[source == k] = getattr(part, name)[rows[source == k]]
+        columns[name] = column.astype(str) if name.endswith("status") else column
+    return Shape(**columns)

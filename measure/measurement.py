@@ -1,0 +1,149 @@
+"""The measured distance between the task's two corners, in one image or in a stack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from measure import status
+from measure.features.layout import Layout, layout_of
+from measure.features.shape import find_shape
+from scenes import InvalidInput, Scene
+
+_BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
+_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Distances measured in images of leading shape (...); one image has the shape ().
+
+    Attributes
+    ----------
+    value_px : ndarray, shape (...)
+        Distance, px; NaN where `status` is neither ``ok`` nor ``clutter``.
+    variance_px2 : ndarray, shape (...)
+        Its variance (not sigma), px^2, from the estimator's own linear response at the contrast measured in the image.
+    status : ndarray of str, shape (...)
+        ``ok``, ``clutter``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or ``ill_conditioned``.
+    corners : ndarray, shape (..., 2, 2)
+        Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
+    covariance : ndarray, shape (..., 4, 4)
+        Joint covariance of start (x, y) and end (x, y), px^2.
+    edge_names : tuple of str
+    edge_status : ndarray of str, shape (..., E)
+    edge_contrast : ndarray, shape (..., E)
+        Measured contrast at the middle of the edge, grey levels.
+    used, rejected : ndarray of int, shape (..., E)
+        Number of edge points (pixels, for ``strip`` and ``polygon``).
+    """
+
+    value_px: np.ndarray
+    variance_px2: np.ndarray
+    status: np.ndarray
+    corners: np.ndarray
+    covariance: np.ndarray
+    edge_names: tuple[str, ...]
+    edge_status: np.ndarray
+    edge_contrast: np.ndarray
+    used: np.ndarray
+    rejected: np.ndarray
+
+
+def distance(
+    image: np.ndarray,
+    scene: Scene,
+    sensor: Any,
+    light: Any = None,
+    estimator: str = "gradient",
+    threshold: float | None = None,
+) -> Measurement:
+    """Measure the task's distance.
+
+    Parameters
+    ----------
+    image : array_like, shape (..., height, width)
+        One image or a stack, grey levels, float or integer.
+    scene : Scene
+    sensor : Pose or pair of float
+        Where the image was taken from; edges are sought where this pose projects them, up to 4 px and 2 degrees away.
+    light : Pose or pair of float, optional
+        Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``polygon``.
+    estimator : {"gradient", "canny", "strip", "polygon"}
+        ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, edge pixels
+        above a gradient threshold refined by a parabola. ``strip``: maximum likelihood along each edge. ``polygon``:
+        all edges of the face together, corners included; the most precise.
+    threshold : float, optional
+        Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given.
+
+    Raises
+    ------
+    InvalidInput
+        If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
+    """
+    layout, threshold = sought(scene, sensor, light, threshold)
+    images = checked_image(image, (scene.camera.height, scene.camera.width))
+    stack = images.reshape(-1, *images.shape[-2:])
+    parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
+    lead = images.shape[:-2]
+    whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    return Measurement(
+        edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
+    )
+
+
+def sought(scene: Scene, sensor: Any, light: Any, threshold: float | None) -> tuple[Layout, float]:
+    """Where the edges should be, and Canny's threshold: arguments of `distance`, checked."""
+    sensor = scene.check_pose("sensor", sensor)
+    light = None if light is None else scene.check_pose("light", light)
+    return layout_of(scene, sensor, light), scene.locator.thresholds[0] if threshold is None else threshold
+
+
+def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
+    """The image or stack as float64.
+
+    Raises
+    ------
+    InvalidInput
+        If it has not the given (height, width), is empty, or holds a number that is not finite.
+    """
+    images = np.asarray(image, float)
+    if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
+        raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
+    low, high = float(images.min()), float(images.max())
+    if not np.isfinite([low, high]).all():
+        raise InvalidInput("image must be of finite numbers, got NaN or infinity")
+    if max(-low, high) > _BRIGHTEST:
+        raise InvalidInput(f"image must be of grey levels up to {_BRIGHTEST:g}, got {max(-low, high):.3g}")
+    return images
+
+
+def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:
+    """All columns of a Measurement for a small stack (n, height, width)."""
+    shape = find_shape(images, layout, estimator, threshold)
+    measured = np.isin(shape.status, status.MEASURED)
+    value, gradient = separation(shape.corners)
+    variance = np.where(
+        measured, np.einsum("ni,nij,nj->n", gradient, np.nan_to_num(shape.covariance), gradient), np.inf
+    )
+    return {
+        "value_px": np.where(measured, value, np.nan),
+        "variance_px2": variance,
+        "status": shape.status,
+        "corners": shape.corners,
+        "covariance": shape.covariance,
+        "edge_status": shape.edge_status,
+        "edge_contrast": shape.edge_contrast,
+        "used": shape.used,
+        "rejected": shape.rejected,
+    }
+
+
+def separation(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of two corners (n, 2, 2), px, and its derivative by (x, y) of both, (n, 4); 0 where there are none."""
+    across = np.nan_to_num(corners[:, 1] - corners[:, 0])
+    value = np.linalg.norm(across, axis=-1)
+    unit = across / np.where(value > 0, value, 1)[:, None]
+    return value, np.concatenate([-unit, unit], -1)

@@ -1,0 +1,144 @@
+"""A camera's intrinsics and distortion (OpenCV's model), undone on points rather than on the image."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydantic import ValidationError
+
+from measure.estimators.gradient import GradientLocator
+from measure.features.calipers import edge_frames
+from measure.features.corners import corner_response, intersect, line_equations
+from measure.features.layout import Layout
+from measure.features.lines import fit_lines, regression
+from measure.features.points import EdgePoints
+from planner.models.locator import reach
+from scenes import InvalidInput
+from scenes.errors import describe
+from scenes.model import Model
+from scenes.ranges import Positive
+
+
+class Lens(Model):
+    """Intrinsics in px and distortion coefficients k1, k2, p1, p2, k3 (OpenCV's order, the rest 0)."""
+
+    fx: Positive
+    fy: Positive
+    cx: float
+    cy: float
+    distortion: tuple[float, ...] = ()
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Camera matrix, shape (3, 3)."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+    def straighten(self, points: np.ndarray) -> np.ndarray:
+        """Where image points (..., 2), px, would be without distortion, px of the same camera matrix."""
+        flat = np.asarray(points, float).reshape(-1, 1, 2)
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+        coefficients = np.array(self.distortion, float)
+        straight = cv2.undistortPoints(flat, self.matrix, coefficients, None, None, self.matrix, criteria)
+        return straight.reshape(np.shape(points))
+
+    def distort(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of `straighten`."""
+        points = np.asarray(points, float)
+        x = (points[..., 0] - self.cx) / self.fx
+        y = (points[..., 1] - self.cy) / self.fy
+        rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 1, 3)
+        zero = np.zeros(3)
+        bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, np.array(self.distortion, float))
+        return bent.reshape(points.shape)
+
+
+def load_lens(path: Path) -> Lens:
+    """Read a lens from TOML.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read, is no TOML, or a value in it is bad.
+    """
+    try:
+        return Lens.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
+    except ValidationError as error:
+        raise InvalidInput(f"{path}: {describe(error)}") from None
+
+
+@dataclass(frozen=True)
+class Straightened:
+    """Corners of a polygon freed from distortion: (x, y) px (k, 2), joint covariance (2 k, 2 k) px^2, points used."""
+
+    corners: np.ndarray
+    covariance: np.ndarray
+    used: np.ndarray
+
+
+def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straightened:
+    """Corners of a layout given in straightened coordinates, from edge points found in the distorted image.
+
+    Edge points are sought along the bent image of each side, straightened one by one, and fitted by straight lines.
+
+    Raises
+    ------
+    InvalidInput
+        If on a side no edge points are found.
+    """
+    optics = layout.optics
+    clear = reach(optics.scale_px, optics.blur_px)
+    frames = edge_frames(layout, clear, 0.0)
+    lines, blocks, used = [], [], []
+    for frame in frames:
+        t, place, toward = _bent(frame, lens)
+        inside = _room(place, optics)
+        if inside.sum() < 3:
+            raise InvalidInput(f"side {frame.name} must have edge points in the image, got none")
+        locator = GradientLocator.along_curve(optics, t[inside], place[inside], toward[inside])
+        found = locator.locate(image[None])
+        points = lens.straighten(place[inside] + found.offset[0][:, None] * toward[inside])
+        along, offset = frame.coordinates(points)
+        line = fit_lines(EdgePoints(along[None], offset[None], found.valid, found.contrast, found.reversed))
+        if not np.isfinite(line.tilt).all() or found.valid.mean() < 0.5:
+            raise InvalidInput(f"side {frame.name} must stand out of the noise, got {found.valid.sum()} edge points")
+        slope = float(np.tan(line.tilt[0]))
+        lines.append((float(line.mean_offset[0] - slope * line.mean_along[0]), slope))
+        response = regression(along) @ locator.unit_noise() / max(float(found.contrast[0]), 1e-12)
+        to_start = np.array([[1, -along.mean()], [0, 1]])
+        blocks.append(to_start @ (optics.noise_variance * response @ response.T) @ to_start.T)
+        used.append(int(found.valid.sum()))
+    return _corners(layout, frames, np.array(lines), blocks, np.array(used))
+
+
+def _bent(frame, lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stations of a side, their places in the distorted image, and the unit normals there."""
+    t = frame.stations
+    straight = frame.at(t, np.zeros(1))
+    step = 1e-3
+    place = lens.distort(straight)
+    ahead = lens.distort(straight + step * frame.direction) - lens.distort(straight - step * frame.direction)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return t, place, np.stack([-ahead[:, 1], ahead[:, 0]], 1)
+
+
+def _room(place: np.ndarray, optics) -> np.ndarray:
+    margin = optics.window_px + 4 * optics.scale_px + 1
+    return ((place >= margin) & (place <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
+
+
+def _corners(layout: Layout, frames, lines: np.ndarray, blocks, used: np.ndarray) -> Straightened:
+    normals, points = line_equations(frames, lines[None, :, 0], lines[None, :, 1])
+    corners = [intersect(normals[:, list(pair)], points[:, list(pair)])[0][0] for pair in layout.corners]
+    response = np.concatenate([corner_response(frames, pair) for pair in layout.corners])
+    whole = np.zeros((2 * len(frames), 2 * len(frames)))
+    for e, block in enumerate(blocks):
+        whole[2 * e : 2 * e + 2, 2 * e : 2 * e + 2] = block
+    return Straightened(np.array(corners), response @ whole @ response.T, used)

@@ -1,0 +1,122 @@
+"""A quadrilateral in a user's own photograph: sides, diagonals and angles, each with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from measure import status
+from measure.features.layout import Optics, polygon_layout
+from measure.features.shape import find_shape
+from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
+from measure.measurement import checked_image
+from measure.photo.lens import Lens, straight_corners
+from scenes import InvalidInput
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measured number: name, value, standard deviation (1 sigma) and unit ("px" or "deg")."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Quadrilateral:
+    """What a photograph tells.
+
+    Attributes
+    ----------
+    corners : ndarray, shape (4, 2)
+        (x, y), px, in order around it; without distortion if a lens was given.
+    covariance : ndarray, shape (8, 8)
+        Joint covariance of all corners, px^2.
+    quantities : tuple of Quantity
+        Four sides, two diagonals, four angles.
+    noise, blur_px : float
+        Standard deviation of a grey level and of the lens blur, px, as estimated from the image.
+    status : str
+    """
+
+    corners: np.ndarray
+    covariance: np.ndarray
+    quantities: tuple[Quantity, ...]
+    noise: float
+    blur_px: float
+    status: str
+
+
+def measure_quadrilateral(image: np.ndarray, estimator: str = "strip", lens: Lens | None = None) -> Quadrilateral:
+    """Find the most prominent quadrilateral and measure it.
+
+    Parameters
+    ----------
+    image : array_like, shape (height, width)
+        Grey levels.
+    estimator : {"strip", "polygon", "gradient", "canny"}
+        With a lens always ``gradient``, whose edge points are freed from distortion one by one.
+    lens : Lens, optional
+        Intrinsics and distortion.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no quadrilateral, or the image is no image.
+    """
+    image = np.asarray(image)
+    image = checked_image(image, image.shape[-2:])
+    if image.ndim != 2:
+        raise InvalidInput(f"image must be of shape (height, width), got {image.shape}")
+    corners, noise = find_quadrilateral(image), max(noise_sigma(image), np.sqrt(1 / 12))
+    blur = edge_sigma(image, corners)
+    optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
+    shape = find_shape(image[None], polygon_layout(corners, optics), "gradient")
+    state = str(shape.status[0])
+    if state in status.MEASURED and lens is not None:
+        found = straight_corners(image, polygon_layout(lens.straighten(shape.corners[0]), optics), lens)
+        return _told(found.corners, found.covariance, noise, blur, state)
+    if state in status.MEASURED and estimator != "gradient":
+        near = polygon_layout(shape.corners[0], optics)
+        shape = find_shape(image[None], near, estimator, _threshold(shape))
+    return _told(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]))
+
+
+def _threshold(shape) -> float:
+    """Canny's gradient threshold at a third of the weakest edge's peak."""
+    return float(max(shape.edge_contrast[0].min() / 9, 1e-6))
+
+
+def _told(corners, covariance, noise: float, blur: float, state: str) -> Quadrilateral:
+    quantities = _quantities(corners, covariance) if np.isfinite(corners).all() else ()
+    return Quadrilateral(corners, covariance, quantities, noise, blur, state)
+
+
+def _quantities(corners: np.ndarray, covariance: np.ndarray) -> tuple[Quantity, ...]:
+    found = [_length(f"side {i + 1}-{(i + 1) % 4 + 1}", corners, covariance, i, (i + 1) % 4) for i in range(4)]
+    found += [_length(f"diagonal {i + 1}-{i + 3}", corners, covariance, i, i + 2) for i in range(2)]
+    return tuple(found + [_angle(f"angle {i + 1}", corners, covariance, i) for i in range(4)])
+
+
+def _length(name: str, corners: np.ndarray, covariance: np.ndarray, i: int, j: int) -> Quantity:
+    across = corners[j] - corners[i]
+    value = float(np.linalg.norm(across))
+    gradient = np.zeros(8)
+    gradient[2 * i : 2 * i + 2], gradient[2 * j : 2 * j + 2] = -across / value, across / value
+    return Quantity(name, value, float(np.sqrt(gradient @ covariance @ gradient)), "px")
+
+
+def _angle(name: str, corners: np.ndarray, covariance: np.ndarray, i: int) -> Quantity:
+    """Angle at corner i: each arm's direction turns by its cross component over its length."""
+    gradient, directions = np.zeros(8), []
+    for sign, j in ((1, (i + 1) % 4), (-1, (i - 1) % 4)):
+        arm = corners[j] - corners[i]
+        turn = sign * np.array([-arm[1], arm[0]]) / (arm @ arm)
+        gradient[2 * j : 2 * j + 2] += turn
+        gradient[2 * i : 2 * i + 2] -= turn
+        directions.append(arm / np.linalg.norm(arm))
+    value = np.degrees(np.arccos(np.clip(directions[0] @ directions[1], -1, 1)))
+    return Quantity(name, float(value), float(np.degrees(np.sqrt(gradient @ covariance @ gradient))), "deg")

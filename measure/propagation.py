@@ -1,0 +1,85 @@
+"""The sharpest prediction: the estimator's linear response on the noise-free image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from measure import status
+from measure.features.corners import corner_response
+from measure.features.shape import prepared
+from measure.measurement import distance, separation, sought
+from scenes import Scene
+
+
+@dataclass(frozen=True)
+class Propagated:
+    """Predicted errors of one setting.
+
+    Attributes
+    ----------
+    value_px : float
+        Distance measured in the noise-free image, px.
+    variance_px2 : float
+        Variance of the distance, px^2; infinite where `status` says it cannot be measured.
+    covariance : ndarray, shape (4, 4)
+        Joint covariance of start (x, y) and end (x, y), px^2.
+    response : ndarray, shape (height, width)
+        Derivative of the distance by each pixel, px per grey level.
+    status : str
+    """
+
+    value_px: float
+    variance_px2: float
+    covariance: np.ndarray
+    response: np.ndarray
+    status: str
+
+
+def propagate(
+    clean: np.ndarray,
+    scene: Scene,
+    sensor: Any,
+    light: Any = None,
+    estimator: str = "gradient",
+    threshold: float | None = None,
+) -> Propagated:
+    """Propagate pixel noise through lines and corners to the distance.
+
+    On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of the
+    distance by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
+    share pixels, and so their correlation is in g.
+
+    Parameters
+    ----------
+    clean : ndarray, shape (height, width)
+        Noise-free image, grey levels, not yet cut off at the end of the sensor's scale.
+    scene, sensor, light, estimator, threshold
+        As for `measure.distance`.
+    """
+    noise = scene.noise.variance_at(clean).ravel()  # of each pixel: shot noise grows with light, saturation ends it
+    clean = scene.noise.mean_at(clean)
+    found = distance(clean, scene, sensor, light, estimator, threshold)
+    if str(found.status) not in status.MEASURED:
+        return _nothing(clean, str(found.status))
+    layout, threshold = sought(scene, sensor, light, threshold)
+    tool = prepared(layout, estimator, threshold)
+    response = np.concatenate([corner_response(tool.frames, pair) for pair in layout.corners])
+    ends = response @ tool.respond(clean).lines
+    _, gradient = separation(found.corners[None])
+    g = gradient[0] @ ends
+    if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is
+        return _nothing(clean, status.ILL_CONDITIONED)
+    return Propagated(
+        float(found.value_px),
+        float(noise @ (g * g)),
+        (noise * ends) @ ends.T,
+        g.reshape(clean.shape),
+        str(found.status),
+    )
+
+
+def _nothing(clean: np.ndarray, state: str) -> Propagated:
+    return Propagated(float("nan"), float("inf"), np.full((4, 4), np.inf), np.zeros(clean.shape), state)

@@ -1,0 +1,167 @@
+"""The required edges as the sensor sees them: ends, lengths, and the part of each edge that can be measured.
+
+Near a corner another edge disturbs the locator, so an edge is trimmed until its neighbours are `locator.reach`
+away: reach / sin(angle) along the edge, or reach itself where the neighbour turns away. Where another part of the
+object hides a piece of an edge, its longest free piece is used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.imaging.projection import depth, direction, facing, from_axis, image_centre
+from planner.imaging.visibility import longest_span, turned
+from planner.models.locator import reach
+from scenes import Edge, Scene
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Images of E straight edges for sensor poses of leading shape (...).
+
+    Attributes
+    ----------
+    names : tuple of str
+        Edge names, as `Task.edges`.
+    ends : ndarray, shape (..., E, 2, 2)
+        The two end points (x, y), px.
+    along : ndarray, shape (..., E, 2)
+        From the first end to the last, px; exact too where it is small against the image.
+    trims : ndarray, shape (..., E, 2)
+        Length to leave out at each end, px: what is hidden, and what a neighbouring edge disturbs.
+    framed : ndarray, shape (..., E, 2)
+        The same, and what lies outside the image or too near to its border for the locator's window.
+    shown : ndarray, shape (..., E, 2)
+        The longest piece of each edge that the sensor sees, as fractions (from, to) of the image's length; (0, 0)
+        where it sees nothing of it. `visibility.visible_spans` gives all pieces.
+    visible : ndarray of bool, shape (..., E)
+        Whether the sensor sees a piece of the edge and a face of it.
+    """
+
+    names: tuple[str, ...]
+    ends: np.ndarray
+    along: np.ndarray
+    trims: np.ndarray
+    framed: np.ndarray
+    shown: np.ndarray
+    visible: np.ndarray
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Length of each edge's image, px, shape (..., E)."""
+        return np.linalg.norm(self.along, axis=-1)
+
+    @property
+    def usable(self) -> np.ndarray:
+        """Length that is left within the image after trimming, px, shape (..., E); not positive where nothing is."""
+        return self.lengths - self.framed.sum(-1)
+
+
+def straight(scene: Scene) -> tuple[str, ...]:
+    """The task's straight edges, in its order."""
+    circles = {circle.name for circle in scene.solid.circles}
+    return tuple(name for name in scene.task.edges if name not in circles)
+
+
+def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = None) -> Outline:
+    """Project edges and decide how much of each can be measured.
+
+    Parameters
+    ----------
+    sensors : ndarray, shape (..., 2)
+        Sensor poses, degrees.
+    names : tuple of str, optional
+        Edges; the task's straight ones when not given.
+    """
+    solid, names = scene.solid, straight(scene) if names is None else names
+    sensors = np.asarray(sensors, float)
+    positions = scene.camera.distance * direction(sensors)
+    seen = facing(solid, positions)
+    edges = [solid.edge(name) for name in names]
+    needed, clear = _near(solid.edges, edges), reach(scene.locator.scale_px, scene.camera.blur_px)
+    corners = dict(
+        zip(needed, np.moveaxis(from_axis(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True)
+    )
+    trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
+    trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
+    shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
+    along = ends[..., 1, :] - ends[..., 0, :]
+    lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
+    if not solid.is_convex:
+        trims = cut(trims, shown, lengths, clear)
+    return Outline(
+        names=names,
+        ends=ends,
+        along=along,
+        trims=trims,
+        framed=cut(trims, within_image(scene, ends), lengths, 0.0),
+        shown=shown,
+        visible=_stack([turned(solid, edge, positions).any(-1) for edge in edges], -1) & (shown[..., 1] > 0),
+    )
+
+
+def cut(trims: np.ndarray, shown: np.ndarray, lengths: np.ndarray, clear: float) -> np.ndarray:
+    """Trims (..., 2) enlarged so that only the shown fractions of the image's length, less ``clear`` px, are left."""
+    hidden = np.stack([shown[..., 0], 1 - shown[..., 1]], -1)
+    return np.where(hidden > 0, np.maximum(trims, hidden * lengths[..., None] + clear), trims)
+
+
+def within_image(scene: Scene, ends: np.ndarray) -> np.ndarray:
+    """Part of each edge's image, ends (..., E, 2, 2), where the locator's window fits into the image.
+
+    Fractions (from, to) of the length, shape (..., E, 2); (1, 0) where none is left.
+    """
+    margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
+    size = np.array([scene.camera.width, scene.camera.height])
+    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        low, high = (margin - start) / along, (size - 1 - margin - start) / along
+    inside = (start >= margin) & (start <= size - 1 - margin)
+    still = along == 0
+    enter = np.where(still, np.where(inside, 0.0, 1.0), np.minimum(low, high)).max(-1)
+    leave = np.where(still, np.where(inside, 1.0, 0.0), np.maximum(low, high)).min(-1)
+    found = np.stack([np.clip(enter, 0, 1), np.clip(leave, 0, 1)], -1)
+    return np.where(found[..., :1] < found[..., 1:], found, np.array([1.0, 0.0]))
+
+
+def image_fractions(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, spatial: np.ndarray) -> np.ndarray:
+    """Fractions of each edge's IMAGE length from fractions (..., E, n) of its length in space."""
+    near, far = end_depths(scene, names, sensors)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return spatial * far / (near + spatial * (far - near))
+
+
+def end_depths(scene: Scene, names: tuple[str, ...], sensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Depths of both ends of each edge, cm, each (..., E, 1)."""
+    ends = np.array([scene.solid.vertices[list(scene.solid.edge(name).ends)] for name in names]).reshape(-1, 3)
+    found = depth(ends, sensors, scene.camera).reshape(*sensors.shape[:-1], len(names), 2)
+    return found[..., :1], found[..., 1:]
+
+
+def _stack(arrays: list, axis: int) -> np.ndarray:
+    return np.stack(arrays, axis) if arrays else np.empty((0,) * -axis)
+
+
+def _near(edges: tuple[Edge, ...], wanted: list[Edge]) -> list[int]:
+    """The vertices of the wanted edges and of those that share a vertex with them."""
+    ends = {end for edge in wanted for end in edge.ends}
+    return sorted({end for edge in edges if ends & set(edge.ends) for end in edge.ends})
+
+
+def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np.ndarray, clear: float):
+    """Length to leave out at one end of an edge, shape (...)."""
+    here, far = edge.ends[end], edge.ends[1 - end]
+    along = corners[far] - corners[here]
+    trim = np.full(along.shape[:-1], clear)
+    for other in edges:
+        if other is edge or here not in other.ends:
+            continue
+        aside = corners[other.ends[1 - other.ends.index(here)]] - corners[here]
+        cosine = np.einsum("...i,...i->...", along, aside)
+        sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
+        trim = np.where(seen[..., list(other.faces)].any(-1), np.fmax(trim, needed), trim)
+    return trim

@@ -1,0 +1,1 @@
+"""Variance models: how precisely the features of a picture can be located, without an image."""

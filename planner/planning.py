@@ -1,0 +1,249 @@
+"""Where to put sensor and light: the whole question, answered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from planner.features.measurand import required_edges
+from planner.prediction import Objective, Prediction, Price, check_objective, evaluator, in_units, predict
+from planner.search.alternating import Partial, Step, alternate
+from planner.search.candidates import Candidate, candidates
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import Found, Report, exhaustive, is_separable
+from planner.search.refinement import refine
+from planner.search.viewing import ViewingSpace
+from scenes import InvalidInput, Pose, Scene, Task
+
+Search = Literal["exhaustive", "alternating"]
+COARSE_STEP = 10.0  # degrees; where every pair has to be priced
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The best setting and how it was found.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene, its task with the required edges that the plan uses: ready to predict, render and measure.
+    sensor, light : Pose
+        Continuous if refined, else on the grid.
+    objective, price : str
+    variance : float
+        What was minimised: cm^2 or px^2 (degrees^2 for an angle).
+    grid_sensor, grid_light, grid_variance
+        The best pair of the grid.
+    prediction : Prediction
+        At the poses, in both units.
+    trace : tuple of Step
+        Of the alternating search.
+    partial_variance : float
+        Where the alternating search stopped.
+    gap : float or None
+        Optimality gap of the alternating search: its variance over the exhaustive one's, less 1; None without
+        exhaustive search.
+    guarantee : str
+        What is known about the optimum.
+    pairs, priced : int
+        Pairs covered by the exhaustive search and how many were priced one by one.
+    candidates : tuple of Candidate
+        Up to ten clearly different settings, the best first; sensors or lights at least 15 degrees apart.
+    """
+
+    scene: Scene
+    sensor: Pose
+    light: Pose
+    objective: str
+    price: str
+    variance: float
+    grid_sensor: Pose
+    grid_light: Pose
+    grid_variance: float
+    prediction: Prediction
+    trace: tuple[Step, ...]
+    partial_variance: float
+    gap: float | None
+    guarantee: str
+    pairs: int
+    priced: int
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def poses(self) -> tuple[Pose, Pose]:
+        """Sensor and light."""
+        return self.sensor, self.light
+
+
+def plan(
+    scene: Scene,
+    objective: Objective = "object",
+    *,
+    price: Price = "calibrated",
+    search: Search = "exhaustive",
+    edges: Literal["given", "best"] = "given",
+    step_deg: float | None = None,
+    constraints: Constraints | None = None,
+    sensor: Any = None,
+    light: Any = None,
+    start: Any = (40, 41),
+    refined: bool = True,
+    report: Report | None = None,
+) -> Plan:
+    """Find the sensor and light poses of the least variance.
+
+    Parameters
+    ----------
+    scene : Scene
+    objective : {"object", "image"}
+        Variance of the physical quantity, or of that in the image (the paper's, which rewards foreshortening).
+    price : {"calibrated", "paper"}
+    search : {"exhaustive", "alternating"}
+        All pairs, or the paper's search alone, which stops at a partial optimum.
+    edges : {"given", "best"}
+        The scene's required edges, or the best of all sets that measure the same (the paper's required edge list).
+    step_deg : float, optional
+        Grid step. By default 1 where a bound makes the exhaustive search fast (convex, diffuse, straight edges), else
+        10 degrees with refinement from the three best settings.
+    constraints : Constraints, optional
+        By default the upper hemisphere.
+    sensor, light : Pose or pair, optional
+        Hold one fixed.
+    start : Pose or pair
+        Where the alternating search's sensor begins.
+    refined : bool
+        Whether to descend below the grid step.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is none of its choices, or no allowed setting can measure.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> found = plan(scenes.load("task1"), step_deg=6)
+    >>> found.prediction.status, found.gap >= 0, len(found.candidates)
+    ('ok', True, 10)
+    """
+    check_objective(objective)
+    evaluator(price)
+    _check("search", search, get_args(Search))
+    _check("edges", edges, ("given", "best"))
+    constraints = constraints or Constraints()
+    tasks = required_edges(scene) if edges == "best" else (scene.task,)
+    options = [_Option.of(with_task(scene, task), price, step_deg, constraints, sensor, light) for task in tasks]
+    found = [option.search(objective, search, start, report) for option in options]
+    best = min(range(len(found)), key=lambda k: found[k].variance)
+    if not np.isfinite(found[best].variance):
+        raise InvalidInput("constraints must leave a setting that can measure, got none")
+    return _finish(options, found, best, objective, refined)
+
+
+def with_task(scene: Scene, task: Task) -> Scene:
+    """The scene with another task."""
+    return scene.model_copy(update={"task": task})
+
+
+def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {value!r}")
+
+
+@dataclass(frozen=True)
+class _Result:
+    """What searching one set of required edges gave; variances in rad^2 for an angle."""
+
+    sensor: np.ndarray
+    light: np.ndarray
+    variance: float
+    partial: Partial | None
+    found: Found | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Option:
+    """One set of required edges and where its sensor and light may stand."""
+
+    scene: Scene
+    price: str
+    step_deg: float
+    constraints: Constraints
+    sensors: np.ndarray
+    lights: np.ndarray
+    free: bool
+
+    @classmethod
+    def of(cls, scene, price, step_deg, constraints, sensor, light) -> _Option:
+        fast = is_separable(scene, price)
+        step = step_deg or (1.0 if fast else COARSE_STEP)
+        sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
+        lights = ViewingSpace(step, constraints.light_polar_deg).poses
+        sensors, lights = sensors[constraints.sensors(scene, sensors)], lights[constraints.lights(lights)]
+        if sensor is not None:
+            sensors = np.array([list(scene.check_pose("sensor", sensor))])
+        if light is not None:
+            lights = np.array([list(scene.check_pose("light", light))])
+        if not len(sensors) or not len(lights):
+            raise InvalidInput("constraints must leave a pose for sensor and light, got none")
+        return cls(scene, price, step, constraints, sensors, lights, sensor is None and light is None)
+
+    def search(self, objective: str, search: str, start: Any, report: Report | None) -> _Result:
+        partial = found = None
+        plain = self.free and not self.constraints.on_pairs
+        if plain:
+            spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
+            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.price, objective)
+        if search == "exhaustive" or not plain:
+            found = exhaustive(self.scene, self.sensors, self.lights, self.price, objective, self.constraints, report)
+        best = found or partial
+        return _Result(self.sensors[best.sensor], self.lights[best.light], best.variance, partial, found)
+
+
+class _Allowed(ViewingSpace):
+    """A viewing space of the allowed poses only."""
+
+    def __init__(self, step_deg: float, poses: np.ndarray) -> None:
+        super().__init__(step_deg)
+        self.__dict__["poses"] = poses
+
+
+def _finish(options: list[_Option], results: list[_Result], best: int, objective: str, refined: bool) -> Plan:
+    option, result = options[best], results[best]
+    scene, found, partial = option.scene, result.found, result.partial
+    sensor, light, variance = result.sensor, result.light, result.variance
+    choice = candidates(options, results, objective)
+    if refined and option.free:
+        starts = [(sensor, light)]
+        if found is None or not is_separable(scene, option.price):
+            others = [c for c in choice[1:3] if c.edges == scene.task.edges]
+            starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
+        descents = [refine(scene, *at, option.price, objective, option.step_deg, option.constraints) for at in starts]
+        sensor, light, variance = min(descents, key=lambda descent: descent[2])
+    return Plan(
+        scene=scene,
+        sensor=Pose(*map(float, sensor)),
+        light=Pose(*map(float, light)),
+        objective=objective,
+        price=option.price,
+        variance=float(in_units(scene, variance, 2)),
+        grid_sensor=Pose(*map(float, result.sensor)),
+        grid_light=Pose(*map(float, result.light)),
+        grid_variance=float(in_units(scene, result.variance, 2)),
+        prediction=predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.price),
+        trace=partial.trace if partial else (),
+        partial_variance=float(in_units(scene, partial.variance, 2)) if partial else float("nan"),
+        gap=partial.variance / result.variance - 1 if partial and found else None,
+        guarantee=_guarantee(option, found),
+        pairs=sum(r.found.pairs for r in results if r.found),
+        priced=sum(r.found.priced for r in results if r.found),
+        candidates=choice,
+    )  # fmt: skip
+
+
+def _guarantee(option: _Option, found: Found | None) -> str:
+    if found is None:
+        return "none: a partial optimum, no neighbour of the sensor and none of the light is better"
+    return f"no pair of the {option.step_deg:g} degree grid is better; between its directions a better one may lie"

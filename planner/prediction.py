@@ -1,0 +1,236 @@
+"""Predicted precision of one setting, or of many at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from planner.features.measurand import normals
+from planner.features.propagation import corner_covariance
+from planner.models import models as prices
+from planner.models.locator import MIN_CONTRAST, MIN_USABLE
+from scenes import Corner, InvalidInput, Scene
+
+Price = Literal["paper", "calibrated", "bound"]
+Objective = Literal["object", "image"]
+_PRICES = {"paper": prices.paper, "calibrated": prices.calibrated, "bound": prices.bound}
+_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
+
+
+@dataclass(frozen=True)
+class EdgePrediction:
+    """A required edge as the sensor will see it: image length (px), contrast (rms along it, grey levels), status."""
+
+    name: str
+    length_px: float
+    contrast: float
+    status: str
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How precisely one setting will let the distance or the angle be measured.
+
+    Attributes
+    ----------
+    price : str
+        ``paper``, ``calibrated`` or ``bound``.
+    kind : str
+        ``distance`` or ``angle``.
+    value_image, value_object : float
+        The quantity itself, as the model projects it and in the object: px and cm, or degrees.
+    variance_image, variance_object : float
+        Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
+        cannot be measured. The ``paper`` price is right only up to one factor common to all settings, and infinite
+        only where an edge is hidden or without any contrast.
+    corners : ndarray, shape (2, 2)
+        Start and end feature (x, y), px; (0, 0) is the centre of the first pixel. For an angle, a point on each line.
+    covariances : ndarray, shape (2, 2, 2)
+        Covariance of each feature, px^2; NaN for an angle, which needs no corners.
+    edges : tuple of EdgePrediction
+        The straight edges.
+    status : str
+        ``ok``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``.
+    """
+
+    price: str
+    kind: str
+    value_image: float
+    value_object: float
+    variance_image: float
+    variance_object: float
+    corners: np.ndarray
+    covariances: np.ndarray
+    edges: tuple[EdgePrediction, ...]
+    status: str
+
+    @property
+    def value_px(self) -> float:
+        """The distance in the image, px."""
+        return self._of_a_distance("value_px", self.value_image)
+
+    @property
+    def variance_px2(self) -> float:
+        """Its variance, px^2."""
+        return self._of_a_distance("variance_px2", self.variance_image)
+
+    @property
+    def variance_cm2(self) -> float:
+        """Variance of the physical length, cm^2."""
+        return self._of_a_distance("variance_cm2", self.variance_object)
+
+    def _of_a_distance(self, name: str, value: float) -> float:
+        if self.kind != "distance":
+            raise InvalidInput(f"task.kind must be distance for {name}, got {self.kind!r}")
+        return value
+
+
+def variances(
+    scene: Scene, sensors: Any, lights: Any, price: Price = "calibrated", objective: Objective = "image"
+) -> np.ndarray:
+    """Variance of the measured quantity for arrays of settings.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensors, lights : array_like, shape (..., 2)
+        Poses (polar, azimuth) in degrees, broadcast against each other.
+    price : {"calibrated", "paper", "bound"}
+    objective : {"image", "object"}
+        In the image (px^2) or in the object (cm^2: px^2 over the squared derivative of the image's distance by the
+        object's, both ends moving apart alike); degrees^2 for an angle.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Infinite where it cannot be measured.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> task1 = scenes.load("task1")
+    >>> v = variances(task1, [30, 135], [[15, 315], [60, 255]], "paper")
+    >>> round(float(v[1] / v[0]), 1)  # the paper's Table 3: 0.595 / 0.070 = 8.5
+    9.0
+    """
+    priced = evaluator(price)(scene, sensors, lights)
+    return in_units(scene, priced.variance if check_objective(objective) == "image" else priced.variance_object, 2)
+
+
+def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") -> Prediction:
+    """Predict the precision of one setting.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor, light : Pose or pair of float
+        Polar angle and azimuth, degrees.
+    price : {"calibrated", "paper", "bound"}
+        ``calibrated`` is absolute; ``paper`` follows the paper and has a free scale; ``bound`` is what no
+        unbiased estimator can beat.
+
+    Raises
+    ------
+    InvalidInput
+        If a pose is no pose or lies in or on the object, or the price is unknown.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> p = predict(scenes.load("task1"), (30, 135), (15, 315))
+    >>> p.status, round(p.value_px, 1), 1e-4 < p.variance_px2 < 1.3e-4
+    ('ok', 100.8, True)
+    """
+    sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
+    priced = evaluator(price)(scene, list(sensor), list(light))
+    known = priced.quantity
+    edges = tuple(
+        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, whole, usable, step))
+        for name, length, whole, usable, step, seen in zip(
+            known.view.names,
+            known.view.lengths,
+            known.view.lengths - known.view.trims.sum(-1),
+            known.view.usable,
+            priced.contrast,
+            known.view.visible,
+            strict=True,
+        )
+    )
+    return Prediction(
+        price=price,
+        kind=scene.task.kind,
+        value_image=float(in_units(scene, known.value, 1)),
+        value_object=float(in_units(scene, known.value_object, 1)),
+        variance_image=float(in_units(scene, priced.variance, 2)),
+        variance_object=float(in_units(scene, priced.variance_object, 2)),
+        corners=known.points,
+        covariances=_covariances(scene, priced),
+        edges=edges,
+        status=_status(scene, priced, edges),
+    )
+
+
+def evaluator(price: str):
+    """The function that prices arrays of settings.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such price.
+    """
+    if price not in _PRICES:
+        raise InvalidInput(f"price must be one of {', '.join(get_args(Price))}, got {price!r}")
+    return _PRICES[price]
+
+
+def check_objective(objective: str) -> str:
+    """The objective, once it is known to be one."""
+    if objective not in get_args(Objective):
+        raise InvalidInput(f"objective must be one of {', '.join(get_args(Objective))}, got {objective!r}")
+    return objective
+
+
+def in_units(scene: Scene, value, power: int):
+    """Angles in degrees."""
+    return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
+
+
+def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
+    """Covariances of the two features, px^2."""
+    if not scene.task.corners:
+        return np.full((2, 2, 2), np.nan)
+    view, centres, found = priced.quantity.view, iter(priced.centres), []
+    for feature in scene.task.corners:
+        if not isinstance(feature, Corner):
+            found.append(next(centres))
+            continue
+        index = [view.names.index(name) for name in feature.edges]
+        vertex = scene.solid.vertex_names.index(feature.vertex)
+        last = np.array([scene.solid.edge(name).ends[1] == vertex for name in view.names])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            offsets = priced.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
+        offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
+        found.append(corner_covariance(normals(view)[index], offsets[index]))
+    return np.stack(found)
+
+
+def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step: float) -> str:
+    if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
+        return "not_visible"
+    if usable < MIN_USABLE:  # first, for where nothing is left there is no contrast either
+        return "short"
+    return "ok" if step > MIN_CONTRAST * np.sqrt(scene.noise.variance) else "low_contrast"
+
+
+def _status(scene: Scene, priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:
+    for worst in ("not_visible", "short", "low_contrast"):
+        if any(edge.status == worst for edge in edges):
+            return worst
+    directions = dict(zip(priced.quantity.view.names, normals(priced.quantity.view), strict=True))
+    corners = [feature for feature in scene.task.corners if isinstance(feature, Corner)]
+    sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
+    if min(sines, default=1.0) < _MIN_SINE:
+        return "ill_conditioned"
+    return "ok" if np.isfinite(priced.variance) else "not_visible"

@@ -1,0 +1,1 @@
+"""Where to put sensor and light: viewing space, searches, constraints."""

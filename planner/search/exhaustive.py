@@ -1,0 +1,165 @@
+"""The best of all sensor x light pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.prediction import evaluator
+from planner.search.constraints import Constraints
+from planner.search.separable import Separable, separable
+from scenes import Scene
+
+_ROWS = 256  # sensors at a time
+_PAIRS = 1 << 16  # pairs priced exactly at a time
+
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The best pair of a search.
+
+    Attributes
+    ----------
+    sensor, light : int
+        Indices into the poses searched; -1 where no pair can measure.
+    variance : float
+        Of the objective (rad^2 for an angle).
+    pairs : int
+        How many pairs were covered, and ...
+    priced : int
+        ... how many of them had to be priced one by one; the others are excluded by a lower bound.
+    best_light : ndarray of int, shape (S,)
+        For each sensor a light that is best or nearly so; -1 where none can measure.
+    least : ndarray, shape (S,)
+        Lower bound of the variance for each sensor (the variance itself where no bound exists).
+    guaranteed : bool
+        Whether no other pair of the grid is better.
+    """
+
+    sensor: int
+    light: int
+    variance: float
+    pairs: int
+    priced: int
+    best_light: np.ndarray
+    least: np.ndarray
+    guaranteed: bool
+
+
+def is_separable(scene: Scene, price: str) -> bool:
+    """Whether the fast search applies: convex, diffuse, straight edges only."""
+    straight = all(name in {edge.name for edge in scene.solid.edges} for name in scene.task.edges)
+    return scene.solid.is_convex and scene.material.is_diffuse and straight and price in ("paper", "calibrated")
+
+
+def exhaustive(
+    scene: Scene, sensors: np.ndarray, lights: np.ndarray, price: str, objective: str,
+    constraints: Constraints | None = None, report: Report | None = None,
+) -> Found:  # fmt: skip
+    """Search all pairs of sensors (S, 2) and lights (L, 2), degrees.
+
+    For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
+    not exceed the best variance known are priced. Otherwise every pair is priced.
+    """
+    search = _by_bound if is_separable(scene, price) else _one_by_one
+    return search(scene, sensors, lights, price, objective, constraints, report or (lambda *_: None))
+
+
+def price_pairs(scene: Scene, sensors, lights, price: str, objective: str) -> np.ndarray:
+    """Variance of pairs (n, 2), (n, 2), in chunks."""
+    values = np.empty(len(sensors))
+    size = _PAIRS // 8
+    for at in range(0, len(sensors), size):
+        part = slice(at, at + size)
+        priced = evaluator(price)(scene, sensors[part], lights[part])
+        values[part] = priced.variance if objective == "image" else priced.variance_object
+    return values
+
+
+def _by_bound(scene, sensors, lights, price, objective, constraints, report) -> Found:
+    table = separable(scene, sensors, lights, price, objective)
+    least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
+    done = 0
+    for rows, which, bound in _blocks(table, scene, sensors, lights, constraints):
+        column = bound.argmin(1)
+        least[table.sensors[rows]] = bound[np.arange(len(rows)), column]
+        best[table.sensors[rows]] = which[column]
+        done += len(rows)
+        report("bounds", done, 2 * len(table.sensors))
+    best[~np.isfinite(least)] = -1
+    order = np.argsort(least)[: max(256, len(least) // 64)]
+    order = order[np.isfinite(least[order])]
+    values = price_pairs(scene, sensors[order], lights[best[order]], price, objective)
+    state = _Best.of(order, best[order], values)
+    priced = len(order)
+    wanted = least <= state.variance
+    for rows, which, bound in _blocks(table, scene, sensors, lights, constraints, wanted):
+        hit = np.argwhere(bound <= state.variance)
+        for at in range(0, len(hit), _PAIRS):
+            some = hit[at : at + _PAIRS]
+            s, k = table.sensors[rows[some[:, 0]]], which[some[:, 1]]
+            state = state.better(s, k, price_pairs(scene, sensors[s], lights[k], price, objective))
+        priced += len(hit)
+        done += len(rows)
+        report("exact", done, 2 * len(table.sensors))
+    return Found(
+        state.sensor, state.light, state.variance, len(sensors) * len(lights), priced, best, least, guaranteed=True
+    )
+
+
+def _blocks(table: Separable, scene, sensors, lights, constraints, wanted=None):
+    """Blocks (rows into table.sensors, indices of lights, bounds) of all pairs, or of the wanted sensors only."""
+    for which in range(len(table.strength)):
+        rows, columns, matrix = table.of_class(which)
+        if wanted is not None:
+            rows = rows[wanted[table.sensors[rows]]]
+        if not len(columns):
+            continue
+        for at in range(0, len(rows), _ROWS):
+            block = rows[at : at + _ROWS]
+            bound = table.rows(block, matrix)
+            if constraints is not None and constraints.on_pairs:
+                allowed = constraints.pairs(scene, sensors[table.sensors[block]][:, None], lights[columns][None])
+                bound = np.where(allowed, bound, np.inf)
+            yield block, columns, bound
+
+
+def _one_by_one(scene, sensors, lights, price, objective, constraints, report) -> Found:
+    least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
+    evaluate = evaluator(price)
+    size = max(1, 20_000 // max(len(lights), 1))
+    for at in range(0, len(sensors), size):
+        part = sensors[at : at + size]
+        priced = evaluate(scene, part[:, None], lights[None])
+        values = priced.variance if objective == "image" else priced.variance_object
+        if constraints is not None and constraints.on_pairs:
+            values = np.where(constraints.pairs(scene, part[:, None], lights[None]), values, np.inf)
+        best[at : at + size] = values.argmin(1)
+        least[at : at + size] = values.min(1)
+        report("pairs", min(at + size, len(sensors)), len(sensors))
+    best[~np.isfinite(least)] = -1
+    state = _Best.of(np.arange(len(sensors)), best, least)
+    pairs = len(sensors) * len(lights)
+    return Found(state.sensor, state.light, state.variance, pairs, pairs, best, least, guaranteed=True)
+
+
+@dataclass(frozen=True)
+class _Best:
+    sensor: int
+    light: int
+    variance: float
+
+    @classmethod
+    def of(cls, sensors: np.ndarray, lights: np.ndarray, values: np.ndarray) -> _Best:
+        return cls(-1, -1, np.inf).better(sensors, lights, values)
+
+    def better(self, sensors: np.ndarray, lights: np.ndarray, values: np.ndarray) -> _Best:
+        """The better of this pair and some others."""
+        if not len(values) or not values.min() < self.variance:
+            return self
+        k = int(values.argmin())
+        return _Best(int(sensors[k]), int(lights[k]), float(values[k]))

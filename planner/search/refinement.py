@@ -1,0 +1,70 @@
+"""Below the grid: a continuous descent in the four angles of sensor and light."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from planner.imaging.projection import direction
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import price_pairs
+from scenes import InvalidInput, Scene
+
+
+def refine(
+    scene: Scene, sensor: np.ndarray, light: np.ndarray, price: str, objective: str, step_deg: float,
+    constraints: Constraints | None = None, value=None,
+) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+    """Nelder-Mead from a pair of poses, in tangent planes of the sphere, so that the poles are places like others.
+
+    Parameters
+    ----------
+    sensor, light : ndarray, shape (2,)
+        Where to begin, degrees.
+    step_deg : float
+        Size of the first simplex.
+    value : callable, optional
+        (sensor, light) to what is minimised; the variance when not given.
+
+    Returns
+    -------
+    sensor, light : ndarray, shape (2,)
+    variance : float
+        Not more than at the beginning.
+    """
+    constraints = constraints or Constraints()
+    if value is None:
+
+        def value(s, k):
+            return float(price_pairs(scene, s[None], k[None], price, objective)[0])
+
+    def cost(x: np.ndarray) -> float:
+        s, k = (shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4))))
+        if constraints.same_mount:
+            k = s
+        return value(s, k) if constraints.allows(scene, s, k) else np.inf
+
+    unit = cost(np.zeros(4))
+    if not np.isfinite(unit):
+        raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
+    x, least = np.zeros(4), 1.0
+    for size in (0.7, 0.1):  # again from a fresh simplex, for the first may have collapsed at a border
+        found = minimize(
+            lambda x: min(cost(x) / unit, np.finfo(float).max), x, method="Nelder-Mead",
+            options={"initial_simplex": x + size * np.vstack([np.zeros(4), np.eye(4)]), "xatol": 1e-3, "fatol": 1e-7,
+                     "maxfev": 250},
+        )  # fmt: skip
+        if found.fun < least:
+            x, least = found.x, found.fun
+    best = [shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4)))]
+    return best[0], best[0] if constraints.same_mount else best[1], float(least * unit)
+
+
+def shifted(pose: np.ndarray, by_deg: np.ndarray) -> np.ndarray:
+    """The pose moved on its sphere by two perpendicular angles (degrees)."""
+    centre = direction(pose)
+    helper = np.eye(3)[np.argmin(np.abs(centre))]
+    one = np.cross(centre, helper)
+    one /= np.linalg.norm(one)
+    x, y, z = centre + np.tan(np.radians(by_deg[0])) * one + np.tan(np.radians(by_deg[1])) * np.cross(centre, one)
+    return np.array([np.degrees(np.arctan2(np.hypot(x, y), z)), np.degrees(np.arctan2(y, x)) % 360])

@@ -1,0 +1,179 @@
+"""Plans for inputs that are not known exactly: how the optimum moves, and the setting whose worst case is least."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from itertools import product
+
+import numpy as np
+
+from planner.imaging.projection import direction
+from planner.planning import Plan
+from planner.prediction import in_units
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import price_pairs
+from planner.search.refinement import refine, shifted
+from scenes import InvalidInput, Pose, Scene
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How far each input may be off: relative for the material and the noise, degrees for the poses.
+
+    A tolerance of 0.1 means from 0.9 to 1.1 times the scene's value; values that have a natural limit stop there.
+    """
+
+    diffuse_reflectance: float = 0.0
+    specular_fraction: float = 0.0
+    roughness: float = 0.0
+    refractive_index: float = 0.0
+    noise: float = 0.0
+    sensor_deg: float = 0.0
+    light_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0 <= value < (1 if not field.name.endswith("deg") else 90):
+                raise InvalidInput(f"tolerance of {field.name} must be at least 0 and small, got {value}")
+
+    @property
+    def of_the_scene(self) -> tuple[str, ...]:
+        """Names of the scene's uncertain values."""
+        names = (field.name for field in fields(self) if not field.name.endswith("deg"))
+        return tuple(name for name in names if getattr(self, name) > 0)
+
+
+@dataclass(frozen=True)
+class Move:
+    """What one input's error does to a plan.
+
+    Attributes
+    ----------
+    input : str
+    factor : float
+        Of the scene's value.
+    variance : float
+        At the plan's poses, over the plan's variance.
+    best : float
+        At the poses that would then be best, over the plan's variance.
+    sensor_deg, light_deg : float
+        How far those lie from the plan's.
+    """
+
+    input: str
+    factor: float
+    variance: float
+    best: float
+    sensor_deg: float
+    light_deg: float
+
+
+@dataclass(frozen=True)
+class Robust:
+    """The setting of the least worst case.
+
+    Attributes
+    ----------
+    sensor, light : Pose
+    worst, nominal : float
+        Its worst variance within the tolerances, and its variance if all inputs are right.
+    plan_worst : float
+        The worst variance of the plan that trusts its inputs.
+    moves : tuple of Move
+        How that plan's optimum moves, one input at a time.
+    cases : int
+        Number of cases the worst is taken over: all combinations of the scene's extremes, with no pose error or one.
+    """
+
+    sensor: Pose
+    light: Pose
+    worst: float
+    nominal: float
+    plan_worst: float
+    moves: tuple[Move, ...]
+    cases: int
+
+
+def altered(scene: Scene, factors: dict[str, float]) -> Scene:
+    """The scene with some values multiplied; fractions and reflectances stop at 1, the refractive index at 1."""
+    material = {}
+    for name, factor in factors.items():
+        if name != "noise":
+            value = getattr(scene.material, name) * factor
+            limits = (1.0, np.inf) if name == "refractive_index" else (0.0, np.inf if name == "roughness" else 1.0)
+            keep = name == "refractive_index" and scene.material.refractive_index < 1
+            material[name] = value if keep else float(np.clip(value, *limits))
+    noise = scene.noise.model_copy(update={"sigma": scene.noise.sigma * factors.get("noise", 1.0)})
+    return scene.model_copy(update={"material": scene.material.model_copy(update=material), "noise": noise})
+
+
+def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None = None) -> Robust:
+    """Minimum of the worst case, from the plan's clearly different candidates downhill.
+
+    No guarantee: the worst case is a maximum over the corners of the tolerances, and the descent is local.
+
+    Raises
+    ------
+    InvalidInput
+        If no tolerance is given.
+    """
+    if tolerances == Tolerances():
+        raise InvalidInput("tolerances must be given for at least one input, got none")
+    names = tolerances.of_the_scene
+    corners = [dict(zip(names, signs, strict=True)) for signs in product((-1, 1), repeat=len(names))]
+    worlds = [altered(plan.scene, {n: 1 + sign * getattr(tolerances, n) for n, sign in c.items()}) for c in corners]
+
+    def worst(sensor: np.ndarray, light: np.ndarray) -> float:
+        pairs = _with_pose_errors(sensor, light, tolerances)
+        return max(float(price_pairs(world, *pairs, plan.price, plan.objective).max()) for world in worlds)
+
+    starts = [(plan.sensor, plan.light)]
+    starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == plan.scene.task.edges]
+    starts = [tuple(np.array(list(pose)) for pose in pair) for pair in starts]
+    values = [worst(*pair) for pair in starts]
+    best = int(np.argmin(values))
+    if not np.isfinite(values[best]):
+        raise InvalidInput("tolerances must leave a setting that can always measure, got none")
+    sensor, light, value = refine(
+        plan.scene, *starts[best], plan.price, plan.objective, 2.0, constraints, value=worst
+    )  # fmt: skip
+    nominal = float(price_pairs(plan.scene, sensor[None], light[None], plan.price, plan.objective)[0])
+    moves = tuple(
+        _move(plan, name, sign * getattr(tolerances, name), constraints) for name in names for sign in (-1, 1)
+    )
+    return Robust(
+        sensor=Pose(*map(float, sensor)),
+        light=Pose(*map(float, light)),
+        worst=in_units(plan.scene, value, 2),
+        nominal=in_units(plan.scene, nominal, 2),
+        plan_worst=in_units(plan.scene, values[0], 2),
+        moves=moves,
+        cases=len(worlds) * len(_with_pose_errors(sensor, light, tolerances)[0]),
+    )
+
+
+def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Tolerances) -> tuple[np.ndarray, np.ndarray]:
+    """The pair itself, and with the sensor or the light or both off in each of four ways."""
+    steps = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]], float)
+    ways = [
+        [pose] + [shifted(pose, off * step) for step in steps if off > 0]
+        for pose, off in ((sensor, tolerances.sensor_deg), (light, tolerances.light_deg))
+    ]
+    pairs = list(product(*ways))
+    return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+
+
+def _move(plan: Plan, name: str, by: float, constraints: Constraints | None) -> Move:
+    world = altered(plan.scene, {name: 1 + by})
+    sensor, light = (np.array(list(pose)) for pose in plan.poses)
+    here = float(price_pairs(world, sensor[None], light[None], plan.price, plan.objective)[0])
+    before = float(price_pairs(plan.scene, sensor[None], light[None], plan.price, plan.objective)[0])
+    if not np.isfinite(here):
+        return Move(name, 1 + by, np.inf, np.inf, np.nan, np.nan)
+    there = refine(world, sensor, light, plan.price, plan.objective, 1.0, constraints)
+    apart = [
+        float(np.degrees(np.arccos(np.clip(direction(a) @ direction(b), -1, 1))))
+        for a, b in zip((sensor, light), there[:2], strict=True)
+    ]
+    return Move(name, 1 + by, here / before, there[2] / before, *apart)

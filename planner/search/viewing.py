@@ -1,0 +1,110 @@
+"""The viewing space: directions nearly evenly spread over the sphere (section 6 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from planner.imaging.projection import direction
+from scenes import InvalidInput
+
+_NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them on the rings above and below
+
+
+@dataclass(frozen=True, eq=False)
+class ViewingSpace:
+    """The paper's tessellation: polar angle every ``step_deg``, azimuth every ``step_deg`` / sin(polar).
+
+    Parameters
+    ----------
+    step_deg : float
+        1 in the paper, which gives 41 347 directions: the printed set, not the printed sum (41 167) or total (41 348).
+    polar_deg : pair of float
+        Least and greatest polar angle; (0, 90) is the upper hemisphere.
+
+    Raises
+    ------
+    InvalidInput
+        If the step is not between 0.1 and 90, or the range is empty.
+
+    Examples
+    --------
+    >>> len(ViewingSpace()), len(ViewingSpace(polar_deg=(0, 90)))
+    (41347, 20854)
+    """
+
+    step_deg: float = 1.0
+    polar_deg: tuple[float, float] = (0.0, 180.0)
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.step_deg <= 90:
+            raise InvalidInput(f"step must be between 0.1 and 90 degrees, got {self.step_deg}")
+        if not 0 <= self.polar_deg[0] <= self.polar_deg[1] <= 180:
+            raise InvalidInput(f"polar range must be two rising angles between 0 and 180, got {self.polar_deg}")
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @cached_property
+    def poses(self) -> np.ndarray:
+        """All directions as (polar, azimuth), degrees, shape (N, 2), ring by ring from the north pole."""
+        rings = np.arange(round(180 / self.step_deg) + 1) * self.step_deg
+        low, high = self.polar_deg
+        rings = rings[(rings >= low - 1e-9) & (rings <= min(high, 180.0) + 1e-9)]
+        return np.concatenate([self._ring(polar) for polar in rings])
+
+    def _ring(self, polar: float) -> np.ndarray:
+        sine = np.sin(np.radians(polar))
+        if polar < 1e-9 or polar > 180 - 1e-9:
+            return np.array([[polar, 0.0]])
+        azimuths = np.arange(np.floor(360 * sine / self.step_deg + 1e-9) + 1) * self.step_deg / sine
+        return np.column_stack([np.full_like(azimuths, polar), azimuths])
+
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """Unit vectors, shape (N, 3)."""
+        return direction(self.poses)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.directions)
+
+    def neighbours(self, index: int) -> np.ndarray:
+        """Indices of the directions next to one."""
+        near = self._tree.query_ball_point(self.directions[index], 2 * np.sin(np.radians(self._reach) / 2))
+        return np.array([i for i in near if i != index], int)
+
+    @cached_property
+    def neighbour_pairs(self) -> np.ndarray:
+        """All pairs of directions that are neighbours, shape (M, 2)."""
+        return self._tree.query_pairs(2 * np.sin(np.radians(self._reach) / 2), output_type="ndarray")
+
+    @property
+    def _reach(self) -> float:
+        return min(_NEIGHBOUR * self.step_deg, 179.0)
+
+    def nearest(self, pose: np.ndarray) -> int:
+        """Index of the direction nearest to a pose (polar, azimuth)."""
+        return int(self.nearest_direction(direction(np.asarray(pose, float))))
+
+    def nearest_direction(self, vectors: np.ndarray) -> np.ndarray:
+        """Indices of the directions nearest to unit vectors (..., 3)."""
+        return self._tree.query(vectors)[1]
+
+
+def local_minima(space: ViewingSpace, values: np.ndarray) -> np.ndarray:
+    """Indices of the finite local minima of a map, the deepest first.
+
+    Directions of equal value that touch (such as azimuth 0 and 360 on the equator) count as one.
+    """
+    a, b = space.neighbour_pairs.T
+    beaten = np.zeros(len(values), bool)
+    beaten[a[values[b] < values[a]]] = True
+    beaten[b[values[a] < values[b]]] = True
+    same = values[a] == values[b]
+    beaten[np.maximum(a[same], b[same])] = True
+    found = np.flatnonzero(~beaten & np.isfinite(values))
+    return found[np.argsort(values[found])]

@@ -1,0 +1,41 @@
+"""Poses are set with a ruler: sensor and light stand a little beside where they should."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner import pose_spread, variances
+from planner.jitter import LEAST_SINE
+from render.phenomena.base import SAFETY, Effect, Influence, Poses, changed
+from scenes import Pose, Scene
+
+
+class PoseJitter(Effect):
+    """Each picture is taken from a pose that is off by a random angle."""
+
+    name = "pose_jitter"
+    cost = 1000.0
+    switch = "each picture is rendered from its own pose (render.shots)"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "poses are exact" if scene.jitter.sensor_deg == 0 and scene.jitter.light_deg == 0 else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        """By how much the projected distance changes with the sensor's pose; the light only changes contrasts."""
+        spread = pose_spread(scene, poses.sensors)
+        own = variances(scene, poses.sensors, poses.lights)
+        contrast = 6 * np.radians(scene.jitter.light_deg) ** 2  # the mean of 1 / cos^2 over small tilts
+        share = float(np.max(spread.variance / own) + contrast)
+        return Influence(SAFETY * float(spread.bias.max()), SAFETY * share)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "jitter", sensor_deg=0.0, light_deg=0.0)
+
+
+def shaken(scene: Scene, role: str, pose: Pose, rng: np.random.Generator) -> Pose:
+    """A pose as it is set in practice: off by normal angles of `scenes.Jitter` along both directions of its sphere."""
+    sigma = scene.jitter.sensor_deg if role == "sensor" else scene.jitter.light_deg
+    away, around = sigma * rng.standard_normal(2)
+    polar = pose.polar_deg + away
+    turn = around / max(np.sin(np.radians(pose.polar_deg)), LEAST_SINE)
+    return Pose(abs(polar), pose.azimuth_deg + turn + (180.0 if polar < 0 else 0.0))

@@ -1,0 +1,156 @@
+"""All effects, and the decision which of them a scene or one of its settings calls for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from render.phenomena.base import NOTHING, Effect, Influence, Poses, Tolerance
+from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
+from render.phenomena.pose import PoseJitter
+from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
+from render.phenomena.shading import (
+    Analyser,
+    AttachedShadow,
+    FallOff,
+    LightSize,
+    Polarisation,
+    SpecularLobe,
+    Wavelength,
+)
+from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
+from scenes import InvalidInput, Pose, Scene, Setting
+
+REGISTER: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
+        Analyser(), Wavelength(), FallOff(), LightSize(), DepthOfField(),
+        LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
+        FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether an effect is simulated.
+
+    Attributes
+    ----------
+    effect : Effect
+    on : bool
+    reason : str
+    influence : Influence
+        Estimated bound; exactly zero where the effect cannot matter.
+    """
+
+    effect: Effect
+    on: bool
+    reason: str
+    influence: Influence
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The scene reduced to the effects that are simulated, their names, and why."""
+
+    scene: Scene
+    active: frozenset[str]
+    decisions: tuple[Decision, ...]
+
+
+def effects(
+    scene: Scene, tolerance: Tolerance = Tolerance(), wanted: str | Iterable[str] = "auto"
+) -> tuple[Decision, ...]:
+    """Which effects the scene's settings call for, all settings together, or which the user wants instead.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> [d.effect.name for d in effects(scenes.load("task1")) if d.on][:3]
+    ['attached_shadow', 'fall_off', 'lens_blur']
+
+    Raises
+    ------
+    InvalidInput
+        If the scene has no settings, or an effect is unknown.
+    """
+    asked = None if wanted == "auto" else named(wanted)
+    if not scene.settings:
+        raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
+    pairs = np.array([[list(setting.sensor), list(setting.light)] for setting in scene.settings])
+    poses = Poses(pairs[:, 0], pairs[:, 1])
+    found = tuple(_decide(effect, scene, poses, tolerance) for effect in REGISTER.values())
+    return found if asked is None else tuple(_overruled(decision, asked) for decision in found)
+
+
+def choose(
+    scene: Scene,
+    wanted: str | Iterable[str],
+    tolerance: Tolerance,
+    sensor: Pose | None = None,
+    light: Pose | None = None,
+) -> Choice:
+    """Reduce a scene to the wanted effects.
+
+    Parameters
+    ----------
+    wanted : {"auto", "all"} or iterable of str
+    tolerance : Tolerance
+        What ``auto`` may leave out.
+    sensor, light : Pose, optional
+        Decide for one setting; for all of the scene's when not given.
+
+    Raises
+    ------
+    InvalidInput
+        If an effect is unknown.
+    """
+    if wanted == "auto":
+        here = (
+            scene if sensor is None else scene.model_copy(update={"settings": (Setting(sensor=sensor, light=light),)})
+        )
+        decisions = effects(here, tolerance)
+        active = frozenset(decision.effect.name for decision in decisions if decision.on)
+    else:
+        decisions, active = (), named(wanted)
+    reduced = scene
+    for name in REGISTER.keys() - active:
+        reduced = REGISTER[name].without(reduced)
+    return Choice(reduced, active, decisions)
+
+
+def named(wanted: str | Iterable[str]) -> frozenset[str]:
+    """Names of effects, from a list or from text: "all", or names with commas between.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such effect.
+    """
+    if wanted == "all":
+        return frozenset(REGISTER)
+    names = frozenset(wanted.split(",") if isinstance(wanted, str) else wanted) - {""}
+    unknown = sorted(names - REGISTER.keys())
+    if unknown:
+        raise InvalidInput(f"effects must be auto, all or some of {', '.join(REGISTER)}, got {unknown[0]!r}")
+    return names
+
+
+def _overruled(decision: Decision, asked: frozenset[str]) -> Decision:
+    on = decision.effect.name in asked
+    return replace(decision, on=on, reason="asked for" if on else "not asked for")
+
+
+def _decide(effect: Effect, scene: Scene, poses: Poses, tolerance: Tolerance) -> Decision:
+    absent = effect.absent(scene, poses)
+    if absent is not None:
+        return Decision(effect, False, absent, NOTHING)
+    influence = effect.influence(scene, poses)
+    if effect.cost == 1.0:
+        return Decision(effect, True, "free", influence)
+    on = tolerance.exceeded_by(influence)
+    return Decision(effect, on, "above the tolerance" if on else "below the tolerance", influence)

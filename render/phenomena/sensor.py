@@ -1,0 +1,113 @@
+"""What the sensor adds (EMVA 1288): shot noise, dark noise, fixed pattern, digits, saturation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner import variances
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Poses, changed
+from render.phenomena.edges import sides
+from scenes import Scene
+
+
+def _brightest(scene: Scene, poses: Poses) -> float:
+    """Highest level above darkness beside a required edge."""
+    floor = scene.camera.exposure * scene.floor.reflectance if scene.floor else 0.0
+    return max(float(sides(scene, poses).levels.max()), floor)
+
+
+def _relative(part: float, rest: float) -> Influence:
+    """Noise of one source beside the others; noise as such moves no mean."""
+    return Influence(0.0, float("inf") if rest <= 0 else part / rest)
+
+
+class ShotNoise(Effect):
+    """Photons arrive at random: variance gain x signal."""
+
+    name = "shot_noise"
+    switch = "noise.gain in the exposure; costs nothing beside the rays"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "gain is 0" if scene.noise.gain == 0 else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return _relative(scene.noise.gain * _brightest(scene, poses), scene.noise.variance)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "noise", gain=0.0)
+
+
+class ReadNoise(Effect):
+    """Gaussian noise that is there in darkness, too."""
+
+    name = "read_noise"
+    switch = "noise.sigma in the exposure; costs nothing beside the rays"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "sigma is 0" if scene.noise.sigma == 0 else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return _relative(scene.noise.sigma**2, scene.noise.variance - scene.noise.sigma**2)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "noise", sigma=0.0)
+
+
+class FixedPattern(Effect):
+    """Pixels differ in sensitivity (PRNU) and offset (DSNU), in every picture alike."""
+
+    name = "fixed_pattern"
+    switch = "noise.prnu and noise.dsnu in the exposure; costs nothing beside the rays"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "prnu and dsnu are 0" if scene.noise.prnu == 0 and scene.noise.dsnu == 0 else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        """One camera's pattern moves the mean, by less than 4 standard deviations of what cameras differ by."""
+        noise, temporal = scene.noise, max(scene.noise.variance, 1e-12)
+        pattern = noise.dsnu**2 + (noise.prnu * _brightest(scene, poses)) ** 2
+        reference = scene.model_copy(update={"noise": noise.model_copy(update={"sigma": temporal**0.5, "bits": None})})
+        spread = float(variances(reference, poses.sensors, poses.lights).max())
+        return Influence(4 * float(np.sqrt(spread * pattern / temporal)), 0.0)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "noise", prnu=0.0, dsnu=0.0)
+
+
+class Quantisation(Effect):
+    """Grey levels are whole numbers."""
+
+    name = "quantisation"
+    switch = "noise.bits in the exposure; costs nothing beside the rays"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "noise.bits is not given" if scene.noise.bits is None else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        """1/12 beside the rest; below half a grey level of noise it is not noise any more."""
+        rest = scene.noise.variance - 1 / 12
+        return EVERYTHING if rest < 0.25 else _relative(1 / 12, rest)
+
+
+class Saturation(Effect):
+    """The highest number ends the scale."""
+
+    name = "saturation"
+    switch = "clipping in the exposure; costs nothing beside the rays"
+    _MARGIN = 6.0  # standard deviations
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        if scene.noise.bits is None:
+            return "noise.bits is not given"
+        top = self._top(scene, poses)
+        full = 2**scene.noise.bits - 1
+        return f"levels reach {top:.0f} of {full}, {self._MARGIN:.0f} sigma included" if top < full else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return EVERYTHING if self._top(scene, poses) >= 2**scene.noise.bits - 1 else NOTHING
+
+    def _top(self, scene: Scene, poses: Poses) -> float:
+        level = scene.camera.black_level + _brightest(scene, poses)
+        noise = scene.noise
+        sigma = np.sqrt(noise.variance + noise.gain * level + (noise.prnu * level) ** 2 + noise.dsnu**2)
+        return level + self._MARGIN * float(sigma)

@@ -1,0 +1,161 @@
+"""How a surface sends light on: attached shadow, fall-off, lobe, polarisation, wavelength, size of the light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.imaging.projection import direction
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Poses, changed, largest
+from render.phenomena.edges import compare, lever, sides, total_variance
+from scenes import Scene
+
+
+class AttachedShadow(Effect):
+    """A face turned away from the light is dark."""
+
+    name = "attached_shadow"
+    switch = "part of every reflectance; costs nothing"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        """Without it a face would be lit through the object."""
+        found = sides(scene, poses)
+        away = np.einsum("efi,si->sef", found.normals, _light_positions(scene, poses)) < np.einsum(
+            "efi,ei->ef", found.normals, found.points[:, 0]
+        )
+        seen = np.einsum("efi,si->sef", found.normals, _sensor_positions(scene, poses)) > np.einsum(
+            "efi,ei->ef", found.normals, found.points[:, 0]
+        )
+        return EVERYTHING if (away & seen).any() else NOTHING
+
+
+class FallOff(Effect):
+    """Irradiance falls with the squared distance from the light."""
+
+    name = "fall_off"
+    switch = "a point light has it; costs nothing"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        variance = total_variance(scene)
+        first, second = (sides(scene, poses, fall_off=on) for on in (True, False))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.abs((first.contrast / second.contrast) ** 2 - 1).max((-1, -2))
+        moved = np.abs(first.shift(variance) - second.shift(variance)).max(-1)
+        return largest((lever(scene, poses) * moved).sum(-1), ratio)
+
+
+class SpecularLobe(Effect):
+    """The Torrance-Sparrow term."""
+
+    name = "specular_lobe"
+    cost = 1.5
+    switch = "the paper's reflectance as a BSDF instead of a diffuse one"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        if scene.material.specular_fraction == 0:
+            return "specular_fraction is 0"
+        return "n = 1 and k = 0: no Fresnel reflection" if scene.material.is_diffuse else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return compare(scene, self.without(scene), poses)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "material", refractive_index=1.0, extinction=0.0, index_table=())
+
+
+class Polarisation(Effect):
+    """Light that swings in one direction: J_parallel and J_perpendicular instead of 1/2 each."""
+
+    name = "polarisation"
+    cost = 1.2
+    switch = "J_parallel, J_perpendicular in the BSDF"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        if scene.light.polarisation_deg is None:
+            return "the light is unpolarised"
+        return "diffuse reflection forgets polarisation" if scene.material.is_diffuse else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return compare(scene, self.without(scene), poses)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "light", polarisation_deg=None)
+
+
+class Analyser(Effect):
+    """A linear polariser in front of the sensor."""
+
+    name = "analyser"
+    cost = 1.2
+    switch = "both components, with their phase, in the BSDF"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "there is no analyser" if scene.camera.analyser_deg is None else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return compare(scene, self.without(scene), poses)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "camera", analyser_deg=None)
+
+
+class Wavelength(Effect):
+    """The refractive index changes with the wavelength."""
+
+    name = "wavelength"
+    cost = 1.2
+    switch = "the specular term summed over the wavelengths"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        if scene.material.is_diffuse:
+            return "the diffuse term does not depend on the index"
+        return None if scene.material.index_table else "the material has no table of indices"
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        return compare(scene, self.without(scene), poses)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "material", index_table=())
+
+
+class LightSize(Effect):
+    """A light of finite radius: softer shading, lobes and shadows."""
+
+    name = "light_size"
+    cost = 9.0
+    random = True
+    switch = "a sphere or a disc instead of a point"
+
+    def absent(self, scene: Scene, poses: Poses) -> str | None:
+        return "the light is a point" if scene.light.radius == 0 else None
+
+    def influence(self, scene: Scene, poses: Poses) -> Influence:
+        """Second order in the light's angle a: cos / r^2 changes by at most 2 a^2, a lobe m wide by (a / m)^2.
+
+        Unbounded where a face is lit at less than 2 a, or where there is something to cast a penumbra on.
+        """
+        angle = scene.light.radius / scene.light.distance
+        found = sides(scene, poses)
+        towards = _light_positions(scene, poses)[:, None, None, None] - found.points[:, None]
+        sine = np.einsum("sefni,efi->sefn", towards, found.normals) / np.linalg.norm(towards, axis=-1)
+        if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
+            return EVERYTHING
+        share = 2 * angle**2 + (0 if scene.material.is_diffuse else (angle / scene.material.roughness) ** 2)
+        moved = np.abs(found.shift(total_variance(scene))).max(-1) * share
+        return largest((lever(scene, poses) * moved).sum(-1), np.array([2 * share]))
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "light", radius=0.0)
+
+
+def _light_positions(scene: Scene, poses: Poses) -> np.ndarray:
+    return scene.light.distance * direction(poses.lights)
+
+
+def _sensor_positions(scene: Scene, poses: Poses) -> np.ndarray:
+    return scene.camera.distance * direction(poses.sensors)

@@ -1,0 +1,168 @@
+"""The noise-free image of a scene from one sensor pose under one light pose, by Mitsuba."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from planner.imaging.projection import depth, project
+from render import variant as variants
+from render.adaptive import crossed, near_edges, refine, refine_tiles
+from render.build import CUSTOM, description, view
+from render.optics import blur_and_bin, distort, distorted
+from render.phenomena import Tolerance, choose
+from render.precision import check_precision
+from render.rays import SURFACES, Rays
+from scenes import InvalidInput, Pose, Scene
+
+STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What the clean image's accuracy costs.
+
+    Attributes
+    ----------
+    supersample : int
+        Fine pixels that divide a pixel, each way.
+    samples : int
+        Rays a fine pixel, a square number.
+    edge_samples : int, optional
+        Rays of a fine pixel that an edge crosses, a square number; 256 in compiled variants and 64 in scalar ones when
+        not given. Where single rays are random all pixels that the task's edges are located from get as many.
+    random_samples : int, optional
+        Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
+        light of finite size), a square number; 16 when not given.
+    seed : int
+
+    In a scalar variant the paper's reflectance runs as interpreted Python, about 20 times slower: there a fine pixel
+    gets one ray, and 16 where an edge crosses it.
+    """
+
+    supersample: int = 4
+    samples: int = 4
+    edge_samples: int | None = None
+    random_samples: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.supersample < 1:
+            raise InvalidInput(f"supersample must be at least 1, got {self.supersample}")
+        for name in ("samples", "edge_samples", "random_samples"):
+            value = getattr(self, name)
+            if value is not None and (value < 1 or math.isqrt(value) ** 2 != value):
+                raise InvalidInput(f"{name} must be a square number, got {value}")
+
+
+def image(
+    scene: Scene,
+    sensor: Any,
+    light: Any,
+    quality: Quality = Quality(),
+    variant: str | None = None,
+    effects: str | Iterable[str] = "auto",
+    tolerance: Tolerance = Tolerance(),
+) -> np.ndarray:
+    """Noise-free image.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor, light : Pose or pair of float
+        Polar angle and azimuth, degrees.
+    quality : Quality
+        Rays a pixel.
+    variant : str, optional
+        Mitsuba variant; `render.variant.choose()` when not given.
+    effects : {"auto", "all"} or iterable of str
+        Which effects to simulate: those whose estimated influence exceeds the tolerance, every one, or the named ones
+        (see `render.effects`).
+    tolerance : Tolerance
+        What ``auto`` may leave out.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        Grey levels, darkness at the black level. Without a floor only the part that the object covers is rendered; the
+        rest is dark. The same seed gives the same image, bit by bit, for the same variant.
+
+    Raises
+    ------
+    InvalidInput
+        If a pose stands in or on the object, an effect is unknown, or the focal length is too long.
+    """
+    sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
+    chosen = choose(scene, effects, tolerance, sensor, light)
+    scene, camera, k = chosen.scene, chosen.scene.camera, quality.supersample
+    picture = np.zeros((camera.height, camera.width))
+    rows, columns = window(scene, sensor)
+    if picture[rows, columns].size:
+        check_precision(camera)
+        crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
+        fine = _fine(scene, sensor, light, chosen.active, crop, quality, variant or variants.choose())
+        start = crop[1].start, crop[0].start
+        warp = partial(distort, camera=camera, start=start, supersample=k) if camera.lens.distortion else None
+        picture[rows, columns] = blur_and_bin(fine, camera.blur_px, k, warp)
+    return picture + camera.black_level
+
+
+def window(scene: Scene, sensor: Pose) -> tuple[slice, slice]:
+    """Rows and columns of the image that have to be rendered: all with a floor, else what object and blur can reach."""
+    camera = scene.camera
+    solids = [scene.solid, *(obstacle.solid for obstacle in scene.obstacles)]
+    corners = project(np.concatenate([solid.vertices for solid in solids]), np.array(list(sensor)), camera)
+    if np.isnan(corners).any() or scene.floor is not None:
+        return slice(0, camera.height), slice(0, camera.width)
+    corners = np.concatenate([corners, distorted(corners, camera)])
+    margin = 2 + 6 * camera.blur_px + _defocus(scene, sensor)
+    low, high = np.floor(corners.min(0) - margin), np.ceil(corners.max(0) + margin + 1)
+    (left, top), (right, bottom) = (
+        np.clip(edge, 0, [camera.width, camera.height]).astype(int).tolist() for edge in (low, high)
+    )
+    return slice(top, bottom), slice(left, right)
+
+
+def _defocus(scene: Scene, sensor: Pose) -> float:
+    """Radius of the largest circle of confusion, px."""
+    lens, camera = scene.camera.lens, scene.camera
+    near = max(float(depth(scene.solid.vertices, np.array(list(sensor)), camera).min()), 1e-3 * camera.distance)
+    return lens.aperture_radius * camera.focal_px * abs(1 / near - 1 / (lens.focus or camera.distance))
+
+
+def _fine(scene, sensor, light, active, crop, quality: Quality, variant: str) -> np.ndarray:
+    """Image of fine pixels, before lens and pixel aperture."""
+    mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
+    sharp, interpreted = active - STOCHASTIC, scalar and bool(active & CUSTOM)
+    size = scene.camera.width * k, scene.camera.height * k
+
+    def load(active, samples):
+        parts = description(mitsuba, scene, sensor, light, active, size, crop, samples)
+        return mitsuba.load_dict(parts, parallel=False)
+
+    def tile(samples: int, part: tuple[slice, slice]) -> dict:
+        shifted = tuple(slice(a.start + b.start, a.start + b.stop) for a, b in zip(crop, part, strict=True))
+        return view(mitsuba, scene, sensor, active, size, shifted, samples)
+
+    loaded = load(sharp, 1 if interpreted else quality.samples)
+    fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
+    marked = crossed(fine, math.ceil(k * _defocus(scene, sensor)))
+    many = quality.edge_samples or (16 if interpreted else 64 if scalar else 256)
+    few = quality.random_samples or 16
+    bounces = SURFACES - 1 if "interreflection" in active else 0
+    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed)
+    if sharp != active:
+        loaded = load(active, few)
+        marked |= near_edges(scene, sensor, crop, k)
+        if scalar:
+            fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
+        else:
+            fine = refine(loaded, rays, fine, np.ones_like(marked), few)
+    if scalar:
+        return refine_tiles(mitsuba, loaded, tile, fine, marked, many, quality.seed)
+    return refine(loaded, rays, fine, marked, many)

@@ -1,0 +1,40 @@
+"""The camera."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from scenes.lens import Lens
+from scenes.model import Model
+from scenes.ranges import Curve, Darkness, Length, Level, rising
+
+
+class Camera(Model):
+    """A pinhole camera on a sphere around the origin, looking at the origin, the object's z axis up.
+
+    ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
+    blur, ``exposure`` the grey level of a white diffuse surface at the origin that faces the light, and
+    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``analyser_deg`` is the
+    direction that an ideal linear polariser in front of the lens lets through, from the image's x towards its y.
+    ``transmission`` (of the lens) and ``responsivity`` (of the sensor) are C and S of eq. 1 by wavelength, rows
+    [nm, relative value], constant where not given.
+    """
+
+    width: Annotated[int, Field(ge=1, le=16384)]
+    height: Annotated[int, Field(ge=1, le=16384)]
+    focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
+    distance: Length
+    blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
+    exposure: Level = 200.0
+    black_level: Darkness = 0.0
+    lens: Lens = Lens()
+    analyser_deg: float | None = None
+    transmission: Curve = ()
+    responsivity: Curve = ()
+
+    @field_validator("transmission", "responsivity")
+    @classmethod
+    def _in_order(cls, rows: tuple, info: ValidationInfo) -> tuple:
+        return rising(f"camera.{info.field_name}", rows)

@@ -1,0 +1,1 @@
+"""Objects: their typed description and their geometry."""

@@ -1,0 +1,22 @@
+"""A rectangular block."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Literal
+
+from scenes.model import Model
+from scenes.parts.solid import Solid, block
+from scenes.ranges import Length
+
+
+class Block(Model):
+    """A rectangular block with a corner at the origin and its sides along the axes; ``size`` in cm."""
+
+    kind: Literal["block"] = "block"
+    size: tuple[Length, Length, Length]
+
+    @cached_property
+    def solid(self) -> Solid:
+        """Vertices, faces and edges, named as in the paper's Fig. 6."""
+        return block(self.size)

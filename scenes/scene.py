@@ -1,0 +1,156 @@
+"""Everything that a prediction, a render or a measurement has to know, in one checked description.
+
+Lengths in space are cm, lengths in the image px, brightness is in grey levels.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Discriminator, Tag, model_validator
+
+from scenes.camera import Camera
+from scenes.errors import InvalidInput
+from scenes.lights import Light
+from scenes.materials import Material
+from scenes.measurands import Centre, Corner, Locator, Task
+from scenes.model import Model
+from scenes.noise import Noise
+from scenes.parts.block import Block
+from scenes.parts.mesh_file import Mesh
+from scenes.parts.solid import Solid
+from scenes.pose import Pose, PoseField
+from scenes.ranges import Positive
+from scenes.surroundings import Floor, Jitter, Obstacle
+
+
+def _tag_of_object(value: Any) -> str:
+    return value.get("kind", "block") if isinstance(value, dict) else getattr(value, "kind", "block")
+
+
+Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")], Discriminator(_tag_of_object)]
+
+
+class Setting(Model):
+    """One pair of sensor and light, with what the paper printed for it (variances, px^2)."""
+
+    sensor: PoseField
+    light: PoseField
+    paper_ice: Positive | None = None
+    paper_real: tuple[Positive, Positive] | None = None
+
+
+class Scene(Model):
+    """Everything that a prediction, a render or a measurement has to know.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a value is missing, unknown or out of range, if the task names a vertex or an edge that the
+        object lacks, or if a sensor or a light would stand in or on the object. `scenes.load` turns it
+        into `scenes.InvalidInput`.
+    """
+
+    name: str
+    title: str = ""
+    object: Object
+    material: Material
+    camera: Camera
+    light: Light
+    noise: Noise
+    task: Task
+    locator: Locator = Locator()
+    settings: tuple[Setting, ...] = ()
+    same_scale: tuple[str, ...] = ()
+    floor: Floor | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    jitter: Jitter = Jitter()
+
+    @property
+    def solid(self) -> Solid:
+        """Vertices, faces and edges of the object."""
+        return self.object.solid
+
+    def position(self, role: Literal["sensor", "light"], pose: Pose) -> np.ndarray:
+        """Where the sensor or the light stands, cm, shape (3,)."""
+        polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
+        direction = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+        return (self.camera if role == "sensor" else self.light).distance * np.array(direction)
+
+    def check_pose(self, role: Literal["sensor", "light"], pose: Any, key: str | None = None) -> Pose:
+        """The pose, once it is known to stand outside the object.
+
+        Raises
+        ------
+        InvalidInput
+            If the pose is no pose, or lies in or on the object.
+        """
+        try:
+            pose = Pose.of(pose)
+        except InvalidInput as error:
+            raise InvalidInput(f"{key or role}: {error}") from None
+        if self.solid.height_above(self.position(role, pose)) <= 1e-6 * np.ptp(self.solid.vertices):
+            radius = (self.camera if role == "sensor" else self.light).distance
+            raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
+        if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
+            raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
+        return pose
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scene:
+        self._check_task()
+        self._check_surroundings()
+        for i, setting in enumerate(self.settings):
+            for role in ("sensor", "light"):
+                self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
+        return self
+
+    def _check_task(self) -> None:
+        for end, feature in zip(("start", "end"), self.task.corners, strict=False):
+            check = self._check_corner if isinstance(feature, Corner) else self._check_centre
+            check(f"task.{end}", feature)
+        if self.task.kind == "angle":
+            known = [edge.name for edge in self.solid.edges]
+            for name in self.task.lines:
+                if name not in known:
+                    raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")
+            if self.task.lines[0] == self.task.lines[1]:
+                raise ValueError(f"task.lines must be two different edges, got {list(self.task.lines)}")
+        elif self.task.start == self.task.end or (
+            getattr(self.task.start, "vertex", 0) == getattr(self.task.end, "vertex", 1)
+        ):
+            key = "vertex" if isinstance(self.task.end, Corner) else "circle"
+            raise ValueError(
+                f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(self.task.end, key)!r}"
+            )
+
+    def _check_centre(self, key: str, centre: Centre) -> None:
+        known = [circle.name for circle in self.solid.circles]
+        if centre.circle not in known:
+            raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
+
+    def _check_surroundings(self) -> None:
+        """Floor below the object, light and sensor above it and outside obstacles, one level of darkness."""
+        low = float(self.solid.vertices[:, 2].min())
+        if self.floor is not None and self.floor.height > low:
+            raise ValueError(
+                f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
+            )
+        if self.noise.needs_darkness and self.noise.dark_level != self.camera.black_level:
+            raise ValueError(
+                f"noise.dark_level must be camera.black_level ({self.camera.black_level:g}) where noise depends on the "
+                f"light, got {self.noise.dark_level:g}"
+            )
+        if self.light.radius >= self.light.distance / 2:
+            raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")
+
+    def _check_corner(self, key: str, corner: Corner) -> None:
+        if corner.vertex not in self.solid.vertex_names:
+            raise ValueError(f"{key}.vertex must be one of {', '.join(self.solid.vertex_names)}, got {corner.vertex!r}")
+        there = [edge.name for edge in self.solid.edges_at(corner.vertex)]
+        for name in corner.edges:
+            if name not in there:
+                raise ValueError(f"{key}.edges must be edges at {corner.vertex} ({', '.join(there)}), got {name!r}")
+        if corner.edges[0] == corner.edges[1]:
+            raise ValueError(f"{key}.edges must be two different edges, got {list(corner.edges)}")

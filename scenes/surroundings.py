@@ -1,0 +1,39 @@
+"""What light meets besides the object, and how exactly poses are set."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from scenes.model import Model
+from scenes.parts.solid import Solid, block
+from scenes.ranges import Fraction, NotNegative, Positive
+
+
+class Floor(Model):
+    """A diffuse square plane at ``height`` below the object, reflecting ``reflectance``, ``half_side`` cm each way."""
+
+    reflectance: Fraction
+    height: float = 0.0
+    half_side: Positive = 1000.0
+
+
+class Obstacle(Model):
+    """A block beside the measured object, of the same material; ``corner`` is its corner of least x, y and z."""
+
+    corner: tuple[float, float, float]
+    size: tuple[Positive, Positive, Positive]
+
+    @cached_property
+    def solid(self) -> Solid:
+        """Its geometry, where it stands."""
+        here = block(self.size)
+        return Solid(here.vertex_names, here.vertices + np.array(self.corner), here.faces, here.edges)
+
+
+class Jitter(Model):
+    """Standard deviations with which poses are set, degrees along each of the sphere's two directions."""
+
+    sensor_deg: NotNegative = 0.0
+    light_deg: NotNegative = 0.0

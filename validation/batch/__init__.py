@@ -1,0 +1,1 @@
+"""The batch job: campaign, work, executors, run file, result."""

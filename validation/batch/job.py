@@ -1,0 +1,300 @@
+"""The batch job: render every setting, measure it many times, judge the predictions."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import platform
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import measure
+import planner
+import render
+import scenes
+from render import Quality, Tolerance
+from render import variant as variants
+from render.phenomena import named
+from scenes import InvalidInput, Scene
+from validation.batch import pool as pools
+from validation.batch import work
+from validation.batch.campaign import Campaign, Case
+from validation.batch.pool import Crew
+from validation.batch.result import Validation, collect
+from validation.batch.stages import Stages
+from validation.batch.stopped import Stopped
+from validation.batch.store import RunFile
+from validation.batch.work import CHUNK, Found, Picture, Rendering, Task
+
+log = logging.getLogger("validation")
+_PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
+_MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
+_PICTURES = 64  # settings whose image is kept for the report
+_BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
+_CHECK_S = 5.0  # between looks at whether the workers are still there
+Progress = Callable[[str, int, int], None]
+More = Callable[[RunFile], Sequence[int] | None]
+
+
+def run(
+    scene: Scene | Campaign,
+    renders: int = 1000,
+    seed: int = 1,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    fresh: bool = False,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
+    dask: str | None = None,
+    quality: Quality = Quality(),
+    more: More | None = None,
+    effects: str = "auto",
+    tolerance: Tolerance = Tolerance(),
+) -> Validation:
+    """Validate all settings of a scene or a campaign.
+
+    Parameters
+    ----------
+    scene : Scene or Campaign
+        At least one setting.
+    renders : int
+        Noisy images a setting, at least 2.
+    seed : int
+        Root of all random numbers; the result does not depend on the number of workers.
+    out : str or Path, optional
+        Run directory, ``runs/<scene>`` when not given. A killed run continues there.
+    workers : int, optional
+        Processes; all available cores when not given. 1 works in this process.
+    fresh : bool
+        Start anew even if the directory holds results.
+    progress : callable, optional
+        Called as progress(what, done, total).
+    executor : concurrent.futures.Executor, optional
+        Used instead of local processes.
+    dask : str, optional
+        Address of a Dask scheduler, whose workers are used instead.
+    quality : Quality
+        Of the noise-free images.
+    more : callable, optional
+        Asked as more(run file) whenever all images asked for are measured; answers how many each setting should have,
+        or None when it is enough. Its answers are kept, so that a killed run continues with them.
+    effects : str
+        "auto", "all" or names with commas between: what is simulated (`render.image`).
+    tolerance : Tolerance
+        What ``auto`` may leave out.
+
+    Raises
+    ------
+    InvalidInput
+        If a number is out of range, there are no settings, none of them can be worked on, or the directory holds
+        another run.
+    Stopped
+        If workers keep dying, the scheduler goes away, or the run file cannot be written. The same call continues.
+    """
+    _check(scene, renders, seed, workers, effects)
+    started = time.perf_counter()
+    campaign, variant = Campaign.of(scene), variants.choose()
+    count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)
+    store = RunFile(Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how), fresh)
+    try:
+        store.note(
+            "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
+        )
+        store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
+        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more)
+        log.info(
+            "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
+        )
+        before, spent = batch.done, store.fact("wall", 0.0)
+        try:
+            batch.finish(lambda: _crew(count, executor, dask))
+        finally:
+            if batch.done > before:
+                with suppress(Stopped):
+                    store.note("wall", spent + time.perf_counter() - started)
+                    store.note("workers", count)
+        found = collect(campaign, store)
+        log.info("finished", extra={"facts": {"verdict": found.verdict.text, "agrees": found.verdict.agrees}})
+        return found
+    finally:
+        store.close()
+
+
+def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None, effects: str) -> None:
+    if effects != "auto":
+        named(effects)
+    if renders < 2:
+        raise InvalidInput(f"renders must be at least 2, got {renders}")
+    if seed < 0:
+        raise InvalidInput(f"seed must be at least 0, got {seed}")
+    if workers is not None and workers < 1:
+        raise InvalidInput(f"workers must be at least 1, got {workers}")
+    if isinstance(scene, Scene) and not scene.settings:
+        raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
+
+
+def _identity(campaign: Campaign, renders: int, seed: int, variant: str, how: Rendering) -> dict:
+    """All that the numbers depend on; a directory that holds other ones is refused."""
+    return {
+        "campaign": campaign.model_dump(mode="json"),
+        "seed": seed,
+        "renders": renders,
+        "chunk": CHUNK,
+        "variant": variant,
+        **asdict(how),
+        "versions": {name: version(name) for name in _PACKAGES},
+        "code": _code(),
+    }
+
+
+def _code() -> str:
+    """Digest of the code that makes the numbers."""
+    folders = [Path(package.__file__).parent for package in (scenes, planner, render, measure)]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [Path(work.__file__)]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+
+
+def _crew(workers: int, executor: Executor | None, dask: str | None) -> AbstractContextManager[Crew]:
+    if executor is not None:
+        return nullcontext(Crew(executor, lambda: workers))
+    return pools.dask(dask) if dask else pools.local(workers)
+
+
+@dataclass
+class _Batch:
+    """The work of a run that is not yet done; each result is committed as it arrives."""
+
+    campaign: Campaign
+    renders: int
+    seed: int
+    variant: str
+    store: RunFile
+    progress: Progress
+    how: Rendering = Rendering()
+    more: More | None = None
+
+    def __post_init__(self) -> None:
+        self.stages = Stages([[self.renders] * len(self.campaign), *self.store.fact("stages", [])])
+        self.done = self.store.images()
+
+    @property
+    def total(self) -> int:
+        """Images asked for so far."""
+        return self.stages.total
+
+    def finish(self, open_crew: Callable[[], AbstractContextManager[Crew]]) -> None:
+        """Work until all is done; after the death of a worker begin again with what is left."""
+        self.progress("images", self.done, self.total)
+        deaths = 0
+        while True:
+            before = self.done
+            try:
+                if next(self._settings(), None):  # else do not start workers for nothing
+                    with open_crew() as crew:
+                        self._work(crew)
+                        while self._extend():
+                            self._work(crew)
+                elif self._extend():
+                    continue
+                return
+            except (BrokenExecutor, CancelledError) as error:
+                deaths = 1 if self.done > before else deaths + 1
+                log.warning("workers lost", extra={"facts": {"deaths": deaths, "error": str(error)}})
+                if deaths == _BREAKS:
+                    raise Stopped(f"workers died {_BREAKS} times in a row; is there enough memory?") from None
+
+    def _extend(self) -> bool:
+        """Whether more images are wanted than there are."""
+        wanted = self.more(self.store) if self.more else None
+        if wanted is None or not self.stages.extend(wanted):
+            return False
+        self.store.note("stages", self.stages.later)
+        return True
+
+    def _work(self, crew: Crew) -> None:
+        """Keep every worker busy, with no more tasks in flight than that needs: memory does not grow with the run."""
+        pending: dict[Future, _Setting] = {}
+        opened: deque[_Setting] = deque()
+        size = crew.size()
+        group, fresh = self._group(size), self._settings()
+        while True:
+            while len(pending) < size + 2:
+                setting = opened.popleft() if opened else next(fresh, None)
+                if setting is None:
+                    break
+                pending[crew.executor.submit(work.perform, setting.task(group))] = setting
+                if setting.picture and setting.left:
+                    opened.appendleft(setting)
+            if not pending:
+                return
+            done = wait(pending, timeout=_CHECK_S, return_when=FIRST_COMPLETED).done
+            if not done:
+                crew.check(None)
+                size = crew.size()
+            for future in done:
+                setting = pending.pop(future)
+                found = self._result(future, crew)
+                self._commit(setting.case.index, found)
+                if found.clean and setting.left:
+                    setting.picture = found.clean.picture
+                    opened.append(setting)
+
+    def _result(self, future: Future, crew: Crew) -> Found:
+        try:
+            return future.result()
+        except Exception as error:
+            crew.check(error)  # says so if it is the crew that is gone, and not the work that is wrong
+            raise
+
+    def _commit(self, index: int, found: Found) -> None:
+        self.store.add(index, found)
+        finished = len(self.store.chunks(index)) == len(self.stages.sizes(index))
+        if index >= _PICTURES and finished and self.more is None:
+            self.store.drop_picture(index)
+        sizes = self.stages.sizes(index)
+        images = sum(sizes[chunk] for chunk in found.chunks)
+        self.done += images
+        self.progress("images", self.done, self.total)
+        facts = {"setting": index, "images": images, "done": self.done, "total": self.total, "trouble": found.trouble}
+        log.info("committed", extra={"facts": facts})
+
+    def _settings(self) -> Iterator[_Setting]:
+        """The settings that have work left, one at a time."""
+        for index in range(len(self.campaign)):
+            done = self.store.chunks(index)
+            left = deque((chunk, size) for chunk, size in self.stages.sizes(index).items() if chunk not in done)
+            if not left or self.store.trouble(index):
+                continue
+            try:
+                case = self.campaign.case(index)
+            except InvalidInput as error:
+                self._commit(index, Found(None, {}, str(error)))
+                continue
+            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.picture(index))
+
+    def _group(self, size: int) -> int:
+        """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
+        return max(1, min(_MAX_CHUNKS, self.total // CHUNK // (16 * size)))
+
+
+@dataclass
+class _Setting:
+    """A setting that has chunks left: its first task renders the image, which then goes with the others."""
+
+    case: Case
+    left: deque[tuple[int, int]]
+    seed: int
+    variant: str
+    how: Rendering
+    picture: Picture | None
+
+    def task(self, group: int) -> Task:
+        """The next task."""
+        chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
+        return Task(self.case, chunks, self.seed, self.variant, self.picture, self.how)

@@ -1,0 +1,242 @@
+"""The piece of work that a run consists of: a plain function of its argument, run by any executor."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+import measure
+import planner
+import render
+from render import Quality, Tolerance
+from render import variant as variants
+from scenes import InvalidInput, Jitter, Scene
+from validation.batch.campaign import Case
+
+CHUNK = 250  # images; a run's random numbers depend on it
+_BATCH = 50  # images held in memory at a time
+Shots = Callable[[np.random.Generator, int], np.ndarray]  # stacks of pictures
+_RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
+
+
+@dataclass(frozen=True)
+class Method:
+    """A locator, with its gradient threshold if it has one."""
+
+    locator: str
+    threshold: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Name in tables and in the run file: "gradient", "canny@12"."""
+        return self.locator if self.threshold is None else f"{self.locator}@{self.threshold:g}"
+
+
+def methods(scene: Scene) -> tuple[Method, ...]:
+    """All methods that a run compares; the first is the one its verdict is about."""
+    return (Method("gradient"), *(Method("canny", threshold) for threshold in scene.locator.thresholds))
+
+
+class Picture(NamedTuple):
+    """A noise-free image as it travels and is stored: zlib-compressed little-endian float64."""
+
+    height: int
+    width: int
+    data: bytes
+
+    @classmethod
+    def of(cls, image: np.ndarray) -> Picture:
+        return cls(*image.shape, zlib.compress(image.astype("<f8").tobytes(), 1))
+
+    def array(self) -> np.ndarray:
+        return np.frombuffer(zlib.decompress(self.data), "<f8").reshape(self.height, self.width)
+
+
+@dataclass(frozen=True)
+class Clean:
+    """The noise-free image of a setting and what is predicted, with and without it.
+
+    Attributes
+    ----------
+    picture : Picture
+    propagated : dict
+        Variance (px^2), distance in the image (px) and status, by method.
+    prices : dict
+        Variances that need no image, px^2 (``paper`` without its free scale), and the model's distance ``value_px``.
+    """
+
+    picture: Picture
+    propagated: dict[str, tuple[float, float, str]]
+    prices: dict[str, float]
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Distances of one chunk of images, one array a method; statuses of the images that failed."""
+
+    distances: dict[str, np.ndarray]
+    failures: dict[str, dict[int, str]]
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """How noise-free images are made: rays, which effects, and what ``auto`` may leave out."""
+
+    quality: Quality = Quality()
+    effects: str = "auto"
+    tolerance: Tolerance = Tolerance()
+
+
+@dataclass(frozen=True)
+class Task:
+    """Chunks of one setting, (number, images) each; without a picture the worker renders it."""
+
+    case: Case
+    chunks: tuple[tuple[int, int], ...]
+    seed: int
+    variant: str
+    picture: Picture | None = None
+    rendering: Rendering = Rendering()
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a task found; ``trouble`` says in one line why the setting cannot be worked on."""
+
+    clean: Clean | None
+    chunks: dict[int, Chunk]
+    trouble: str | None = None
+
+
+def perform(task: Task) -> Found:
+    """Render, unless the image came with the task, then measure.
+
+    With one thread of linear algebra, whatever the worker's environment says: a sum split over threads has other bits.
+    """
+    with _libraries().limit(limits=1):
+        return _perform(task)
+
+
+@functools.cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def _perform(task: Task) -> Found:
+    with _RENDERER:
+        variants.use(task.variant)  # what the machine cannot do is not the setting's fault
+    try:
+        clean = None
+        if task.picture is None:
+            with _RENDERER:
+                clean = render_setting(task.case, task.variant, task.rendering)
+        image = (task.picture or clean.picture).array()
+        shots = _shots(task)
+        return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, n, shots) for k, n in task.chunks})
+    except InvalidInput as error:
+        return Found(None, {}, str(error))
+
+
+def _shots(task: Task) -> Shots | None:
+    """Takes pictures from poses that are set anew each time; None where that does not matter."""
+    scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
+    if _jitter(task.case, how) == Jitter():
+        return None
+
+    def take(rng: np.random.Generator, count: int) -> np.ndarray:
+        with _RENDERER:
+            return render.shots(scene, sensor, light, rng, count, how.quality, task.variant, how.effects, how.tolerance)
+
+    return take
+
+
+def _jitter(case: Case, how: Rendering) -> Jitter:
+    """How exactly poses are set, as far as it is simulated."""
+    scene, setting = case.scene, case.setting
+    if scene.jitter == Jitter():  # nearly always: spare the choice
+        return scene.jitter
+    return render.choose(scene, how.effects, how.tolerance, setting.sensor, setting.light).scene.jitter
+
+
+def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
+    """Render a setting, and predict with and without its image."""
+    clock = _Clock()
+    scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
+    prices = {price: planner.predict(scene, sensor, light, price) for price in ("paper", "calibrated", "bound")}
+    numbers = {price: found.variance_px2 for price, found in prices.items()}
+    numbers["value_px"] = prices["calibrated"].value_px
+    clock.lap("predict")
+    image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
+    clock.lap("render")
+    shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
+    spread = float(planner.pose_spread(shaken, np.array([list(sensor)])).variance[0])
+    propagated = {}
+    for method in methods(scene):
+        found = measure.propagate(image, scene, sensor, None, method.locator, method.threshold)  # as it is measured
+        propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
+    clock.lap("propagate")
+    return Clean(Picture.of(image), propagated, numbers, clock.seconds)
+
+
+def measure_chunk(
+    case: Case, image: np.ndarray, seed: int, chunk: int, count: int, shots: Shots | None = None
+) -> Chunk:
+    """Expose ``count`` images of a setting and measure each with every method.
+
+    ``shots`` takes the pictures where exposing the one noise-free image is not enough.
+
+    The random numbers depend on seed, setting, chunk and batch alone, so a run gives the same numbers in any order and
+    with any number of workers, and a longer run begins with the shorter one's.
+    """
+    cv2.setNumThreads(1)  # workers share the cores among themselves
+    clock = _Clock()
+    scene, sensor = case.scene, case.setting.sensor
+    where = measure.footprint(scene, sensor)
+    clock.lap("prepare")
+    parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
+    for batch, first in enumerate(range(0, count, _BATCH)):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
+        many = min(_BATCH, count - first)
+        pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
+        clock.lap("expose")
+        for method in methods(scene):
+            found = measure.distance(pictures, scene, sensor, None, method.locator, method.threshold)
+            parts[method.name].append(found)
+            clock.lap(method.name)
+    distances = {name: np.concatenate([part.value_px for part in found]) for name, found in parts.items()}
+    statuses = {name: np.concatenate([part.status for part in found]) for name, found in parts.items()}
+    failures = {
+        name: {int(i): str(statuses[name][i]) for i in np.flatnonzero(np.isnan(values))}
+        for name, values in distances.items()
+    }
+    return Chunk(distances, failures, clock.seconds)
+
+
+def effects(scene: Scene, how: Rendering = Rendering()) -> list[dict[str, Any]]:
+    """Which effects the renderer simulates for a scene's settings, and why."""
+    found = render.effects(scene, how.tolerance, how.effects)
+    return [{"effect": each.effect.name, "on": each.on, "reason": each.reason} for each in found]
+
+
+class _Clock:
+    """Adds up wall time by what it was spent on."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name] = self.seconds.get(name, 0.0) + now - self._last
+        self._last = now

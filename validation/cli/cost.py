@@ -1,0 +1,45 @@
+"""``ice cost``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from validation.batch import campaign
+from validation.cli.common import Json, SceneName, app, progress
+from validation.cost.sweep import survey
+from validation.cost.table import tables, write_csv
+from validation.report.table import console
+
+
+@app.command("cost")
+def cost_command(
+    scene: SceneName,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; default runs/SCENE-cost.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Root of all random numbers.")] = 1,
+    as_json: Json = False,
+) -> None:
+    """Measure what each knob costs in time and gives in accuracy on this machine.
+
+    Writes cost.json, and a CSV file and a plot of each knob to DIR.
+    """
+    from validation.report import cost_figures  # matplotlib takes half a second to load
+
+    loaded = campaign.load(scene)
+    directory = out or Path("runs") / f"{loaded.name}-cost"
+    with progress(f"{loaded.name}: cost", "knobs") as shown:
+        found = survey(loaded, seed, shown)
+    directory.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(found.to_json(), indent=1)
+    (directory / "cost.json").write_text(text, encoding="utf-8")
+    write_csv(found, directory)
+    cost_figures.draw(found, directory)
+    if as_json:
+        print(text)
+    else:
+        shown_on = console()
+        shown_on.print(tables(found))
+        shown_on.print(f"cost.json, CSV files and plots: {directory}", highlight=False)

@@ -1,0 +1,142 @@
+"""``ice render`` and ``ice measure``: one image."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import measure
+import render
+import scenes
+from render import Tolerance
+from scenes import InvalidInput
+from validation import picture_file
+from validation.cli.common import (
+    AUTO,
+    Effects,
+    Json,
+    LeaveOutPx,
+    LeaveOutVariance,
+    LightPose,
+    SceneName,
+    Sensor,
+    app,
+    parse_pose,
+    say,
+)
+
+
+@app.command("render")
+def render_command(
+    scene: SceneName,
+    sensor: Sensor,
+    light: LightPose,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
+    noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
+    effects: Effects = "auto",
+    bias_px: LeaveOutPx = AUTO.bias_px,
+    variance: LeaveOutVariance = AUTO.variance,
+    as_json: Json = False,
+) -> None:
+    """Render one image of a scene."""
+    loaded = scenes.load(scene)
+    poses, tolerance = (parse_pose("--sensor", sensor), parse_pose("--light", light)), Tolerance(bias_px, variance)
+    image = render.image(loaded, *poses, effects=effects, tolerance=tolerance)
+    if noise_seed is not None:
+        image = render.expose(image, loaded.noise, np.random.default_rng(noise_seed), 1)[0]
+    picture_file.write(output, image)
+    facts = {
+        "file": str(output),
+        "width": image.shape[1],
+        "height": image.shape[0],
+        "least": float(image.min()),
+        "greatest": float(image.max()),
+    }
+    say(
+        facts,
+        as_json,
+        f"{output}: {image.shape[1]} x {image.shape[0]} px, grey levels {image.min():.1f} to {image.max():.1f}",
+    )
+
+
+@app.command("measure")
+def measure_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="PNG, TIFF, JPEG or .npy, 8 or 16 bit or float.")],
+    scene: Annotated[
+        str | None, typer.Argument(metavar="[SCENE]", help="Scene that the image shows, if known.")
+    ] = None,
+    sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None,
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; helps strip and polygon.")] = None,
+    estimator: Annotated[str | None, typer.Option(help=" or ".join(measure.ESTIMATORS))] = None,
+    threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
+    lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure an image: the distance of a known scene, or else the quadrilateral that it shows.
+
+    Exit status 1 if it cannot be measured.
+    """
+    picture = picture_file.read(file)
+    if scene is None:
+        found = measure.measure_quadrilateral(picture, estimator or "strip", lens and measure.load_lens(lens))
+        say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
+        raise typer.Exit(0 if found.quantities else 1)
+    if sensor is None:
+        raise InvalidInput("--sensor must be given with a scene, got nothing")
+    if lens is not None:
+        raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
+    poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
+    distance = measure.distance(picture, scenes.load(scene), *poses, estimator or "gradient", threshold)
+    facts = {"file": str(file), **_distance_facts(distance)}
+    say(facts, as_json, _distance_text(distance, facts["edges"]))
+    raise typer.Exit(0 if np.isfinite(distance.value_px) else 1)
+
+
+def _distance_facts(found: measure.Measurement) -> dict:
+    good = bool(np.isfinite(found.value_px))
+    return {
+        "value_px": float(found.value_px) if good else None,
+        "variance_px2": float(found.variance_px2) if good else None,
+        "status": str(found.status),
+        "corners": found.corners.tolist() if good else None,
+        "edges": [
+            {
+                "name": name,
+                "status": str(found.edge_status[i]),
+                "used": int(found.used[i]),
+                "rejected": int(found.rejected[i]),
+                "contrast": float(found.edge_contrast[i]),
+            }
+            for i, name in enumerate(found.edge_names)
+        ],
+    }
+
+
+def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
+    good = np.isfinite(found.value_px)
+    value = f"{found.value_px:.4f} +- {np.sqrt(found.variance_px2):.4f} px (1 sigma)" if good else "not measured"
+    told = ", ".join(f"{e['name']} {e['status']} ({e['used']} used, contrast {e['contrast']:.0f})" for e in edges)
+    return f"{value}, {found.status}\nedges: {told}"
+
+
+def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
+    return {
+        "status": found.status,
+        "corners": found.corners.tolist() if found.quantities else None,
+        "noise": found.noise,
+        "blur_px": found.blur_px,
+        "quantities": [vars(quantity) for quantity in found.quantities],
+    }
+
+
+def _quadrilateral_text(found: measure.Quadrilateral) -> str:
+    lines = [f"quadrilateral: {found.status}; noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px"]
+    if found.quantities:
+        sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
+        for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):
+            lines.append(f"corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
+    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.quantities]
+    return "\n".join([*lines, "(1 sigma)"])

@@ -1,0 +1,46 @@
+"""Noisy images a setting: how far an empirical variance is off, and how wide its interval."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import measure
+import render
+from validation.batch.campaign import Case
+from validation.cost.interval import half_width
+from validation.cost.parameter import Fit, Knob, slope
+
+_COUNTS = (10, 20, 40, 80, 160, 320)
+_IMAGES = 6400
+
+
+def images_knob(case: Case, image: np.ndarray, seed: int) -> Knob:
+    """Relative scatter of the variance of n distances, from disjoint groups of images of one setting."""
+    scene, sensor = case.scene, case.setting.sensor
+    where, rng = measure.footprint(scene, sensor), np.random.default_rng(seed)
+    began, parts = time.perf_counter(), []
+    for _ in range(0, _IMAGES, 50):
+        parts.append(measure.distance(render.expose(image, scene.noise, rng, 50, where), scene, sensor).value_px)
+    seconds = (time.perf_counter() - began) / _IMAGES
+    values = np.concatenate(parts)
+    values = values[np.isfinite(values)]
+    rows = []
+    for n in _COUNTS:
+        groups = values[: values.size // n * n].reshape(-1, n).var(1, ddof=1)
+        rows.append((n, n * seconds, len(groups), float(groups.std(ddof=1) / groups.mean()), half_width(n)))
+    n, _, groups, found, widths = np.array(rows).T
+    return Knob(
+        name="images",
+        title="Noisy images a setting: error of the empirical variance",
+        columns=("images", "seconds", "groups", "sigma of the variance", "95 % half-width"),
+        rows=tuple(rows),
+        x="images",
+        y="sigma of the variance",
+        fits=(
+            Fit("sigma against images - 1", slope(n - 1, found, np.sqrt(groups)), -0.5),
+            Fit("chi-square half-width against images", slope(n[2:], widths[2:]), -0.5),
+        ),
+        note="The half-width falls faster than -1/2 with few images, whose chi-square is skewed; fitted from 40 on.",
+    )

@@ -1,0 +1,125 @@
+"""The pictures of a validation: the paper's Figs 14-21, and predicted against measured."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import cv2
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+import render
+from render.renderer import window
+from scenes import Pose, Scene
+from validation.batch.campaign import Campaign, Case
+from validation.batch.result import Validation
+from validation.batch.store import RunFile
+
+_SHOWN = 16  # settings whose images are drawn
+
+
+def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path) -> list[Path]:
+    """Write all pictures of a run as PNG; their paths."""
+    directory.mkdir(parents=True, exist_ok=True)
+    paths = [_agreement(found, directory / "predicted_measured.png")]
+    for stem, cases in _panels(campaign, store).items():
+        pictures = [_noisy(case, store, found.seed) for case in cases]
+        sensor, lights = cases[0].setting.sensor, [case.setting.light for case in cases]
+        paths.append(_panel(pictures, sensor, lights, "images", (0, 255), directory / f"{stem}_images.png"))
+        edges = [255 - _edges(case.scene, picture) for case, picture in zip(cases, pictures, strict=True)]
+        paths.append(_panel(edges, sensor, lights, "edge images", (0, 255), directory / f"{stem}_edges.png"))
+    return paths
+
+
+def _panels(campaign: Campaign, store: RunFile) -> dict[str, list[Case]]:
+    """The first settings that have an image, by sensor and scene, as pictures' names."""
+    panels: dict[str, list[Case]] = {}
+    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.picture(i))
+    for case in map(campaign.case, itertools.islice(shown, _SHOWN)):
+        sensor = case.setting.sensor
+        labels = [case.scene.name] * (len(campaign.scenes) > 1) + [f"{v:g}" for v in _numbers(case.parameters)]
+        stem = "_".join([f"sensor_{sensor.polar_deg:g}_{sensor.azimuth_deg:g}", *labels])
+        panels.setdefault(stem, []).append(case)
+    return panels
+
+
+def _numbers(parameters: dict) -> list[float]:
+    return [float(v) for value in parameters.values() for v in np.atleast_1d(value)]
+
+
+def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
+    """One exposure of a setting, the part that the object covers."""
+    rng = np.random.default_rng([seed, case.index])
+    picture = render.expose(store.image(case.index), case.scene.noise, rng, 1)[0]
+    rows, columns = window(case.scene, case.setting.sensor)
+    return picture[max(rows.start - 8, 0) : rows.stop + 8, max(columns.start - 8, 0) : columns.stop + 8]
+
+
+def _edges(scene: Scene, picture: np.ndarray) -> np.ndarray:
+    """Canny's edge pixels (255) at the paper's first threshold."""
+    smooth = cv2.GaussianBlur(picture, (0, 0), scene.locator.scale_px)
+    dx, dy = (cv2.Scharr(smooth, cv2.CV_64F, *axis) / 32 for axis in ((1, 0), (0, 1)))
+    fixed = [np.clip(np.rint(64 * g), -32767, 32767).astype(np.int16) for g in (dx, dy)]
+    limit = 64 * scene.locator.thresholds[0]
+    return cv2.Canny(*fixed, limit, limit, L2gradient=True)
+
+
+def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[float, float], path: Path) -> Path:
+    columns = 2 if len(pictures) > 1 else 1
+    rows = -(-len(pictures) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(4 * columns, 3.9 * rows), squeeze=False, layout="constrained")
+    figure.suptitle(f"sensor {sensor}: {kind}")
+    for axis in axes.flat:
+        axis.set(xticks=[], yticks=[])
+    for axis, picture, light in zip(axes.flat, pictures, lights, strict=False):
+        axis.imshow(picture, cmap="gray", vmin=grey[0], vmax=grey[1], interpolation="nearest")
+        axis.set_title(f"light {light}", fontsize=10)
+    return save(figure, path)
+
+
+def _agreement(found: Validation, path: Path) -> Path:
+    """Measured against predicted variance with 95 % intervals, and their ratio below."""
+    rows = [row for row in found.rows if row.main.ratio is not None]
+    figure, (top, bottom) = plt.subplots(
+        2, 1, figsize=(7, 7.5), sharex=True, height_ratios=[3, 1.3], layout="constrained"
+    )
+    propagated = np.array([row.main.propagated for row in rows])
+    ratio = np.array([row.main.ratio for row in rows])
+    spread = np.abs(np.array([row.main.ratio_interval for row in rows]).T - ratio) if rows else np.zeros((2, 0))
+    calibrated = np.array([row.calibrated for row in rows])
+    top.errorbar(
+        propagated,
+        ratio * propagated,
+        spread * propagated,
+        fmt="o",
+        color="C0",
+        ms=5,
+        label="propagated (one clean render)",
+    )
+    top.plot(calibrated, ratio * propagated, "x", color="C1", label="calibrated (no image)")
+    top.plot([row.bound for row in rows], ratio * propagated, "|", color="0.5", ms=9, label="Cramer-Rao bound")
+    if rows:
+        limits = np.array([0.9 * min(row.bound for row in rows), 1.2 * propagated.max()])
+        top.plot(limits, limits, "k-", lw=0.8, label="predicted = measured")
+    top.set(
+        xscale="log",
+        yscale="log",
+        ylabel="measured variance, px$^2$",
+        title=f"{found.scene}: variance of the measured distance",
+    )
+    top.legend(frameon=False)
+    bottom.errorbar(propagated, ratio, spread, fmt="o", color="C0", ms=5)
+    bottom.plot(calibrated, ratio * propagated / np.where(calibrated > 0, calibrated, 1), "x", color="C1")
+    bottom.axhline(1, color="k", lw=0.8)
+    bottom.set(xlabel="predicted variance, px$^2$", ylabel="measured / predicted")
+    return save(figure, path)
+
+
+def save(figure, path: Path) -> Path:
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
