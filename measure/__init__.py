@@ -6,12 +6,27 @@ from measure.features.conic import Ellipse, find_ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
 from measure.measurement import Measurement, distance
 from measure.photo.lens import Lens, load_lens
-from measure.photo.quadrilateral import Quadrilateral, Quantity, measure_quadrilateral
+from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, propagate
-from measure.region import footprint
+from measure.region import region_of_interest
 
 __all__ = [
-    "ESTIMATORS", "Ellipse", "Lens", "Measurement", "Propagated", "Quadrilateral", "Quantity", "bound", "distance",
-    "find_ellipse", "fit_ellipse", "footprint", "image_bound", "line_angle", "load_lens", "measure_quadrilateral",
-    "point_distance", "propagate",
+    "ESTIMATORS",
+    "Ellipse",
+    "Lens",
+    "MeasuredValue",
+    "Measurement",
+    "Propagated",
+    "Quadrilateral",
+    "bound",
+    "distance",
+    "find_ellipse",
+    "fit_ellipse",
+    "image_bound",
+    "line_angle",
+    "load_lens",
+    "measure_quadrilateral",
+    "point_distance",
+    "propagate",
+    "region_of_interest",
 ]  # fmt: skip

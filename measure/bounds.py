@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from measure.estimators.polygon import edge_derivatives
-from measure.features.calipers import edge_frames
+from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response
 from measure.features.layout import Layout, layout_of
 from measure.measurement import distance, separation
@@ -28,7 +28,7 @@ def bound(scene: Scene, sensor: Any, light: Any) -> float:
     >>> 4e-5 < bound(scenes.load("task1"), (30, 135), (15, 315)) < 6e-5
     True
     """
-    return predict(scene, sensor, light, price="bound").variance_px2
+    return predict(scene, sensor, light, model="bound").variance_px2
 
 
 def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> float:
@@ -60,19 +60,19 @@ def line_bound(layout: Layout, contrast: np.ndarray, noise_variance: float) -> n
     noise_variance : float
         Of a grey level.
     """
-    frames = edge_frames(layout, 0.0, 0.0)
-    slopes, levers = edge_derivatives(layout, frames)
-    edges = len(frames)
+    calipers = edge_calipers(layout, 0.0, 0.0)
+    slopes, levers = edge_derivatives(layout, calipers)
+    edges = len(calipers)
     design = np.stack([slopes, levers], -1) * np.asarray(contrast, float)[:, None]
     design = design.reshape(-1, 2 * edges)
     about_middle = noise_variance * np.linalg.inv(design.T @ design)
     to_start = np.kron(np.eye(edges), np.eye(2))
-    to_start[np.arange(0, 2 * edges, 2), np.arange(1, 2 * edges, 2)] = [-frame.length / 2 for frame in frames]
+    to_start[np.arange(0, 2 * edges, 2), np.arange(1, 2 * edges, 2)] = [-caliper.length / 2 for caliper in calipers]
     return to_start @ about_middle @ to_start.T
 
 
 def corner_bound(layout: Layout, contrast: np.ndarray, noise_variance: float) -> np.ndarray:
     """Smallest joint covariance of the layout's corners (x, y), px^2, shape (2 C, 2 C)."""
-    frames = edge_frames(layout, 0.0, 0.0)
-    response = np.concatenate([corner_response(frames, pair) for pair in layout.corners])
+    calipers = edge_calipers(layout, 0.0, 0.0)
+    response = np.concatenate([corner_response(calipers, pair) for pair in layout.corners])
     return response @ line_bound(layout, contrast, noise_variance) @ response.T

@@ -143,8 +143,10 @@ def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float]
     variances, lengths = [], []
     for part in tool.parts:
         found = part.locator.locate(noisy)
-        span = part.frame.stations[-1] - part.frame.stations[0]
-        if found.valid.sum(1).mean() < 0.98 * (part.frame.stations.size if name == "gradient" else span / np.sqrt(2)):
+        span = part.caliper.positions[-1] - part.caliper.positions[0]
+        if found.valid.sum(1).mean() < 0.98 * (
+            part.caliper.positions.size if name == "gradient" else span / np.sqrt(2)
+        ):
             return None
         weight = found.valid / found.valid.sum(1, keepdims=True)
         mean = (weight * found.offset).sum(1)

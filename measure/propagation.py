@@ -66,7 +66,7 @@ def propagate(
         return _nothing(clean, str(found.status))
     layout, threshold = sought(scene, sensor, light, threshold)
     tool = prepared(layout, estimator, threshold)
-    response = np.concatenate([corner_response(tool.frames, pair) for pair in layout.corners])
+    response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
     ends = response @ tool.respond(clean).lines
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends

@@ -11,7 +11,7 @@ from measure.features.shape import prepared
 from scenes import Scene
 
 
-def footprint(
+def region_of_interest(
     scene: Scene, sensor: Any, light: Any = None, estimators: tuple[str, ...] = ("gradient", "canny")
 ) -> np.ndarray:
     """Pixels that can change the measured distance, as long as the edges are where the pose projects them.

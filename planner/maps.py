@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.prediction import Objective, Price, check_objective, evaluator, in_units
+from planner.prediction import ModelName, Objective, check_objective, evaluator, in_units
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene
 
@@ -19,7 +19,7 @@ def variance_map(
     light: Any = None,
     *,
     space: ViewingSpace | None = None,
-    price: Price = "calibrated",
+    model: ModelName = "calibrated",
     objective: Objective = "object",
 ) -> np.ndarray:
     """Variance for every direction of the viewing space, one of sensor and light being held fixed.
@@ -31,7 +31,7 @@ def variance_map(
         Exactly one: the one that is held fixed. Degrees.
     space : ViewingSpace, optional
         Where the other one may stand; the paper's 41 347 directions when not given.
-    price : {"calibrated", "paper", "bound"}
+    model : {"calibrated", "paper", "bound"}
     objective : {"object", "image"}
 
     Returns
@@ -55,7 +55,7 @@ def variance_map(
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
     fixed = np.array(list(scene.check_pose("sensor" if light is None else "light", sensor if light is None else light)))
-    evaluate, field = evaluator(price), "variance" if check_objective(objective) == "image" else "variance_object"
+    evaluate, field = evaluator(model), "variance" if check_objective(objective) == "image" else "variance_object"
     values = np.empty(len(space))
     for at in range(0, len(space), _CHUNK):
         part = slice(at, at + _CHUNK)

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.features.measurand import required_edges
-from planner.prediction import Objective, Prediction, Price, check_objective, evaluator, in_units, predict
+from planner.prediction import ModelName, Objective, Prediction, check_objective, evaluator, in_units, predict
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates
 from planner.search.constraints import Constraints
@@ -18,7 +18,7 @@ from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
 
 Search = Literal["exhaustive", "alternating"]
-COARSE_STEP = 10.0  # degrees; where every pair has to be priced
+COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Plan:
         The scene, its task with the required edges that the plan uses: ready to predict, render and measure.
     sensor, light : Pose
         Continuous if refined, else on the grid.
-    objective, price : str
+    objective, model : str
     variance : float
         What was minimised: cm^2 or px^2 (degrees^2 for an angle).
     grid_sensor, grid_light, grid_variance
@@ -47,8 +47,8 @@ class Plan:
         exhaustive search.
     guarantee : str
         What is known about the optimum.
-    pairs, priced : int
-        Pairs covered by the exhaustive search and how many were priced one by one.
+    pairs, evaluated : int
+        Pairs covered by the exhaustive search and how many were evaluated one by one.
     candidates : tuple of Candidate
         Up to ten clearly different settings, the best first; sensors or lights at least 15 degrees apart.
     """
@@ -57,7 +57,7 @@ class Plan:
     sensor: Pose
     light: Pose
     objective: str
-    price: str
+    model: str
     variance: float
     grid_sensor: Pose
     grid_light: Pose
@@ -68,7 +68,7 @@ class Plan:
     gap: float | None
     guarantee: str
     pairs: int
-    priced: int
+    evaluated: int
     candidates: tuple[Candidate, ...]
 
     @property
@@ -81,7 +81,7 @@ def plan(
     scene: Scene,
     objective: Objective = "object",
     *,
-    price: Price = "calibrated",
+    model: ModelName = "calibrated",
     search: Search = "exhaustive",
     edges: Literal["given", "best"] = "given",
     step_deg: float | None = None,
@@ -99,7 +99,7 @@ def plan(
     scene : Scene
     objective : {"object", "image"}
         Variance of the physical quantity, or of that in the image (the paper's, which rewards foreshortening).
-    price : {"calibrated", "paper"}
+    model : {"calibrated", "paper"}
     search : {"exhaustive", "alternating"}
         All pairs, or the paper's search alone, which stops at a partial optimum.
     edges : {"given", "best"}
@@ -129,12 +129,12 @@ def plan(
     ('ok', True, 10)
     """
     check_objective(objective)
-    evaluator(price)
+    evaluator(model)
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
     constraints = constraints or Constraints()
     tasks = required_edges(scene) if edges == "best" else (scene.task,)
-    options = [_Option.of(with_task(scene, task), price, step_deg, constraints, sensor, light) for task in tasks]
+    options = [_Option.of(with_task(scene, task), model, step_deg, constraints, sensor, light) for task in tasks]
     found = [option.search(objective, search, start, report) for option in options]
     best = min(range(len(found)), key=lambda k: found[k].variance)
     if not np.isfinite(found[best].variance):
@@ -168,7 +168,7 @@ class _Option:
     """One set of required edges and where its sensor and light may stand."""
 
     scene: Scene
-    price: str
+    model: str
     step_deg: float
     constraints: Constraints
     sensors: np.ndarray
@@ -176,8 +176,8 @@ class _Option:
     free: bool
 
     @classmethod
-    def of(cls, scene, price, step_deg, constraints, sensor, light) -> _Option:
-        fast = is_separable(scene, price)
+    def of(cls, scene, model, step_deg, constraints, sensor, light) -> _Option:
+        fast = is_separable(scene, model)
         step = step_deg or (1.0 if fast else COARSE_STEP)
         sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
         lights = ViewingSpace(step, constraints.light_polar_deg).poses
@@ -188,16 +188,16 @@ class _Option:
             lights = np.array([list(scene.check_pose("light", light))])
         if not len(sensors) or not len(lights):
             raise InvalidInput("constraints must leave a pose for sensor and light, got none")
-        return cls(scene, price, step, constraints, sensors, lights, sensor is None and light is None)
+        return cls(scene, model, step, constraints, sensors, lights, sensor is None and light is None)
 
     def search(self, objective: str, search: str, start: Any, report: Report | None) -> _Result:
         partial = found = None
         plain = self.free and not self.constraints.on_pairs
         if plain:
             spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
-            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.price, objective)
+            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.model, objective)
         if search == "exhaustive" or not plain:
-            found = exhaustive(self.scene, self.sensors, self.lights, self.price, objective, self.constraints, report)
+            found = exhaustive(self.scene, self.sensors, self.lights, self.model, objective, self.constraints, report)
         best = found or partial
         return _Result(self.sensors[best.sensor], self.lights[best.light], best.variance, partial, found)
 
@@ -217,28 +217,28 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
     choice = candidates(options, results, objective)
     if refined and option.free:
         starts = [(sensor, light)]
-        if found is None or not is_separable(scene, option.price):
+        if found is None or not is_separable(scene, option.model):
             others = [c for c in choice[1:3] if c.edges == scene.task.edges]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
-        descents = [refine(scene, *at, option.price, objective, option.step_deg, option.constraints) for at in starts]
+        descents = [refine(scene, *at, option.model, objective, option.step_deg, option.constraints) for at in starts]
         sensor, light, variance = min(descents, key=lambda descent: descent[2])
     return Plan(
         scene=scene,
         sensor=Pose(*map(float, sensor)),
         light=Pose(*map(float, light)),
         objective=objective,
-        price=option.price,
+        model=option.model,
         variance=float(in_units(scene, variance, 2)),
         grid_sensor=Pose(*map(float, result.sensor)),
         grid_light=Pose(*map(float, result.light)),
         grid_variance=float(in_units(scene, result.variance, 2)),
-        prediction=predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.price),
+        prediction=predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model),
         trace=partial.trace if partial else (),
         partial_variance=float(in_units(scene, partial.variance, 2)) if partial else float("nan"),
         gap=partial.variance / result.variance - 1 if partial and found else None,
         guarantee=_guarantee(option, found),
         pairs=sum(r.found.pairs for r in results if r.found),
-        priced=sum(r.found.priced for r in results if r.found),
+        evaluated=sum(r.found.evaluated for r in results if r.found),
         candidates=choice,
     )  # fmt: skip
 

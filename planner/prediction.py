@@ -9,13 +9,13 @@ import numpy as np
 
 from planner.features.measurand import normals
 from planner.features.propagation import corner_covariance
-from planner.models import models as prices
+from planner.models import models as models
 from planner.models.locator import MIN_CONTRAST, MIN_USABLE
 from scenes import Corner, InvalidInput, Scene
 
-Price = Literal["paper", "calibrated", "bound"]
+ModelName = Literal["paper", "calibrated", "bound"]
 Objective = Literal["object", "image"]
-_PRICES = {"paper": prices.paper, "calibrated": prices.calibrated, "bound": prices.bound}
+_MODELS = {"paper": models.paper, "calibrated": models.calibrated, "bound": models.bound}
 _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 
@@ -35,7 +35,7 @@ class Prediction:
 
     Attributes
     ----------
-    price : str
+    model : str
         ``paper``, ``calibrated`` or ``bound``.
     kind : str
         ``distance`` or ``angle``.
@@ -43,7 +43,7 @@ class Prediction:
         The quantity itself, as the model projects it and in the object: px and cm, or degrees.
     variance_image, variance_object : float
         Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
-        cannot be measured. The ``paper`` price is right only up to one factor common to all settings, and infinite
+        cannot be measured. The ``paper`` model is right only up to one factor common to all settings, and infinite
         only where an edge is hidden or without any contrast.
     corners : ndarray, shape (2, 2)
         Start and end feature (x, y), px; (0, 0) is the centre of the first pixel. For an angle, a point on each line.
@@ -55,7 +55,7 @@ class Prediction:
         ``ok``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``.
     """
 
-    price: str
+    model: str
     kind: str
     value_image: float
     value_object: float
@@ -88,7 +88,7 @@ class Prediction:
 
 
 def variances(
-    scene: Scene, sensors: Any, lights: Any, price: Price = "calibrated", objective: Objective = "image"
+    scene: Scene, sensors: Any, lights: Any, model: ModelName = "calibrated", objective: Objective = "image"
 ) -> np.ndarray:
     """Variance of the measured quantity for arrays of settings.
 
@@ -97,7 +97,7 @@ def variances(
     scene : Scene
     sensors, lights : array_like, shape (..., 2)
         Poses (polar, azimuth) in degrees, broadcast against each other.
-    price : {"calibrated", "paper", "bound"}
+    model : {"calibrated", "paper", "bound"}
     objective : {"image", "object"}
         In the image (px^2) or in the object (cm^2: px^2 over the squared derivative of the image's distance by the
         object's, both ends moving apart alike); degrees^2 for an angle.
@@ -115,11 +115,13 @@ def variances(
     >>> round(float(v[1] / v[0]), 1)  # the paper's Table 3: 0.595 / 0.070 = 8.5
     9.0
     """
-    priced = evaluator(price)(scene, sensors, lights)
-    return in_units(scene, priced.variance if check_objective(objective) == "image" else priced.variance_object, 2)
+    evaluated = evaluator(model)(scene, sensors, lights)
+    return in_units(
+        scene, evaluated.variance if check_objective(objective) == "image" else evaluated.variance_object, 2
+    )
 
 
-def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") -> Prediction:
+def predict(scene: Scene, sensor: Any, light: Any, model: ModelName = "calibrated") -> Prediction:
     """Predict the precision of one setting.
 
     Parameters
@@ -127,14 +129,14 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     scene : Scene
     sensor, light : Pose or pair of float
         Polar angle and azimuth, degrees.
-    price : {"calibrated", "paper", "bound"}
+    model : {"calibrated", "paper", "bound"}
         ``calibrated`` is absolute; ``paper`` follows the paper and has a free scale; ``bound`` is what no
         unbiased estimator can beat.
 
     Raises
     ------
     InvalidInput
-        If a pose is no pose or lies in or on the object, or the price is unknown.
+        If a pose is no pose or lies in or on the object, or the model is unknown.
 
     Examples
     --------
@@ -144,8 +146,8 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
     ('ok', 100.8, True)
     """
     sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
-    priced = evaluator(price)(scene, list(sensor), list(light))
-    known = priced.quantity
+    evaluated = evaluator(model)(scene, list(sensor), list(light))
+    known = evaluated.measurand
     edges = tuple(
         EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, whole, usable, step))
         for name, length, whole, usable, step, seen in zip(
@@ -153,36 +155,36 @@ def predict(scene: Scene, sensor: Any, light: Any, price: Price = "calibrated") 
             known.view.lengths,
             known.view.lengths - known.view.trims.sum(-1),
             known.view.usable,
-            priced.contrast,
+            evaluated.contrast,
             known.view.visible,
             strict=True,
         )
     )
     return Prediction(
-        price=price,
+        model=model,
         kind=scene.task.kind,
         value_image=float(in_units(scene, known.value, 1)),
         value_object=float(in_units(scene, known.value_object, 1)),
-        variance_image=float(in_units(scene, priced.variance, 2)),
-        variance_object=float(in_units(scene, priced.variance_object, 2)),
+        variance_image=float(in_units(scene, evaluated.variance, 2)),
+        variance_object=float(in_units(scene, evaluated.variance_object, 2)),
         corners=known.points,
-        covariances=_covariances(scene, priced),
+        covariances=_covariances(scene, evaluated),
         edges=edges,
-        status=_status(scene, priced, edges),
+        status=_status(scene, evaluated, edges),
     )
 
 
-def evaluator(price: str):
-    """The function that prices arrays of settings.
+def evaluator(model: str):
+    """The function that models arrays of settings.
 
     Raises
     ------
     InvalidInput
-        If there is no such price.
+        If there is no such model.
     """
-    if price not in _PRICES:
-        raise InvalidInput(f"price must be one of {', '.join(get_args(Price))}, got {price!r}")
-    return _PRICES[price]
+    if model not in _MODELS:
+        raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {model!r}")
+    return _MODELS[model]
 
 
 def check_objective(objective: str) -> str:
@@ -197,11 +199,11 @@ def in_units(scene: Scene, value, power: int):
     return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
 
 
-def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
+def _covariances(scene: Scene, evaluated: models.Evaluated) -> np.ndarray:
     """Covariances of the two features, px^2."""
     if not scene.task.corners:
         return np.full((2, 2, 2), np.nan)
-    view, centres, found = priced.quantity.view, iter(priced.centres), []
+    view, centres, found = evaluated.measurand.view, iter(evaluated.centres), []
     for feature in scene.task.corners:
         if not isinstance(feature, Corner):
             found.append(next(centres))
@@ -210,7 +212,7 @@ def _covariances(scene: Scene, priced: prices.Priced) -> np.ndarray:
         vertex = scene.solid.vertex_names.index(feature.vertex)
         last = np.array([scene.solid.edge(name).ends[1] == vertex for name in view.names])
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            offsets = priced.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
+            offsets = evaluated.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
         offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
         found.append(corner_covariance(normals(view)[index], offsets[index]))
     return np.stack(found)
@@ -224,13 +226,13 @@ def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step:
     return "ok" if step > MIN_CONTRAST * np.sqrt(scene.noise.variance) else "low_contrast"
 
 
-def _status(scene: Scene, priced: prices.Priced, edges: tuple[EdgePrediction, ...]) -> str:
+def _status(scene: Scene, evaluated: models.Evaluated, edges: tuple[EdgePrediction, ...]) -> str:
     for worst in ("not_visible", "short", "low_contrast"):
         if any(edge.status == worst for edge in edges):
             return worst
-    directions = dict(zip(priced.quantity.view.names, normals(priced.quantity.view), strict=True))
+    directions = dict(zip(evaluated.measurand.view.names, normals(evaluated.measurand.view), strict=True))
     corners = [feature for feature in scene.task.corners if isinstance(feature, Corner)]
     sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
     if min(sines, default=1.0) < _MIN_SINE:
         return "ill_conditioned"
-    return "ok" if np.isfinite(priced.variance) else "not_visible"
+    return "ok" if np.isfinite(evaluated.variance) else "not_visible"

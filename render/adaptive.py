@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from planner import outline
+from planner import projected_edges
 from render.rays import Rays
 from scenes import Pose, Scene
 
@@ -33,7 +33,7 @@ def near_edges(scene: Scene, sensor: Pose, crop: tuple[slice, slice], supersampl
     rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
     pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
     found = np.zeros(shape, bool)
-    for start, stop in outline(scene, np.array(list(sensor))).ends:
+    for start, stop in projected_edges(scene, np.array(list(sensor))).ends:
         along = stop - start
         part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
         away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)

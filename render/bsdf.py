@@ -18,16 +18,16 @@ _ROUNDING = 1e-6  # of a cosine, in single precision
 class Surface:
     """What the BSDF needs to know; positions and directions in space, cm.
 
-    ``swing`` is the direction in which the light at ``light`` swings, ``analyser`` what the polariser before the sensor
-    at ``sensor`` passes; None without one. Light between two surfaces counts as unpolarised; light and sensor are
-    known by their directions, within the angles (radians) that their sizes span.
+    ``polarisation`` is the direction of polarisation of the light at ``light``, ``analyser`` what the polariser before
+    the sensor at ``sensor`` passes; None without one. Light between two surfaces counts as unpolarised; light and
+    sensor are known by their directions, within the angles (radians) that their sizes span.
     """
 
     material: Material
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
     light: tuple[float, float, float]
-    swing: tuple[float, float, float] | None = None
+    polarisation: tuple[float, float, float] | None = None
     analyser: tuple[float, float, float] | None = None
     light_angle: float = 0.0
     sensor_angle: float = 0.0
@@ -71,25 +71,25 @@ def _register(variant: str) -> None:
         def eval(self, ctx, si, wo, active=True):
             known = self.surface
             lit, seen = (_towards(dr, mi, si, at) for at in (known.light, known.sensor))
-            swing = None if known.swing is None else _local(dr, mi, si, known.swing, wo)
+            polarisation = None if known.polarisation is None else _local(dr, mi, si, known.polarisation, wo)
             analyser = None if known.analyser is None else _local(dr, mi, si, known.analyser, si.wi)
             from_light = dr.dot(lit, wo) > math.cos(known.light_angle) - _ROUNDING
             to_sensor = dr.dot(seen, si.wi) > math.cos(known.sensor_angle) - _ROUNDING
             value = self._value(wo, si.wi, None, None)
-            if swing is not None:
-                value = dr.select(from_light, self._value(wo, si.wi, swing, None), value)
+            if polarisation is not None:
+                value = dr.select(from_light, self._value(wo, si.wi, polarisation, None), value)
             if analyser is not None:
                 passed = self._value(wo, si.wi, None, analyser)
-                if swing is not None:
-                    passed = dr.select(from_light, self._value(wo, si.wi, swing, analyser), passed)
+                if polarisation is not None:
+                    passed = dr.select(from_light, self._value(wo, si.wi, polarisation, analyser), passed)
                 value = dr.select(to_sensor, passed, value)
             return mi.Spectrum(value / math.pi) & active
 
-        def _value(self, wo, wi, swing, analyser):
+        def _value(self, wo, wi, polarisation, analyser):
             known = self.surface
             up = (0.0 * wi.x, 0.0 * wi.x, 1.0 + 0.0 * wi.x)
             light, sensor = (wo.x, wo.y, wo.z), (wi.x, wi.y, wi.z)
-            return brightness(ops, known.material, known.index, up, light, sensor, swing, analyser)
+            return brightness(ops, known.material, known.index, up, light, sensor, polarisation, analyser)
 
         def pdf(self, ctx, si, wo, active=True):
             above = (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)

@@ -70,7 +70,7 @@ def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
 
 
 def polariser_axes(scene: Scene, sensor: Pose, light: Pose) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Directions in space of the light's swing and of the analyser; None without them."""
+    """Directions in space of the light's polarisation and of the analyser; None without them."""
     found = []
     for angle, pose, names in (
         (scene.light.polarisation_deg, light, ("down", "right")),
@@ -88,7 +88,9 @@ def _surface(mitsuba, scene: Scene, sensor: Pose, light: Pose, active: frozenset
     if not active & CUSTOM:
         albedo = (1 - material.specular_fraction) * material.diffuse_reflectance
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": albedo}}
-    swing, analyser = (None if axis is None else tuple(axis.tolist()) for axis in polariser_axes(scene, sensor, light))
+    polarisation, analyser = (
+        None if axis is None else tuple(axis.tolist()) for axis in polariser_axes(scene, sensor, light)
+    )
     places = [tuple(scene.position(role, pose).tolist()) for role, pose in (("sensor", sensor), ("light", light))]
     return bsdf.describe(
         mitsuba,
@@ -96,7 +98,7 @@ def _surface(mitsuba, scene: Scene, sensor: Pose, light: Pose, active: frozenset
             material,
             indices(scene, spectral="wavelength" in active),
             *places,
-            swing=swing if "polarisation" in active else None,
+            polarisation=polarisation if "polarisation" in active else None,
             analyser=analyser if "analyser" in active else None,
             light_angle=2 * light_radius(scene, active) / scene.light.distance,
             sensor_angle=2 * aperture_radius(scene, active) / scene.camera.distance,

@@ -53,7 +53,7 @@ def brightness(
     normal: Vector,
     to_light: Vector,
     to_sensor: Vector,
-    swing: Vector | None = None,
+    polarisation: Vector | None = None,
     analyser: Vector | None = None,
 ):
     """N.L times the reflectance, of a surface lit from ``to_light`` and seen from ``to_sensor``.
@@ -62,9 +62,9 @@ def brightness(
     ----------
     normal, to_light, to_sensor : Vector
         Unit vectors N, L, V.
-    swing : Vector, optional
-        Direction in which the light swings (unit, perpendicular to L): J_perp = (swing . s)^2 and J_par = 1 - J_perp
-        with s the normal of the plane of L and V. Unpolarised, J_par = J_perp = 1/2, when not given.
+    polarisation : Vector, optional
+        Direction of polarisation (unit, perpendicular to L): J_perp = (polarisation . s)^2 and J_par =
+        1 - J_perp with s the normal of the plane of L and V. Unpolarised, J_par = J_perp = 1/2, when not given.
     analyser : Vector, optional
         Direction that the analyser passes (unit, perpendicular to V). The diffuse term is unpolarised: half of it
         passes. The two components of the specular term keep their phase, so they interfere in the analyser.
@@ -78,7 +78,9 @@ def brightness(
     s = material.specular_fraction
     total = (1 - s) * material.diffuse_reflectance * nl * (1.0 if analyser is None else 0.5)
     if not material.is_diffuse:
-        total = total + s * _specular(ops, material.roughness, index, normal, to_light, to_sensor, swing, analyser)
+        total = total + s * _specular(
+            ops, material.roughness, index, normal, to_light, to_sensor, polarisation, analyser
+        )
     return ops.select((nl > 0) & (nv > 0), total, 0.0)
 
 
@@ -102,7 +104,7 @@ def fresnel(ops: Ops, cosine, n: float, k: float):
     return perpendicular * upper / lower, perpendicular, -perpendicular * coherent / lower
 
 
-def _specular(ops, roughness, index, normal, to_light, to_sensor, swing, analyser):
+def _specular(ops, roughness, index, normal, to_light, to_sensor, polarisation, analyser):
     """N.L K rho, K = D G / (pi N.L N.V)."""
     nl = ops.maximum(_dot(normal, to_light), 0.0)
     nv = ops.maximum(_dot(normal, to_sensor), 1e-12)
@@ -113,25 +115,25 @@ def _specular(ops, roughness, index, normal, to_light, to_sensor, swing, analyse
     tangent2 = _dot(across, across) / (nh * nh)
     distribution = ops.exp(-tangent2 / roughness**2) / (roughness**2 * nh * nh * nh * nh)
     g_over_nv = ops.minimum(1 / nv, 2 * nh * ops.minimum(1.0, nl / nv) / vh)
-    reflected = _polarised(ops, index, vh, half, to_light, to_sensor, swing, analyser)
+    reflected = _polarised(ops, index, vh, half, to_light, to_sensor, polarisation, analyser)
     return distribution * g_over_nv / math.pi * reflected
 
 
-def _polarised(ops, index, cosine, half, to_light, to_sensor, swing, analyser):
+def _polarised(ops, index, cosine, half, to_light, to_sensor, polarisation, analyser):
     """Fraction of the light that a facet of normal ``half`` sends through the analyser, averaged over the bands."""
-    if swing is not None or analyser is not None:
+    if polarisation is not None or analyser is not None:
         s = _across(ops, half, to_light, to_sensor)
         p_in, p_out = _cross(s, to_light), _cross(to_sensor, s)
-        es, ep = (None, None) if swing is None else (_dot(swing, s), _dot(swing, p_in))
+        es, ep = (None, None) if polarisation is None else (_dot(polarisation, s), _dot(polarisation, p_in))
         ts, tp = (None, None) if analyser is None else (_dot(analyser, s), _dot(analyser, p_out))
     total = 0.0
     for n, k, weight in index:
         parallel, perpendicular, coherent = fresnel(ops, cosine, n, k)
-        if swing is None and analyser is None:
+        if polarisation is None and analyser is None:
             passed = (parallel + perpendicular) / 2
         elif analyser is None:
             passed = parallel * ep * ep + perpendicular * es * es
-        elif swing is None:
+        elif polarisation is None:
             passed = (parallel * tp * tp + perpendicular * ts * ts) / 2
         else:
             passed = parallel * (ep * tp) ** 2 + perpendicular * (es * ts) ** 2 + 2 * coherent * es * ep * ts * tp

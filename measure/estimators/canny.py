@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy import sparse
 
-from measure.features.calipers import EdgeFrame
+from measure.features.calipers import Caliper
 from measure.features.layout import Optics
 from measure.features.lines import unit_covariance
 from measure.features.points import EdgePoints
@@ -26,7 +26,7 @@ class CannyLocator:
 
     Attributes
     ----------
-    frame : EdgeFrame
+    caliper : Caliper
     shape : tuple of int
         Of the image.
     scale, blur : float
@@ -43,7 +43,7 @@ class CannyLocator:
         Contrast of a straight blurred edge whose gradient is 1 at its middle.
     """
 
-    frame: EdgeFrame
+    caliper: Caliper
     shape: tuple[int, int]
     scale: float
     blur: float
@@ -56,7 +56,7 @@ class CannyLocator:
     gradient_to_contrast: float
 
     @classmethod
-    def of(cls, optics: Optics, frame: EdgeFrame, threshold: float) -> CannyLocator:
+    def of(cls, optics: Optics, caliper: Caliper, threshold: float) -> CannyLocator:
         """Prepare the locator of one edge."""
         scale, window = optics.scale_px, optics.window_px
         x = np.arange(-int(np.ceil(_TRUNCATE * scale)), int(np.ceil(_TRUNCATE * scale)) + 1)
@@ -64,16 +64,18 @@ class CannyLocator:
         gauss /= gauss.sum()
         derive = x * gauss / (x**2 * gauss).sum()  # exactly 1 on a ramp of 1 grey level a pixel
         margin = window + _TRUNCATE * scale + 2
-        ends = frame.at(frame.stations[[0, -1]], np.zeros(2))
+        ends = caliper.at(caliper.positions[[0, -1]], np.zeros(2))
         low = np.maximum(np.floor(ends.min(0) - margin), 0).astype(int)
         high = np.minimum(np.ceil(ends.max(0) + margin) + 1, optics.shape[::-1]).astype(int)
         rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
         y, x = np.mgrid[rows, columns]
-        along, offset = frame.coordinates(np.stack([x, y], -1))
-        near = (np.abs(offset) <= window) & (along >= frame.stations[0] - 0.5) & (along <= frame.stations[-1] + 0.5)
+        along, offset = caliper.coordinates(np.stack([x, y], -1))
+        near = (
+            (np.abs(offset) <= window) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
+        )
         total = np.hypot(scale, edge_blur(optics.blur_px))
         return cls(
-            frame,
+            caliper,
             optics.shape,
             scale,
             optics.blur_px,
@@ -101,12 +103,14 @@ class CannyLocator:
         along, offset, strength = (np.zeros((len(images), max(counts.max(), 1))) for _ in range(3))
         valid = np.zeros(along.shape, bool)
         points, peak, good = _parabola(gx, gy, which, y, x)
-        along[which, slot], offset[which, slot] = self.frame.coordinates(points + [self.columns.start, self.rows.start])
+        along[which, slot], offset[which, slot] = self.caliper.coordinates(
+            points + [self.columns.start, self.rows.start]
+        )
         strength[which, slot], valid[which, slot] = peak, good
         contrast = self.gradient_to_contrast * (strength * valid).sum(1) / np.maximum(valid.sum(1), 1)
         rise = np.zeros(along.shape)
-        rise[which, slot] = np.sign(gx[which, y, x] * self.frame.normal[0] + gy[which, y, x] * self.frame.normal[1])
-        late = along > self.frame.stations.mean()
+        rise[which, slot] = np.sign(gx[which, y, x] * self.caliper.normal[0] + gy[which, y, x] * self.caliper.normal[1])
+        late = along > self.caliper.positions.mean()
         first, second = ((rise * valid * half).sum(1) for half in (~late, late))
         return EdgePoints(along, offset, valid, contrast, first * second < 0)
 
@@ -121,7 +125,7 @@ class CannyLocator:
 
     def unit_covariance(self) -> np.ndarray:
         """Covariance of (mean offset, slope) for unit noise and unit contrast, (2, 2): the closed form of eq. 7."""
-        return kappa2(self.scale, self.blur) * unit_covariance(self.frame.stations, self.scale)
+        return kappa2(self.scale, self.blur) * unit_covariance(self.caliper.positions, self.scale)
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width).
@@ -131,7 +135,7 @@ class CannyLocator:
         gx, gy = self.gradient(clean)
         y, x = np.nonzero(self.edge_pixels(gx, gy))
         _, d_low, d_mid, d_high, gx0, gy0, m0 = _peak(gx[None], gy[None], np.zeros_like(x), y, x)
-        toward = (gx0 * self.frame.normal[0] + gy0 * self.frame.normal[1]) / m0
+        toward = (gx0 * self.caliper.normal[0] + gy0 * self.caliper.normal[1]) / m0
         shape = gx.shape
         d_magnitude = sparse.csr_array((x.size, gx.size))
         for step, derivative in ((-1, d_low), (0, d_mid), (1, d_high)):

@@ -1,4 +1,4 @@
-"""What every estimator returns: lines in the frames of the expected edges, with what their errors depend on."""
+"""What every estimator returns: lines in the calipers of the expected edges, with what their errors depend on."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from measure.features.calipers import EdgeFrame
+from measure.features.calipers import Caliper
 
 
 class Estimate(NamedTuple):
-    """Lines of E edges in n images: offset = level + slope * along, in the frame of each edge.
+    """Lines of E edges in n images: offset = level + slope * along, in the caliper of each edge.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Response:
 class Estimator(Protocol):
     """An estimator prepared for one layout."""
 
-    frames: tuple[EdgeFrame, ...]
+    calipers: tuple[Caliper, ...]
     pixels: np.ndarray
     """Flat indices of the pixels that it looks at."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from measure.features.calipers import EdgeFrame
+from measure.features.calipers import Caliper
 from measure.features.layout import Optics
 from measure.features.lines import regression, trapezoid
 from measure.features.points import EdgePoints
@@ -27,33 +27,33 @@ class GradientLocator:
 
     Attributes
     ----------
-    stations : ndarray, shape (m,)
+    positions : ndarray, shape (m,)
         Places along the edge, px (or any other parameter of a curve).
     offsets : ndarray, shape (T,)
         Places across the edge, px.
     pixels : ndarray of int
         Flat indices of the pixels that matter.
     kernel : csr_array, shape (m * T, len(pixels))
-        Second derivative across the edge at each station and place.
+        Second derivative across the edge at each position and place.
     slope_to_contrast : float
         Contrast of a straight blurred edge whose second derivative has slope 1 at the crossing.
     """
 
-    stations: np.ndarray
+    positions: np.ndarray
     offsets: np.ndarray
     pixels: np.ndarray
     kernel: sparse.csr_array
     slope_to_contrast: float
 
     @classmethod
-    def of(cls, optics: Optics, frame: EdgeFrame) -> GradientLocator:
+    def of(cls, optics: Optics, caliper: Caliper) -> GradientLocator:
         """Prepare the locator of a straight edge."""
-        places = frame.at(frame.stations, np.zeros(1))
-        return cls.along_curve(optics, frame.stations, places, np.broadcast_to(frame.normal, places.shape))
+        places = caliper.at(caliper.positions, np.zeros(1))
+        return cls.along_curve(optics, caliper.positions, places, np.broadcast_to(caliper.normal, places.shape))
 
     @classmethod
     def along_curve(
-        cls, optics: Optics, stations: np.ndarray, places: np.ndarray, normals: np.ndarray
+        cls, optics: Optics, positions: np.ndarray, places: np.ndarray, normals: np.ndarray
     ) -> GradientLocator:
         """Prepare the locator of a curve given by places (m, 2) on it and unit normals (m, 2) there."""
         half = int(np.ceil(optics.window_px / STEP))
@@ -62,7 +62,7 @@ class GradientLocator:
         kernel = second_derivative(across, np.repeat(normals, offsets.size, 0), optics.scale_px, optics.shape)
         pixels = np.unique(kernel.indices)
         total = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
-        return cls(stations, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
+        return cls(positions, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
 
     def locate(self, images: np.ndarray) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width)."""
@@ -75,7 +75,7 @@ class GradientLocator:
         offset = np.where(valid, self.offsets[0] + STEP * offset, 0.0)
         slope = np.where(valid, -slope / STEP, 0.0)
         contrast = self.slope_to_contrast * slope.sum(0) / np.maximum(valid.sum(0), 1)
-        along = np.broadcast_to(self.stations, (len(images), self.stations.size))
+        along = np.broadcast_to(self.positions, (len(images), self.positions.size))
         return EdgePoints(along, offset.T, valid.T, contrast, turned)
 
     def unit_covariance(self) -> np.ndarray:
@@ -83,7 +83,7 @@ class GradientLocator:
 
         The offsets are the second derivative's noise at the crossing over its slope; neighbours share pixels.
         """
-        response = regression(self.stations, trapezoid(self.stations)) @ self.unit_noise()
+        response = regression(self.positions, trapezoid(self.positions)) @ self.unit_noise()
         return response @ response.T
 
     def unit_noise(self) -> sparse.csr_array:
@@ -112,7 +112,7 @@ class GradientLocator:
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """Second derivative at all places, shape (m, T, n)."""
         used = np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T)
-        return (self.kernel @ used).reshape(self.stations.size, self.offsets.size, len(images))
+        return (self.kernel @ used).reshape(self.positions.size, self.offsets.size, len(images))
 
 
 def second_derivative(
@@ -142,7 +142,7 @@ def _polarity(profiles: np.ndarray) -> np.ndarray:
 
 
 def _rise(profiles: np.ndarray) -> np.ndarray:
-    """How much the image brightens along the normal at each station, (m, n)."""
+    """How much the image brightens along the normal at each position, (m, n)."""
     half = profiles.shape[1] // 2
     return profiles[:, :half].sum(1) - profiles[:, half + 1 :].sum(1)
 

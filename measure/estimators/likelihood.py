@@ -14,7 +14,7 @@ import numpy as np
 
 from measure import status
 from measure.estimators.estimate import Estimate, Response, scaled
-from measure.features.calipers import EdgeFrame
+from measure.features.calipers import Caliper
 
 MIN_CONTRAST_SIGMAS = 4.0  # contrast over its own standard error below which there is no edge to be seen
 
@@ -48,7 +48,7 @@ class LikelihoodEstimator:
 
     Attributes
     ----------
-    frames : tuple of EdgeFrame
+    calipers : tuple of Caliper
     pixels : ndarray of int
         Flat indices of the P pixels.
     rows : ndarray, shape (4 E, P)
@@ -59,7 +59,7 @@ class LikelihoodEstimator:
         Standard deviation of a grey level.
     """
 
-    frames: tuple[EdgeFrame, ...]
+    calipers: tuple[Caliper, ...]
     pixels: np.ndarray
     rows: np.ndarray
     unit: np.ndarray
@@ -67,7 +67,7 @@ class LikelihoodEstimator:
 
     @classmethod
     def of(
-        cls, frames: tuple[EdgeFrame, ...], pixels: np.ndarray, columns: Columns, noise: float
+        cls, calipers: tuple[Caliper, ...], pixels: np.ndarray, columns: Columns, noise: float
     ) -> LikelihoodEstimator:
         """Solve the normal equations once, by an orthogonal decomposition of the scaled columns."""
         design = np.concatenate([columns.offsets, columns.levels, columns.blurs], 1)
@@ -79,33 +79,33 @@ class LikelihoodEstimator:
         first = columns.offsets.shape[1]
         levels = inverse[first : first + columns.levels.shape[1]]
         rows = np.concatenate([inverse[:first], columns.start @ levels, columns.stop @ levels])
-        return cls(frames, pixels, rows, rows @ rows.T, noise)
+        return cls(calipers, pixels, rows, rows @ rows.T, noise)
 
     @property
     def middles(self) -> np.ndarray:
         """Place along each edge about which its tilt is taken, px, shape (E,)."""
-        return np.array([frame.length / 2 for frame in self.frames])
+        return np.array([caliper.length / 2 for caliper in self.calipers])
 
     def estimate(self, images: np.ndarray) -> Estimate:
         used = images.reshape(len(images), -1)[:, self.pixels]
         return self._estimate(used @ self.rows.T)
 
     def _estimate(self, found: np.ndarray) -> Estimate:
-        edges, n = len(self.frames), len(found)
+        edges, n = len(self.calipers), len(found)
         p = found[:, : 2 * edges].reshape(n, edges, 2)
         start, stop = found[:, 2 * edges : 3 * edges], found[:, 3 * edges :]
         offset, tilt = self._solve(p, start, stop)
         error = self.noise * np.sqrt(np.diag(self.unit)[2 * edges : 3 * edges] + np.diag(self.unit)[3 * edges :]) / 2
         seen = np.minimum(np.abs(start), np.abs(stop)) > MIN_CONTRAST_SIGMAS * error
         steady = start * stop > 0
-        contrast = np.stack([start, (stop - start) / np.array([frame.length for frame in self.frames])], -1)
+        contrast = np.stack([start, (stop - start) / np.array([caliper.length for caliper in self.calipers])], -1)
         count = np.full((n, edges), len(self.pixels))
         state = np.where(seen, np.where(steady, status.OK, status.SIGN_CHANGE), status.LOW_CONTRAST)
         return Estimate(offset - self.middles * tilt, tilt, contrast, count, np.zeros_like(count), state)
 
     def _solve(self, p: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Offset at the middle and tilt from p0 + p1 t = C(t) (a + b t), least squares along the edge, (n, E)."""
-        length = np.array([frame.length for frame in self.frames])
+        length = np.array([caliper.length for caliper in self.calipers])
         c0, c1 = (start + stop) / 2, (stop - start) / length
         lever = length**2 / 12
         determinant = c0**2 - c1**2 * lever
@@ -115,18 +115,18 @@ class LikelihoodEstimator:
         return offset, tilt
 
     def covariance(self, estimate: Estimate) -> np.ndarray:
-        edges = len(self.frames)
+        edges = len(self.calipers)
         contrast = estimate.contrast[..., 0] + estimate.contrast[..., 1] * self.middles
         return scaled(self.unit[: 2 * edges, : 2 * edges], contrast, self.middles)
 
     def respond(self, clean: np.ndarray) -> Response:
         """The rows themselves, divided by the clean image's contrast; the offsets found there are second order."""
         estimate = self.estimate(clean[None])
-        edges = len(self.frames)
+        edges = len(self.calipers)
         lines = np.zeros((2 * edges, clean.size))
         for e in range(edges):
             c0 = estimate.contrast[0, e, 0] + estimate.contrast[0, e, 1] * self.middles[e]
-            c1, lever = estimate.contrast[0, e, 1], self.frames[e].length ** 2 / 12
+            c1, lever = estimate.contrast[0, e, 1], self.calipers[e].length ** 2 / 12
             p0, p1 = self.rows[2 * e], self.rows[2 * e + 1]
             determinant = c0**2 - c1**2 * lever
             offset, tilt = (c0 * p0 - c1 * lever * p1) / determinant, (c0 * p1 - c1 * p0) / determinant

@@ -9,7 +9,7 @@ import numpy as np
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, wedge, wedge_slope
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
 from measure.estimators.strip import NEARER, SLIVER
-from measure.features.calipers import EdgeFrame, distance_to_segment
+from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import BACKGROUND, Layout
 from scenes import InvalidInput
 
@@ -17,7 +17,7 @@ REACH = 16.0  # px from an edge up to which pixels are used; beyond it they only
 _CURVED = 30.0  # px: faces larger than this may shade quadratically
 
 
-def polygon_estimator(layout: Layout, frames: tuple[EdgeFrame, ...], clear: float) -> LikelihoodEstimator | None:
+def polygon_estimator(layout: Layout, calipers: tuple[Caliper, ...], clear: float) -> LikelihoodEstimator | None:
     """Estimator of the whole outline of a face; None unless the edges are a closed, convex ring around one face.
 
     Grey levels are linear in x and y times the known shading; where the shading is not known, quadratic on a large
@@ -26,7 +26,7 @@ def polygon_estimator(layout: Layout, frames: tuple[EdgeFrame, ...], clear: floa
     Parameters
     ----------
     layout : Layout
-    frames : tuple of EdgeFrame
+    calipers : tuple of Caliper
     clear : float
         How far edges that do not belong to the ring must be from a pixel that is used, px.
     """
@@ -38,20 +38,20 @@ def polygon_estimator(layout: Layout, frames: tuple[EdgeFrame, ...], clear: floa
     y, x, nearest = _pixels(layout, inner, clear)
     points = np.stack([x, y], 1).astype(float)
     sigma = max(layout.optics.blur_px, 0.3)
-    covered, slopes, levers = _coverage(layout, frames, sign, points, nearest, sigma)
-    wider, *_ = _coverage(layout, frames, sign, points, nearest, 1.02 * sigma)
+    covered, slopes, levers = _coverage(layout, calipers, sign, points, nearest, sigma)
+    wider, *_ = _coverage(layout, calipers, sign, points, nearest, 1.02 * sigma)
     outer = np.where(sign > 0, layout.sides[:, 1], layout.sides[:, 0])
     levels, start, stop = _levels(layout, inner, points, covered, outer, nearest)
-    edges = len(frames)
+    edges = len(calipers)
     offsets = np.stack([slopes, levers], -1).transpose(1, 2, 0).reshape(2 * edges, -1).T
     blurs = ((wider - covered) / (0.02 * sigma))[:, None] * np.ones((1, 1))
     columns = Columns(levels, start, stop, offsets, blurs)
     return LikelihoodEstimator.of(
-        frames, y * layout.optics.shape[1] + x, columns, np.sqrt(layout.optics.noise_variance)
+        calipers, y * layout.optics.shape[1] + x, columns, np.sqrt(layout.optics.noise_variance)
     )
 
 
-def edge_derivatives(layout: Layout, frames: tuple[EdgeFrame, ...]) -> tuple[np.ndarray, np.ndarray]:
+def edge_derivatives(layout: Layout, calipers: tuple[Caliper, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Change of every pixel near the ring with each edge's offset and with its tilt, at unit contrast, both (P, E).
 
     Raises
@@ -64,7 +64,7 @@ def edge_derivatives(layout: Layout, frames: tuple[EdgeFrame, ...]) -> tuple[np.
         raise InvalidInput("edges must be a closed convex ring around one face, got another arrangement")
     y, x, nearest = _pixels(replace(layout, others=np.empty((0, 2, 2))), ring[0], 0.0)
     points = np.stack([x, y], 1).astype(float)
-    return _coverage(layout, frames, ring[1], points, nearest, max(layout.optics.blur_px, 0.3))[1:]
+    return _coverage(layout, calipers, ring[1], points, nearest, max(layout.optics.blur_px, 0.3))[1:]
 
 
 def inner_face(layout: Layout) -> tuple[int, np.ndarray] | None:
@@ -105,23 +105,23 @@ def _pixels(layout: Layout, inner: int, clear: float) -> tuple[np.ndarray, np.nd
     return y[keep], x[keep], nearest[keep]
 
 
-def _coverage(layout, frames, sign, points, nearest, sigma):
+def _coverage(layout, calipers, sign, points, nearest, sigma):
     """Part of each pixel within the face (P,), its derivative by each edge's offset (P, E), and by its tilt (P, E)."""
     partner = _partners(layout, points, nearest)
     covered = np.zeros(len(points))
-    slopes, levers = np.zeros((len(points), len(frames))), np.zeros((len(points), len(frames)))
-    for i in range(len(frames)):
+    slopes, levers = np.zeros((len(points), len(calipers))), np.zeros((len(points), len(calipers)))
+    for i in range(len(calipers)):
         for j in np.unique(partner[nearest == i]):
             here = (nearest == i) & (partner == j)
-            rho = float(sign[i] * sign[j] * frames[i].normal @ frames[j].normal)
+            rho = float(sign[i] * sign[j] * calipers[i].normal @ calipers[j].normal)
             places = points[here][:, None] + NODES
-            (s_i, t_i), (s_j, t_j) = (frames[k].coordinates(places) for k in (i, j))
+            (s_i, t_i), (s_j, t_j) = (calipers[k].coordinates(places) for k in (i, j))
             h, k = sign[i] * t_i / sigma, sign[j] * t_j / sigma
             covered[here] = (wedge(h, k, rho) * NODE_WEIGHTS).sum(1)
             for e, s, slope in ((i, s_i, wedge_slope(h, k, rho)), (j, s_j, wedge_slope(k, h, rho))):
                 part = -sign[e] / sigma * slope * NODE_WEIGHTS
                 slopes[here, e] = part.sum(1)
-                levers[here, e] = (part * (s - frames[e].length / 2)).sum(1)
+                levers[here, e] = (part * (s - calipers[e].length / 2)).sum(1)
     return covered, slopes, levers
 
 

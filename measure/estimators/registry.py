@@ -14,7 +14,7 @@ from measure.estimators.gradient import GradientLocator
 from measure.estimators.likelihood import LikelihoodEstimator
 from measure.estimators.polygon import polygon_estimator
 from measure.estimators.strip import strip_estimator
-from measure.features.calipers import EdgeFrame, edge_frames
+from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression, trapezoid
 from planner.models.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
@@ -23,7 +23,7 @@ from scenes import InvalidInput
 ESTIMATORS = ("canny", "gradient", "strip", "polygon")
 CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
-_MIN_FOUND = 0.5  # part of an edge's stations at which a point must be found
+_MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
@@ -49,59 +49,61 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     optics = layout.optics
     own_reach = CLEARANCE * edge_blur(optics.blur_px)
     if name == "polygon":
-        whole = edge_frames(layout, 0.0, 0.0)
+        whole = edge_calipers(layout, 0.0, 0.0)
         found = polygon_estimator(layout, whole, own_reach) if _all_measurable(whole) else None
         if found is not None:
             return found
         name = "strip"  # no closed ring around one face: each edge by itself
     if name == "strip":
-        frames = edge_frames(layout, own_reach, 0.0)
-        parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(frames)]
-        frames = tuple(
+        calipers = edge_calipers(layout, own_reach, 0.0)
+        parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(calipers)]
+        calipers = tuple(
             f if p or not _measurable(f) else replace(f, status=status.SHORT)
-            for f, p in zip(frames, parts, strict=True)
+            for f, p in zip(calipers, parts, strict=True)
         )
-        return SeparateEstimator(frames, tuple(parts))
-    frames = edge_frames(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + 4 * optics.scale_px + 1)
+        return SeparateEstimator(calipers, tuple(parts))
+    calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + 4 * optics.scale_px + 1)
     if name == "gradient":
-        frames = tuple(_thinned(frame, optics.scale_px) for frame in frames)
+        calipers = tuple(_thinned(caliper, optics.scale_px) for caliper in calipers)
     make = GradientLocator.of if name == "gradient" else lambda o, f: CannyLocator.of(o, f, threshold)
-    parts = tuple(PointEstimator(f, make(optics, f), optics.noise_variance) if _measurable(f) else None for f in frames)
-    return SeparateEstimator(frames, parts)
+    parts = tuple(
+        PointEstimator(f, make(optics, f), optics.noise_variance) if _measurable(f) else None for f in calipers
+    )
+    return SeparateEstimator(calipers, parts)
 
 
-def _thinned(frame: EdgeFrame, scale: float) -> EdgeFrame:
+def _thinned(caliper: Caliper, scale: float) -> Caliper:
     """Stations at most 2 scales apart, at least three: points in between add nothing (their errors are smooth)."""
-    if frame.stations.size < 3:
-        return frame
-    first, last = frame.stations[[0, -1]]
-    return replace(frame, stations=np.linspace(first, last, max(3, int(np.ceil((last - first) / (2 * scale))) + 1)))
+    if caliper.positions.size < 3:
+        return caliper
+    first, last = caliper.positions[[0, -1]]
+    return replace(caliper, positions=np.linspace(first, last, max(3, int(np.ceil((last - first) / (2 * scale))) + 1)))
 
 
-def _measurable(frame: EdgeFrame) -> bool:
-    return frame.status in status.MEASURED
+def _measurable(caliper: Caliper) -> bool:
+    return caliper.status in status.MEASURED
 
 
-def _all_measurable(frames: tuple[EdgeFrame, ...]) -> bool:
-    return all(frame.status != status.NOT_VISIBLE for frame in frames)
+def _all_measurable(calipers: tuple[Caliper, ...]) -> bool:
+    return all(caliper.status != status.NOT_VISIBLE for caliper in calipers)
 
 
 @dataclass(frozen=True)
 class PointEstimator:
     """One edge from edge points and a total-least-squares line."""
 
-    frame: EdgeFrame
+    caliper: Caliper
     locator: GradientLocator | CannyLocator
     noise_variance: float
 
     @property
     def weights(self) -> np.ndarray | float:
         """Of the edge points: few evenly spaced ones stand for the whole edge; Canny's pixels are what they are."""
-        return trapezoid(self.frame.stations) if isinstance(self.locator, GradientLocator) else 1.0
+        return trapezoid(self.caliper.positions) if isinstance(self.locator, GradientLocator) else 1.0
 
     @property
-    def frames(self) -> tuple[EdgeFrame, ...]:
-        return (self.frame,)
+    def edge_calipers(self) -> tuple[Caliper, ...]:
+        return (self.caliper,)
 
     @property
     def pixels(self) -> np.ndarray:
@@ -111,7 +113,7 @@ class PointEstimator:
         points = self.locator.locate(images)
         lines = fit_lines(points, self.weights)
         slope = np.tan(lines.tilt)
-        enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.frame.stations.size, 3)
+        enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
         clear = points.contrast > MIN_CONTRAST * np.sqrt(self.noise_variance)
         edge = enough & clear & (lines.scatter < _MAX_SCATTER)
         state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
@@ -120,13 +122,13 @@ class PointEstimator:
             slope,
             np.stack([points.contrast, np.zeros_like(points.contrast)], -1),
             lines.count,
-            np.maximum(self.frame.stations.size - lines.count, 0),
+            np.maximum(self.caliper.positions.size - lines.count, 0),
             state,
         )
         return Estimate(*(column[:, None] for column in columns))
 
     def covariance(self, estimate: Estimate) -> np.ndarray:
-        return scaled(self.locator.unit_covariance(), estimate.contrast[..., 0], self.frame.stations.mean()[None])
+        return scaled(self.locator.unit_covariance(), estimate.contrast[..., 0], self.caliper.positions.mean()[None])
 
     def respond(self, clean: np.ndarray) -> Response:
         points, response = self.locator.linear_response(clean)
@@ -144,7 +146,7 @@ class PointEstimator:
 class SeparateEstimator:
     """Several edges, each by an estimator of its own; None for an edge that cannot be measured."""
 
-    frames: tuple[EdgeFrame, ...]
+    calipers: tuple[Caliper, ...]
     parts: tuple[PointEstimator | LikelihoodEstimator | None, ...]
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
-from measure.features.calipers import EdgeFrame, distance_to_segment
+from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import Layout
 
 NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
@@ -14,7 +14,7 @@ SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the
 HALF_WIDTH = 16.0  # px to each side; wider hardly helps, since the levels are then known well enough
 
 
-def strip_estimator(layout: Layout, frame: EdgeFrame, index: int, clear: float) -> LikelihoodEstimator | None:
+def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) -> LikelihoodEstimator | None:
     """Estimator of one edge; None if too few pixels are free of other edges.
 
     Grey levels may change linearly along and across the edge on each side, and the blur is free.
@@ -22,27 +22,27 @@ def strip_estimator(layout: Layout, frame: EdgeFrame, index: int, clear: float) 
     Parameters
     ----------
     layout : Layout
-    frame : EdgeFrame
-        Frame of the edge; its stations tell the part to use.
+    caliper : Caliper
+        Frame of the edge; its positions tell the part to use.
     index : int
         Which edge of the layout.
     clear : float
         How far every other edge must be from a pixel that is used, px.
     """
     layout = layout.without_slivers(SLIVER)
-    pixels, along, across = _strip(layout, frame, index, clear)
+    pixels, along, across = _strip(layout, caliper, index, clear)
     if len(pixels) < 40:
         return None
-    middle = frame.length / 2
+    middle = caliper.length / 2
     sigma = max(layout.optics.blur_px, 0.3)
-    nodes = across[:, None] + NODES @ frame.normal
+    nodes = across[:, None] + NODES @ caliper.normal
     inside = (half_plane(nodes / sigma) * NODE_WEIGHTS).sum(1)
     thin = density(nodes / sigma) * NODE_WEIGHTS
-    lever = along[:, None] + NODES @ frame.direction - middle
-    basis = np.stack([np.ones_like(along), (along - middle) / frame.length, across / HALF_WIDTH], 1)
-    places = frame.at(along, across)
+    lever = along[:, None] + NODES @ caliper.direction - middle
+    basis = np.stack([np.ones_like(along), (along - middle) / caliper.length, across / HALF_WIDTH], 1)
+    places = caliper.at(along, across)
     plus, minus = (layout.shade(face, places)[:, None] for face in layout.sides[index])
-    ends = frame.at(np.array([0.0, frame.length]), np.zeros(2))
+    ends = caliper.at(np.array([0.0, caliper.length]), np.zeros(2))
     at_ends = np.array([[1, -0.5, 0], [1, 0.5, 0]])
     contrast = np.concatenate([layout.shade(layout.sides[index, 0], ends)[:, None] * at_ends,
                                -layout.shade(layout.sides[index, 1], ends)[:, None] * at_ends], 1)  # fmt: skip
@@ -53,19 +53,21 @@ def strip_estimator(layout: Layout, frame: EdgeFrame, index: int, clear: float) 
         offsets=-np.stack([thin.sum(1), (thin * lever).sum(1)], 1) / sigma,
         blurs=-(thin * nodes).sum(1)[:, None] / sigma**2,
     )
-    return LikelihoodEstimator.of((frame,), pixels, columns, np.sqrt(layout.optics.noise_variance))
+    return LikelihoodEstimator.of((caliper,), pixels, columns, np.sqrt(layout.optics.noise_variance))
 
 
-def _strip(layout: Layout, frame: EdgeFrame, index: int, clear: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels of the strip (flat indices) and their coordinates (along, across) in the frame."""
+def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixels of the strip (flat indices) and their coordinates (along, across) in the caliper."""
     height, width = layout.optics.shape
-    used = frame.at(frame.stations[[0, -1]], np.zeros(2))
+    used = caliper.at(caliper.positions[[0, -1]], np.zeros(2))
     low = np.maximum(np.floor(used.min(0) - HALF_WIDTH - 1), 0).astype(int)
     high = np.minimum(np.ceil(used.max(0) + HALF_WIDTH + 2), [width, height]).astype(int)
     y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
     points = np.stack([x, y], 1).astype(float)
-    along, across = frame.coordinates(points)
-    keep = (np.abs(across) <= HALF_WIDTH) & (along >= frame.stations[0] - 0.5) & (along <= frame.stations[-1] + 0.5)
+    along, across = caliper.coordinates(points)
+    keep = (
+        (np.abs(across) <= HALF_WIDTH) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
+    )
     # an edge may be required twice, once for each of its corners
     task = [ends for ends in layout.ends[layout.visible] if not np.array_equal(ends, layout.ends[index])]
     apart = {segment.tobytes() for segment in layout.apart[index]}

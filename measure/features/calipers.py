@@ -10,11 +10,11 @@ from measure import status
 from measure.features.layout import Layout
 from planner.models.locator import MIN_USABLE
 
-MIN_STATIONS = 3
+MIN_POSITIONS = 3
 
 
 @dataclass(frozen=True)
-class EdgeFrame:
+class Caliper:
     """Coordinates along and across one expected edge.
 
     A point of the image is ``origin + along * t + offset * n`` with t the unit direction and n = (-t_y, t_x).
@@ -26,7 +26,7 @@ class EdgeFrame:
         Start of the edge's image, px, and its unit direction t.
     length : float
         Length of the edge's image, px.
-    stations : ndarray, shape (m,)
+    positions : ndarray, shape (m,)
         Places along the edge, at most 1 px apart, where it can be measured: the trimmed corners and what lies outside
         the image are left out.
     status : str
@@ -37,7 +37,7 @@ class EdgeFrame:
     origin: np.ndarray
     direction: np.ndarray
     length: float
-    stations: np.ndarray
+    positions: np.ndarray
     status: str
 
     @property
@@ -45,7 +45,7 @@ class EdgeFrame:
         return np.array([-self.direction[1], self.direction[0]])
 
     def at(self, along: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        """Image coordinates (x, y), px, of places in this frame."""
+        """Image coordinates (x, y), px, of places in this caliper."""
         return self.origin + along[..., None] * self.direction + offset[..., None] * self.normal
 
     def coordinates(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -54,8 +54,8 @@ class EdgeFrame:
         return away @ self.direction, away @ self.normal
 
 
-def edge_frames(layout: Layout, clear: float, margin: float) -> tuple[EdgeFrame, ...]:
-    """A frame for each edge of a layout.
+def edge_calipers(layout: Layout, clear: float, margin: float) -> tuple[Caliper, ...]:
+    """A caliper for each edge of a layout.
 
     Parameters
     ----------
@@ -63,34 +63,34 @@ def edge_frames(layout: Layout, clear: float, margin: float) -> tuple[EdgeFrame,
     clear : float
         How far every other edge must be from the part that is used, px.
     margin : float
-        How far from the image's border a station must be, px.
+        How far from the image's border a position must be, px.
     """
-    return tuple(_frame(layout, i, clear, margin) for i in range(len(layout.names)))
+    return tuple(_caliper(layout, i, clear, margin) for i in range(len(layout.names)))
 
 
-def _frame(layout: Layout, i: int, clear: float, margin: float) -> EdgeFrame:
+def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
     start, stop = layout.ends[i]
     length = float(np.linalg.norm(stop - start))
     if not layout.visible[i] or not length > 0:
-        return EdgeFrame(layout.names[i], np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0), status.NOT_VISIBLE)
+        return Caliper(layout.names[i], np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0), status.NOT_VISIBLE)
     along = (stop - start) / length
     shown = length * layout.shown[i]
     first = max(trim(along, layout.beside[i][0], clear), shown[0] + clear if shown[0] > 0 else 0.0)
     last = length - max(
         trim(-along, layout.beside[i][1], clear), length - shown[1] + clear if shown[1] < length else 0.0
     )
-    stations = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
-    places = start + stations[:, None] * along
+    positions = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
+    places = start + positions[:, None] * along
     size = np.array(layout.optics.shape[::-1])
     inside = ((places >= margin) & (places <= size - 1 - margin)).all(-1)
-    if stations.size < MIN_STATIONS:
+    if positions.size < MIN_POSITIONS:
         state = status.SHORT
-    elif inside.sum() < MIN_STATIONS:
+    elif inside.sum() < MIN_POSITIONS:
         state = status.NOT_VISIBLE
     else:
         crowded = any(distance_to_segment(places[inside], *other).min() < clear for other in layout.apart[i])
         state = status.CLUTTER if crowded else status.OK
-    return EdgeFrame(layout.names[i], start, along, length, stations[inside], state)
+    return Caliper(layout.names[i], start, along, length, positions[inside], state)
 
 
 def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from measure import status
 from measure.estimators.gradient import GradientLocator
-from measure.features.calipers import MIN_STATIONS
+from measure.features.calipers import MIN_POSITIONS
 from measure.features.layout import Optics
 from planner.models.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput
@@ -112,8 +112,8 @@ def find_ellipse(
     """
     expected = np.asarray(expected, float)
     stack = images.reshape(-1, *images.shape[-2:])
-    angles, places, normals = _stations(expected, optics, spacing)
-    if len(angles) < max(MIN_STATIONS, 5):
+    angles, places, normals = _positions(expected, optics, spacing)
+    if len(angles) < max(MIN_POSITIONS, 5):
         return _nothing(images.shape[:-2], status.NOT_VISIBLE)
     locator = GradientLocator.along_curve(optics, angles, places, normals)
     found = locator.locate(stack)
@@ -137,7 +137,7 @@ def find_ellipse(
     return Ellipse(parameters.reshape(*lead, 5), np.array(covariances).reshape(*lead, 5, 5), state.reshape(lead))
 
 
-def _stations(expected: np.ndarray, optics: Optics, spacing: float):
+def _positions(expected: np.ndarray, optics: Optics, spacing: float):
     """Parameter angles, places (m, 2) and outward unit normals (m, 2) about evenly spaced, where the image has room."""
     fine = np.linspace(0, 2 * np.pi, 2001)
     a, b = expected[2:4]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from measure.features.calipers import EdgeFrame
+from measure.features.calipers import Caliper
 
 
 def line_equations(
-    frames: tuple[EdgeFrame, ...], level: np.ndarray, slope: np.ndarray
+    calipers: tuple[Caliper, ...], level: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Unit normals and a point of each line, in image coordinates, both (n, E, 2)."""
     normals, directions, origins = (
-        np.stack([getattr(f, name) for f in frames]) for name in ("normal", "direction", "origin")
+        np.stack([getattr(f, name) for f in calipers]) for name in ("normal", "direction", "origin")
     )
     tilted = normals - slope[..., None] * directions
     return tilted / np.hypot(1, slope)[..., None], origins + level[..., None] * normals
@@ -41,18 +41,18 @@ def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.n
     return points[:, 0] + step[:, None] * np.stack([-b1, a1], -1), np.abs(sine)
 
 
-def corner_response(frames: tuple[EdgeFrame, ...], pair: tuple[int, int]) -> np.ndarray:
+def corner_response(calipers: tuple[Caliper, ...], pair: tuple[int, int]) -> np.ndarray:
     """Derivative of the expected corner of two edges by (level, slope) of all E edges, shape (2, 2 E).
 
     Infinite if the two expected edges are parallel.
     """
-    first, second = frames[pair[0]], frames[pair[1]]
-    whole = np.zeros((2, 2 * len(frames)))
+    first, second = calipers[pair[0]], calipers[pair[1]]
+    whole = np.zeros((2, 2 * len(calipers)))
     (corner,), (sine,) = intersect(np.stack([[first.normal, second.normal]]), np.stack([[first.origin, second.origin]]))
     if sine < 1e-9:
         return np.full(whole.shape, np.inf)
     inverse = np.linalg.inv(np.stack([first.normal, second.normal]))
     for row, e in enumerate(pair):
         whole[:, 2 * e] = inverse[:, row]
-        whole[:, 2 * e + 1] = inverse[:, row] * frames[e].coordinates(corner)[0]
+        whole[:, 2 * e + 1] = inverse[:, row] * calipers[e].coordinates(corner)[0]
     return whole

@@ -9,7 +9,7 @@ import numpy as np
 from skimage.draw import polygon2mask
 
 from measure.estimators.shading import Shading, face_shadings
-from planner.features.projected_edges import outline
+from planner.features.projected_edges import projected_edges
 from planner.imaging.projection import depth, direction, facing, project
 from scenes import Corner, InvalidInput, Pose, Scene
 
@@ -179,7 +179,7 @@ def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
     if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
         raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
     solid, pose = scene.solid, np.array(list(sensor))
-    view = outline(scene, pose)
+    view = projected_edges(scene, pose)
     points = project(solid.vertices, pose, scene.camera)
     seen = facing(solid, scene.camera.distance * direction(pose))
     shadings = [None] * len(solid.faces) if light is None else face_shadings(scene, sensor, light)

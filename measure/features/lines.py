@@ -1,4 +1,4 @@
-"""A line through edge points, in the frame of its expected edge."""
+"""A line through edge points, in the caliper of its expected edge."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 
 
 class EdgePoints(NamedTuple):
-    """Edge points of n images in the frame of one edge.
+    """Edge points of n images in the caliper of one edge.
 
     Attributes
     ----------

@@ -83,10 +83,10 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     tool = prepared(layout, name, threshold)
     estimate = tool.estimate(images)
     shape = _assemble(tool, layout, estimate)
-    frames = tool.frames
-    if any(frame.status not in status.MEASURED for frame in frames):
+    calipers = tool.calipers
+    if any(caliper.status not in status.MEASURED for caliper in calipers):
         return shape
-    lengths = np.array([frame.length for frame in frames])
+    lengths = np.array([caliper.length for caliper in calipers])
     offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
     limit = np.maximum(CAPTURE[name], 5 * _end_errors(tool, layout, estimate))
     far = ~(np.abs(offsets) <= limit).all((1, 2))
@@ -120,17 +120,17 @@ def _expectations(images, layout, offsets, far, lost, first):
 def _end_errors(tool: Estimator, layout: Layout, estimate: Estimate) -> np.ndarray:
     """Standard deviation of each line's offset at its two ends, px, (n, E, 2)."""
     covariance = tool.covariance(estimate) * layout.optics.noise_variance
-    lengths = np.array([frame.length for frame in tool.frames])
+    lengths = np.array([caliper.length for caliper in tool.calipers])
     a, b, ab = (np.einsum("nee->ne", covariance[:, i::2, j::2]) for i, j in ((0, 0), (1, 1), (0, 1)))
     return np.nan_to_num(np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1)))
 
 
 def _assemble(tool: Estimator, layout: Layout, estimate: Estimate) -> Shape:
-    frames = tool.frames
-    normals, points = line_equations(frames, estimate.level, estimate.slope)
+    calipers = tool.calipers
+    normals, points = line_equations(calipers, estimate.level, estimate.slope)
     crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]
     corners, sines = np.stack([c for c, _ in crossings], 1), np.stack([s for _, s in crossings], 1)
-    fixed = np.array([frame.status for frame in frames])
+    fixed = np.array([caliper.status for caliper in calipers])
     edge_status = np.where(fixed == status.OK, estimate.state, np.where(
         (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
     joint = np.where(sines < _MIN_SINE, status.ILL_CONDITIONED, status.OK)
@@ -139,9 +139,9 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate) -> Shape:
     lines = tool.covariance(estimate) * layout.optics.noise_variance
     covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
     if measured.any():
-        response = np.concatenate([corner_response(frames, pair) for pair in layout.corners])
+        response = np.concatenate([corner_response(calipers, pair) for pair in layout.corners])
         covariance[measured] = response @ lines[measured] @ response.T
-    middle = estimate.contrast[..., 0] + estimate.contrast[..., 1] * np.array([f.length / 2 for f in frames])
+    middle = estimate.contrast[..., 0] + estimate.contrast[..., 1] * np.array([f.length / 2 for f in calipers])
     return Shape(
         corners=np.where(measured[:, None, None], corners, np.nan),
         covariance=covariance,

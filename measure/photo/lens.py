@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from measure.estimators.gradient import GradientLocator
-from measure.features.calipers import edge_frames
+from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression
@@ -95,36 +95,36 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straighte
     """
     optics = layout.optics
     clear = reach(optics.scale_px, optics.blur_px)
-    frames = edge_frames(layout, clear, 0.0)
+    calipers = edge_calipers(layout, clear, 0.0)
     lines, blocks, used = [], [], []
-    for frame in frames:
-        t, place, toward = _bent(frame, lens)
+    for caliper in calipers:
+        t, place, toward = _bent(caliper, lens)
         inside = _room(place, optics)
         if inside.sum() < 3:
-            raise InvalidInput(f"side {frame.name} must have edge points in the image, got none")
+            raise InvalidInput(f"side {caliper.name} must have edge points in the image, got none")
         locator = GradientLocator.along_curve(optics, t[inside], place[inside], toward[inside])
         found = locator.locate(image[None])
         points = lens.straighten(place[inside] + found.offset[0][:, None] * toward[inside])
-        along, offset = frame.coordinates(points)
+        along, offset = caliper.coordinates(points)
         line = fit_lines(EdgePoints(along[None], offset[None], found.valid, found.contrast, found.reversed))
         if not np.isfinite(line.tilt).all() or found.valid.mean() < 0.5:
-            raise InvalidInput(f"side {frame.name} must stand out of the noise, got {found.valid.sum()} edge points")
+            raise InvalidInput(f"side {caliper.name} must stand out of the noise, got {found.valid.sum()} edge points")
         slope = float(np.tan(line.tilt[0]))
         lines.append((float(line.mean_offset[0] - slope * line.mean_along[0]), slope))
         response = regression(along) @ locator.unit_noise() / max(float(found.contrast[0]), 1e-12)
         to_start = np.array([[1, -along.mean()], [0, 1]])
         blocks.append(to_start @ (optics.noise_variance * response @ response.T) @ to_start.T)
         used.append(int(found.valid.sum()))
-    return _corners(layout, frames, np.array(lines), blocks, np.array(used))
+    return _corners(layout, calipers, np.array(lines), blocks, np.array(used))
 
 
-def _bent(frame, lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bent(caliper, lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stations of a side, their places in the distorted image, and the unit normals there."""
-    t = frame.stations
-    straight = frame.at(t, np.zeros(1))
+    t = caliper.positions
+    straight = caliper.at(t, np.zeros(1))
     step = 1e-3
     place = lens.distort(straight)
-    ahead = lens.distort(straight + step * frame.direction) - lens.distort(straight - step * frame.direction)
+    ahead = lens.distort(straight + step * caliper.direction) - lens.distort(straight - step * caliper.direction)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     return t, place, np.stack([-ahead[:, 1], ahead[:, 0]], 1)
 
@@ -134,11 +134,11 @@ def _room(place: np.ndarray, optics) -> np.ndarray:
     return ((place >= margin) & (place <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
 
 
-def _corners(layout: Layout, frames, lines: np.ndarray, blocks, used: np.ndarray) -> Straightened:
-    normals, points = line_equations(frames, lines[None, :, 0], lines[None, :, 1])
+def _corners(layout: Layout, calipers, lines: np.ndarray, blocks, used: np.ndarray) -> Straightened:
+    normals, points = line_equations(calipers, lines[None, :, 0], lines[None, :, 1])
     corners = [intersect(normals[:, list(pair)], points[:, list(pair)])[0][0] for pair in layout.corners]
-    response = np.concatenate([corner_response(frames, pair) for pair in layout.corners])
-    whole = np.zeros((2 * len(frames), 2 * len(frames)))
+    response = np.concatenate([corner_response(calipers, pair) for pair in layout.corners])
+    whole = np.zeros((2 * len(calipers), 2 * len(calipers)))
     for e, block in enumerate(blocks):
         whole[2 * e : 2 * e + 2, 2 * e : 2 * e + 2] = block
     return Straightened(np.array(corners), response @ whole @ response.T, used)

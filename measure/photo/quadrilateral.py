@@ -16,7 +16,7 @@ from scenes import InvalidInput
 
 
 @dataclass(frozen=True)
-class Quantity:
+class MeasuredValue:
     """A measured number: name, value, standard deviation (1 sigma) and unit ("px" or "deg")."""
 
     name: str
@@ -35,7 +35,7 @@ class Quadrilateral:
         (x, y), px, in order around it; without distortion if a lens was given.
     covariance : ndarray, shape (8, 8)
         Joint covariance of all corners, px^2.
-    quantities : tuple of Quantity
+    measurands : tuple of MeasuredValue
         Four sides, two diagonals, four angles.
     noise, blur_px : float
         Standard deviation of a grey level and of the lens blur, px, as estimated from the image.
@@ -44,7 +44,7 @@ class Quadrilateral:
 
     corners: np.ndarray
     covariance: np.ndarray
-    quantities: tuple[Quantity, ...]
+    measurands: tuple[MeasuredValue, ...]
     noise: float
     blur_px: float
     status: str
@@ -78,11 +78,11 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "strip", lens: Len
     state = str(shape.status[0])
     if state in status.MEASURED and lens is not None:
         found = straight_corners(image, polygon_layout(lens.straighten(shape.corners[0]), optics), lens)
-        return _told(found.corners, found.covariance, noise, blur, state)
+        return _reported(found.corners, found.covariance, noise, blur, state)
     if state in status.MEASURED and estimator != "gradient":
         near = polygon_layout(shape.corners[0], optics)
         shape = find_shape(image[None], near, estimator, _threshold(shape))
-    return _told(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]))
+    return _reported(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]))
 
 
 def _threshold(shape) -> float:
@@ -90,26 +90,26 @@ def _threshold(shape) -> float:
     return float(max(shape.edge_contrast[0].min() / 9, 1e-6))
 
 
-def _told(corners, covariance, noise: float, blur: float, state: str) -> Quadrilateral:
-    quantities = _quantities(corners, covariance) if np.isfinite(corners).all() else ()
-    return Quadrilateral(corners, covariance, quantities, noise, blur, state)
+def _reported(corners, covariance, noise: float, blur: float, state: str) -> Quadrilateral:
+    values = _values(corners, covariance) if np.isfinite(corners).all() else ()
+    return Quadrilateral(corners, covariance, values, noise, blur, state)
 
 
-def _quantities(corners: np.ndarray, covariance: np.ndarray) -> tuple[Quantity, ...]:
+def _values(corners: np.ndarray, covariance: np.ndarray) -> tuple[MeasuredValue, ...]:
     found = [_length(f"side {i + 1}-{(i + 1) % 4 + 1}", corners, covariance, i, (i + 1) % 4) for i in range(4)]
     found += [_length(f"diagonal {i + 1}-{i + 3}", corners, covariance, i, i + 2) for i in range(2)]
     return tuple(found + [_angle(f"angle {i + 1}", corners, covariance, i) for i in range(4)])
 
 
-def _length(name: str, corners: np.ndarray, covariance: np.ndarray, i: int, j: int) -> Quantity:
+def _length(name: str, corners: np.ndarray, covariance: np.ndarray, i: int, j: int) -> MeasuredValue:
     across = corners[j] - corners[i]
     value = float(np.linalg.norm(across))
     gradient = np.zeros(8)
     gradient[2 * i : 2 * i + 2], gradient[2 * j : 2 * j + 2] = -across / value, across / value
-    return Quantity(name, value, float(np.sqrt(gradient @ covariance @ gradient)), "px")
+    return MeasuredValue(name, value, float(np.sqrt(gradient @ covariance @ gradient)), "px")
 
 
-def _angle(name: str, corners: np.ndarray, covariance: np.ndarray, i: int) -> Quantity:
+def _angle(name: str, corners: np.ndarray, covariance: np.ndarray, i: int) -> MeasuredValue:
     """Angle at corner i: each arm's direction turns by its cross component over its length."""
     gradient, directions = np.zeros(8), []
     for sign, j in ((1, (i + 1) % 4), (-1, (i - 1) % 4)):
@@ -119,4 +119,4 @@ def _angle(name: str, corners: np.ndarray, covariance: np.ndarray, i: int) -> Qu
         gradient[2 * i : 2 * i + 2] -= turn
         directions.append(arm / np.linalg.norm(arm))
     value = np.degrees(np.arccos(np.clip(directions[0] @ directions[1], -1, 1)))
-    return Quantity(name, float(value), float(np.degrees(np.sqrt(gradient @ covariance @ gradient))), "deg")
+    return MeasuredValue(name, float(value), float(np.degrees(np.sqrt(gradient @ covariance @ gradient))), "deg")

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.projected_edges import Outline, outline
+from planner.features.projected_edges import ProjectedEdges, projected_edges
 from planner.imaging.projection import depth, frame, from_axis, image_centre, project
 from scenes import Centre, Corner, Edge, Scene, Task
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Measurand:
     """The measured quantity for sensor poses of leading shape (...); px and cm for a distance, rad for an angle.
 
     Attributes
     ----------
-    view : Outline
+    view : ProjectedEdges
         The E different straight edges that it depends on.
     value : ndarray, shape (...)
         In the image.
@@ -38,7 +38,7 @@ class Quantity:
         Images of the two features (x, y), px; of the edges' middles for an angle.
     """
 
-    view: Outline
+    view: ProjectedEdges
     value: np.ndarray
     value_object: float
     scale: np.ndarray
@@ -48,12 +48,12 @@ class Quantity:
     points: np.ndarray
 
 
-def quantity(scene: Scene, sensors: np.ndarray) -> Quantity:
+def measurand(scene: Scene, sensors: np.ndarray) -> Measurand:
     """The task's quantity seen from sensor poses (..., 2), degrees."""
     sensors = np.asarray(sensors, float)
     circles = {circle.name for circle in scene.solid.circles}
     names = tuple(name for name in dict.fromkeys(scene.task.edges) if name not in circles)
-    view = outline(scene, sensors, names)
+    view = projected_edges(scene, sensors, names)
     with np.errstate(divide="ignore", invalid="ignore"):
         return (_distance if scene.task.kind == "distance" else _angle)(scene, sensors, view)
 
@@ -91,7 +91,7 @@ def jacobian(points: np.ndarray, poses: np.ndarray, camera) -> np.ndarray:
     return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)
 
 
-def _distance(scene: Scene, sensors: np.ndarray, view: Outline) -> Quantity:
+def _distance(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand:
     solid = scene.solid
     places = np.array([_place(scene, feature) for feature in scene.task.corners])
     points = from_axis(places, sensors, scene.camera)
@@ -107,10 +107,10 @@ def _distance(scene: Scene, sensors: np.ndarray, view: Outline) -> Quantity:
     length = float(np.linalg.norm(places[1] - places[0]))
     derivative = jacobian(places, sensors, scene.camera).sum(-3) / 2 @ ((places[1] - places[0]) / length)
     scale = np.einsum("...i,...i->...", pull, derivative)
-    return Quantity(view, value, length, scale, offset, tilt, pull, points)
+    return Measurand(view, value, length, scale, offset, tilt, pull, points)
 
 
-def _add_corner(gradient, view: Outline, edges: list[Edge], feature: Corner, solid, offset, tilt) -> None:
+def _add_corner(gradient, view: ProjectedEdges, edges: list[Edge], feature: Corner, solid, offset, tilt) -> None:
     """Add a corner's part to the derivatives: it moves by N^-1 (d1, d2), the rows of N being the two normals."""
     index = [view.names.index(edge.name) for edge in edges]
     response = np.einsum("...i,...ij->...j", gradient, corner_response(normals(view)[..., index, :]))
@@ -120,7 +120,7 @@ def _add_corner(gradient, view: Outline, edges: list[Edge], feature: Corner, sol
         tilt[..., i] += response[..., k] * (view.lengths[..., i] if last else 0.0)
 
 
-def normals(view: Outline) -> np.ndarray:
+def normals(view: ProjectedEdges) -> np.ndarray:
     """Unit normal of each edge's image, (-t_y, t_x) of its direction t, shape (..., E, 2)."""
     along = view.along / np.where(view.lengths > 0, view.lengths, np.nan)[..., None]
     return np.stack([-along[..., 1], along[..., 0]], -1)
@@ -139,7 +139,7 @@ def _place(scene: Scene, feature: Corner | Centre) -> np.ndarray:
     return scene.solid.vertex(feature.vertex)
 
 
-def _angle(scene: Scene, sensors: np.ndarray, view: Outline) -> Quantity:
+def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand:
     """Angle between two edges, from their common vertex if they have one; both turn by half in their common plane."""
     solid = scene.solid
     edges = [solid.edge(name) for name in scene.task.lines]
@@ -162,7 +162,7 @@ def _angle(scene: Scene, sensors: np.ndarray, view: Outline) -> Quantity:
     scale = sign * rates.sum(-1) / 2
     tilt = np.stack([-sign, sign], -1)
     points = project(pivots, sensors, scene.camera)
-    return Quantity(view, value, float(inside), scale, np.zeros_like(tilt), tilt, np.zeros((*value.shape, 2)), points)
+    return Measurand(view, value, float(inside), scale, np.zeros_like(tilt), tilt, np.zeros((*value.shape, 2)), points)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

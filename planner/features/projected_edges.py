@@ -18,7 +18,7 @@ from scenes import Edge, Scene
 
 
 @dataclass(frozen=True)
-class Outline:
+class ProjectedEdges:
     """Images of E straight edges for sensor poses of leading shape (...).
 
     Attributes
@@ -65,7 +65,7 @@ def straight(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in scene.task.edges if name not in circles)
 
 
-def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = None) -> Outline:
+def projected_edges(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = None) -> ProjectedEdges:
     """Project edges and decide how much of each can be measured.
 
     Parameters
@@ -91,7 +91,7 @@ def outline(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = N
     lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
     if not solid.is_convex:
         trims = cut(trims, shown, lengths, clear)
-    return Outline(
+    return ProjectedEdges(
         names=names,
         ends=ends,
         along=along,

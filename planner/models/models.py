@@ -1,7 +1,7 @@
 """Prices of a setting that need no image: the paper's, the calibrated one in absolute px^2, and the bound.
 
 Each finds how well the line of every edge is known, as a function V(A, B): the variance of A d + B theta, d the
-line's displacement at the edge's first end (px) and theta its rotation (rad). `quantity` knows A and B.
+line's displacement at the edge's first end (px) and theta its rotation (rad). `features.measurand` knows A and B.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.features.circles import calibrated_centre, fisher_centre, rim
-from planner.features.measurand import Quantity, quantity
+from planner.features.measurand import Measurand, measurand
 from planner.features.projected_edges import cut, end_depths, image_fractions
 from planner.imaging.contrast import squared_contrast
 from planner.imaging.projection import direction
@@ -29,12 +29,12 @@ LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Priced:
+class Evaluated:
     """Predicted errors for arrays of settings of leading shape (...).
 
     Attributes
     ----------
-    quantity : Quantity
+    measurand : Measurand
         What is measured; its arrays have the sensors' leading shape.
     variance, variance_object : ndarray, shape (...)
         In the image (px^2, or rad^2 of an angle) and in the object (cm^2, or rad^2); infinite where it cannot be
@@ -48,7 +48,7 @@ class Priced:
         cannot be found.
     """
 
-    quantity: Quantity
+    measurand: Measurand
     variance: np.ndarray
     variance_object: np.ndarray
     line_variance: LineVariance
@@ -56,7 +56,7 @@ class Priced:
     centres: tuple[np.ndarray, ...]
 
 
-def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
+def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Evaluated:
     """The paper's VarianceEvaluate (Fig. 8): eq. 8-10, 7, 3, 5, 6 as printed, slips repaired.
 
     100 points an edge, equally spaced in space, independent errors of variance 8.697 sigma^2 / C_i^2, no fall-off
@@ -64,7 +64,7 @@ def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     up to one factor for all settings.
     """
     sensors, lights = np.asarray(sensors, float), np.asarray(lights, float)
-    known = quantity(scene, sensors)
+    known = measurand(scene, sensors)
     lengths, per_point = known.view.lengths, PAPER_KAPPA2 * scene.noise.sigma**2
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         total, mean, spread, count = moments(scene, known.view.names, sensors, lights, PAPER_POINTS)
@@ -77,10 +77,10 @@ def paper(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     def centre(circle) -> np.ndarray:
         return fisher_centre(circle, circle.squared / per_point, circle.counted)
 
-    return _priced(scene, sensors, lights, known, line_variance, total / PAPER_POINTS, centre, fall_off=False)
+    return _evaluated(scene, sensors, lights, known, line_variance, total / PAPER_POINTS, centre, fall_off=False)
 
 
-def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
+def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Evaluated:
     """Absolute px^2 from camera, exposure, blur, noise, image length and the locator's closed form.
 
     Edge points lie densely along the trimmed edge; their errors have variance kappa^2 s_n^2 / C^2 and correlation
@@ -121,10 +121,12 @@ def calibrated(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     def centre(circle) -> np.ndarray:
         return calibrated_centre(circle, per_point, 2 * np.sqrt(np.pi) * scale, MIN_CONTRAST**2 * noise)
 
-    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared.mean(-1), centre, fall_off=True)
+    return _evaluated(
+        scene, sensors, lights, along.measurand, line_variance, along.squared.mean(-1), centre, fall_off=True
+    )
 
 
-def bound(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
+def bound(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Evaluated:
     """Cramer-Rao bound: the smallest variance that any unbiased estimator can have.
 
     Information C^2 / (2 sqrt(pi) s_e s_n^2) per px of each whole visible edge about its offset and tilt.
@@ -143,7 +145,9 @@ def bound(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> Priced:
     def centre(circle) -> np.ndarray:
         return fisher_centre(circle, information_bound(np.sqrt(circle.squared), noise, blur) * circle.arc, None)
 
-    return _priced(scene, sensors, lights, along.quantity, line_variance, along.squared.mean(-1), centre, fall_off=True)
+    return _evaluated(
+        scene, sensors, lights, along.measurand, line_variance, along.squared.mean(-1), centre, fall_off=True
+    )
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ class _Along:
     distance from the edge's first end, ``length`` the used length: px, the last two with a last axis of size 1.
     """
 
-    quantity: Quantity
+    measurand: Measurand
     t: np.ndarray
     middle: np.ndarray
     length: np.ndarray
@@ -163,7 +167,7 @@ class _Along:
     @classmethod
     def of(cls, scene: Scene, sensors: np.ndarray, lights: np.ndarray, *, trimmed: bool) -> _Along:
         sensors, lights = np.asarray(sensors, float), np.asarray(lights, float)
-        known = quantity(scene, sensors)
+        known = measurand(scene, sensors)
         view = known.view
         whole = np.where(view.lengths > 0, view.lengths, np.nan)[..., None]  # an edge seen end-on has no direction
         trims = used_trims(scene, view, sensors, lights, trimmed=trimmed)
@@ -213,10 +217,10 @@ def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: fl
     return np.einsum("...i,...ij,...j->...", weighted, kernel, weighted)
 
 
-def _priced(
-    scene, sensors, lights, known: Quantity, line_variance, mean_square, centre_covariance, *, fall_off
-) -> Priced:
-    """From the lines' and the centres' errors to the quantity's."""
+def _evaluated(
+    scene, sensors, lights, known: Measurand, line_variance, mean_square, centre_covariance, *, fall_off
+) -> Evaluated:
+    """From the lines' and the centres' errors to the measurand's."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         parts = line_variance(known.offset, known.tilt)
         usable = known.view.visible & np.isfinite(parts)
@@ -232,4 +236,4 @@ def _priced(
         variance = np.where(np.isfinite(variance) & np.isfinite(known.value), variance, np.inf)
         in_object = variance / known.scale**2
     in_object = np.where(np.isfinite(in_object), in_object, np.inf)
-    return Priced(known, variance, in_object, line_variance, np.sqrt(mean_square), tuple(centres))
+    return Evaluated(known, variance, in_object, line_variance, np.sqrt(mean_square), tuple(centres))

@@ -1,4 +1,4 @@
-"""Moments of the paper's weighted edge points along each edge, the part of its price that takes all the time.
+"""Moments of the paper's weighted edge points along each edge, the part of its model that takes all the time.
 
 On a convex diffuse solid a point's weight is a number an edge over r^2, r its distance from the light, and its place
 in the image is a fraction tau z_B / z of the edge, z its depth. So r^2 depends on the light alone, z on the sensor

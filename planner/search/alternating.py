@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.search.exhaustive import price_pairs
+from planner.search.exhaustive import evaluate_pairs
 from planner.search.viewing import ViewingSpace
 from scenes import Pose, Scene
 
@@ -35,7 +35,7 @@ class Partial:
 
 
 def alternate(
-    scene: Scene, sensors: ViewingSpace, lights: ViewingSpace, start: np.ndarray, price: str, objective: str,
+    scene: Scene, sensors: ViewingSpace, lights: ViewingSpace, start: np.ndarray, model: str, objective: str,
     first_light: np.ndarray | None = None,
 ) -> Partial:  # fmt: skip
     """The paper's procedure FindSensorLight for one set of required edges.
@@ -58,7 +58,7 @@ def alternate(
 
         def value(indices: np.ndarray, moving=moving, fixed=fixed) -> np.ndarray:
             poses = {moving: spaces[moving].poses[indices], fixed: spaces[fixed].poses[[at[fixed]] * len(indices)]}
-            return price_pairs(scene, poses["sensor"], poses["light"], price, objective)
+            return evaluate_pairs(scene, poses["sensor"], poses["light"], model, objective)
 
         before = at[moving]
         at[moving], variance = _descend(spaces[moving], before, value)

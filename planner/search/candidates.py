@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.imaging.projection import direction
 from planner.prediction import in_units
-from planner.search.exhaustive import price_pairs
+from planner.search.exhaustive import evaluate_pairs
 from scenes import Pose
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
@@ -52,7 +52,9 @@ def candidates(options, results, objective: str, count: int = 10):
 
 def _candidate(option, sensor: np.ndarray, light: np.ndarray) -> Candidate:
     values = [
-        float(in_units(option.scene, price_pairs(option.scene, sensor[None], light[None], option.price, units)[0], 2))
+        float(
+            in_units(option.scene, evaluate_pairs(option.scene, sensor[None], light[None], option.model, units)[0], 2)
+        )
         for units in ("object", "image")
     ]
     return Candidate(Pose(*map(float, sensor)), Pose(*map(float, light)), option.scene.task.edges, *values)

@@ -13,7 +13,7 @@ from planner.search.separable import Separable, separable
 from scenes import Scene
 
 _ROWS = 256  # sensors at a time
-_PAIRS = 1 << 16  # pairs priced exactly at a time
+_PAIRS = 1 << 16  # pairs evaluated exactly at a time
 
 Report = Callable[[str, int, int], None]
 
@@ -30,8 +30,8 @@ class Found:
         Of the objective (rad^2 for an angle).
     pairs : int
         How many pairs were covered, and ...
-    priced : int
-        ... how many of them had to be priced one by one; the others are excluded by a lower bound.
+    evaluated : int
+        ... how many of them had to be evaluated one by one; the others are excluded by a lower bound.
     best_light : ndarray of int, shape (S,)
         For each sensor a light that is best or nearly so; -1 where none can measure.
     least : ndarray, shape (S,)
@@ -44,44 +44,44 @@ class Found:
     light: int
     variance: float
     pairs: int
-    priced: int
+    evaluated: int
     best_light: np.ndarray
     least: np.ndarray
     guaranteed: bool
 
 
-def is_separable(scene: Scene, price: str) -> bool:
+def is_separable(scene: Scene, model: str) -> bool:
     """Whether the fast search applies: convex, diffuse, straight edges only."""
     straight = all(name in {edge.name for edge in scene.solid.edges} for name in scene.task.edges)
-    return scene.solid.is_convex and scene.material.is_diffuse and straight and price in ("paper", "calibrated")
+    return scene.solid.is_convex and scene.material.is_diffuse and straight and model in ("paper", "calibrated")
 
 
 def exhaustive(
-    scene: Scene, sensors: np.ndarray, lights: np.ndarray, price: str, objective: str,
+    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str,
     constraints: Constraints | None = None, report: Report | None = None,
 ) -> Found:  # fmt: skip
     """Search all pairs of sensors (S, 2) and lights (L, 2), degrees.
 
     For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
-    not exceed the best variance known are priced. Otherwise every pair is priced.
+    not exceed the best variance known are evaluated. Otherwise every pair is evaluated.
     """
-    search = _by_bound if is_separable(scene, price) else _one_by_one
-    return search(scene, sensors, lights, price, objective, constraints, report or (lambda *_: None))
+    search = _by_bound if is_separable(scene, model) else _one_by_one
+    return search(scene, sensors, lights, model, objective, constraints, report or (lambda *_: None))
 
 
-def price_pairs(scene: Scene, sensors, lights, price: str, objective: str) -> np.ndarray:
+def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str) -> np.ndarray:
     """Variance of pairs (n, 2), (n, 2), in chunks."""
     values = np.empty(len(sensors))
     size = _PAIRS // 8
     for at in range(0, len(sensors), size):
         part = slice(at, at + size)
-        priced = evaluator(price)(scene, sensors[part], lights[part])
-        values[part] = priced.variance if objective == "image" else priced.variance_object
+        evaluated = evaluator(model)(scene, sensors[part], lights[part])
+        values[part] = evaluated.variance if objective == "image" else evaluated.variance_object
     return values
 
 
-def _by_bound(scene, sensors, lights, price, objective, constraints, report) -> Found:
-    table = separable(scene, sensors, lights, price, objective)
+def _by_bound(scene, sensors, lights, model, objective, constraints, report) -> Found:
+    table = separable(scene, sensors, lights, model, objective)
     least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
     done = 0
     for rows, which, bound in _blocks(table, scene, sensors, lights, constraints):
@@ -93,21 +93,21 @@ def _by_bound(scene, sensors, lights, price, objective, constraints, report) -> 
     best[~np.isfinite(least)] = -1
     order = np.argsort(least)[: max(256, len(least) // 64)]
     order = order[np.isfinite(least[order])]
-    values = price_pairs(scene, sensors[order], lights[best[order]], price, objective)
+    values = evaluate_pairs(scene, sensors[order], lights[best[order]], model, objective)
     state = _Best.of(order, best[order], values)
-    priced = len(order)
+    evaluated = len(order)
     wanted = least <= state.variance
     for rows, which, bound in _blocks(table, scene, sensors, lights, constraints, wanted):
         hit = np.argwhere(bound <= state.variance)
         for at in range(0, len(hit), _PAIRS):
             some = hit[at : at + _PAIRS]
             s, k = table.sensors[rows[some[:, 0]]], which[some[:, 1]]
-            state = state.better(s, k, price_pairs(scene, sensors[s], lights[k], price, objective))
-        priced += len(hit)
+            state = state.better(s, k, evaluate_pairs(scene, sensors[s], lights[k], model, objective))
+        evaluated += len(hit)
         done += len(rows)
         report("exact", done, 2 * len(table.sensors))
     return Found(
-        state.sensor, state.light, state.variance, len(sensors) * len(lights), priced, best, least, guaranteed=True
+        state.sensor, state.light, state.variance, len(sensors) * len(lights), evaluated, best, least, guaranteed=True
     )
 
 
@@ -128,14 +128,14 @@ def _blocks(table: Separable, scene, sensors, lights, constraints, wanted=None):
             yield block, columns, bound
 
 
-def _one_by_one(scene, sensors, lights, price, objective, constraints, report) -> Found:
+def _one_by_one(scene, sensors, lights, model, objective, constraints, report) -> Found:
     least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
-    evaluate = evaluator(price)
+    evaluate = evaluator(model)
     size = max(1, 20_000 // max(len(lights), 1))
     for at in range(0, len(sensors), size):
         part = sensors[at : at + size]
-        priced = evaluate(scene, part[:, None], lights[None])
-        values = priced.variance if objective == "image" else priced.variance_object
+        evaluated = evaluate(scene, part[:, None], lights[None])
+        values = evaluated.variance if objective == "image" else evaluated.variance_object
         if constraints is not None and constraints.on_pairs:
             values = np.where(constraints.pairs(scene, part[:, None], lights[None]), values, np.inf)
         best[at : at + size] = values.argmin(1)

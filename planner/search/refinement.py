@@ -7,12 +7,12 @@ from scipy.optimize import minimize
 
 from planner.imaging.projection import direction
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import price_pairs
+from planner.search.exhaustive import evaluate_pairs
 from scenes import InvalidInput, Scene
 
 
 def refine(
-    scene: Scene, sensor: np.ndarray, light: np.ndarray, price: str, objective: str, step_deg: float,
+    scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, objective: str, step_deg: float,
     constraints: Constraints | None = None, value=None,
 ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
     """Nelder-Mead from a pair of poses, in tangent planes of the sphere, so that the poles are places like others.
@@ -36,7 +36,7 @@ def refine(
     if value is None:
 
         def value(s, k):
-            return float(price_pairs(scene, s[None], k[None], price, objective)[0])
+            return float(evaluate_pairs(scene, s[None], k[None], model, objective)[0])
 
     def cost(x: np.ndarray) -> float:
         s, k = (shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4))))

@@ -11,7 +11,7 @@ from planner.imaging.projection import direction
 from planner.planning import Plan
 from planner.prediction import in_units
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import price_pairs
+from planner.search.exhaustive import evaluate_pairs
 from planner.search.refinement import refine, shifted
 from scenes import InvalidInput, Pose, Scene
 
@@ -126,7 +126,7 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
 
     def worst(sensor: np.ndarray, light: np.ndarray) -> float:
         pairs = _with_pose_errors(sensor, light, tolerances)
-        return max(float(price_pairs(world, *pairs, plan.price, plan.objective).max()) for world in worlds)
+        return max(float(evaluate_pairs(world, *pairs, plan.model, plan.objective).max()) for world in worlds)
 
     starts = [(plan.sensor, plan.light)]
     starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == plan.scene.task.edges]
@@ -136,9 +136,9 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
     if not np.isfinite(values[best]):
         raise InvalidInput("tolerances must leave a setting that can always measure, got none")
     sensor, light, value = refine(
-        plan.scene, *starts[best], plan.price, plan.objective, 2.0, constraints, value=worst
+        plan.scene, *starts[best], plan.model, plan.objective, 2.0, constraints, value=worst
     )  # fmt: skip
-    nominal = float(price_pairs(plan.scene, sensor[None], light[None], plan.price, plan.objective)[0])
+    nominal = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, plan.objective)[0])
     moves = tuple(
         _move(plan, name, sign * getattr(tolerances, name), constraints) for name in names for sign in (-1, 1)
     )
@@ -167,11 +167,11 @@ def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Toleran
 def _move(plan: Plan, name: str, by: float, constraints: Constraints | None) -> Move:
     world = altered(plan.scene, {name: 1 + by})
     sensor, light = (np.array(list(pose)) for pose in plan.poses)
-    here = float(price_pairs(world, sensor[None], light[None], plan.price, plan.objective)[0])
-    before = float(price_pairs(plan.scene, sensor[None], light[None], plan.price, plan.objective)[0])
+    here = float(evaluate_pairs(world, sensor[None], light[None], plan.model, plan.objective)[0])
+    before = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, plan.objective)[0])
     if not np.isfinite(here):
         return Move(name, 1 + by, np.inf, np.inf, np.nan, np.nan)
-    there = refine(world, sensor, light, plan.price, plan.objective, 1.0, constraints)
+    there = refine(world, sensor, light, plan.model, plan.objective, 1.0, constraints)
     apart = [
         float(np.degrees(np.arccos(np.clip(direction(a) @ direction(b), -1, 1))))
         for a, b in zip((sensor, light), there[:2], strict=True)

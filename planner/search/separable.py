@@ -1,9 +1,9 @@
 """A lower bound of the variance of all sensor x light pairs that is one matrix product.
 
 On a convex diffuse solid an edge's contrast is K / r (or K / r^3 with fall-off): K depends on the light and on which
-faces the sensor sees, r on the light and the place along the edge. For the paper's price the line's variance is a
+faces the sensor sees, r on the light and the place along the edge. For the paper's model the line's variance is a
 convex function of the weights K^2 / r^2, so it lies above its tangent at equal weights, which is linear in 1 / r^2.
-The calibrated price is linear in r^6 itself. Both are then, edge by edge, a sum of products (sensor) x (light).
+The calibrated model is linear in r^6 itself. Both are then, edge by edge, a sum of products (sensor) x (light).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.measurand import Quantity, quantity
+from planner.features.measurand import Measurand, measurand
 from planner.features.projected_edges import end_depths, image_fractions
 from planner.imaging.contrast import squared_distance, step_on_unit_sphere
 from planner.imaging.projection import direction, facing
@@ -59,24 +59,24 @@ class Separable:
         return part.reshape(len(part), -1).astype(np.float32) @ lights
 
 
-def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, price: str, objective: str) -> Separable:
+def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str) -> Separable:
     """Set up the bound for a convex diffuse solid and a task of straight edges.
 
     Parameters
     ----------
     sensors, lights : ndarray, shape (n, 2), (m, 2)
         Poses, degrees.
-    price : {"paper", "calibrated"}
+    model : {"paper", "calibrated"}
     objective : {"image", "object"}
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        known = quantity(scene, sensors)
-        make = _paper if price == "paper" else _calibrated
+        known = measurand(scene, sensors)
+        make = _paper if model == "paper" else _calibrated
         sensor_part, good = make(scene, sensors, known)
         if objective == "object":
             sensor_part = sensor_part / known.scale[:, None, None] ** 2
     good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2))
-    light_part = _light_part(scene, known.view.names, lights, price)
+    light_part = _light_part(scene, known.view.names, lights, model)
     slack = 1 - _MARGIN * np.sign(sensor_part * light_part.mean(0))  # less where it adds, more where it takes away
     seen = facing(scene.solid, scene.camera.distance * direction(sensors[good]))
     kinds, classes = np.unique(seen, axis=0, return_inverse=True)
@@ -99,9 +99,9 @@ def _lagrange(at: np.ndarray) -> np.ndarray:
     return np.stack(parts, -1)
 
 
-def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, price: str) -> np.ndarray:
+def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, model: str) -> np.ndarray:
     """What an edge's bound takes from the light, shape (L, E, k)."""
-    if price == "paper":
+    if model == "paper":
         points = np.linspace(0, 1, PAPER_POINTS)
         inverse = 1 / squared_distance(scene, names, points, lights)
         mean = inverse.mean(-1, keepdims=True)
@@ -112,7 +112,7 @@ def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, price:
     return np.concatenate([np.ptp(cubes, axis=-1)[..., None] ** 2, sixth], -1)
 
 
-def _paper(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.ndarray, np.ndarray]:
+def _paper(scene: Scene, sensors: np.ndarray, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
     """Tangent at equal weights: 2 sum h^2 - sum h^2 w, h the weight of each point's error in A d + B theta."""
     names, lengths = known.view.names, known.view.lengths[..., None]
     fractions = np.linspace(0, 1, PAPER_POINTS)
@@ -128,7 +128,7 @@ def _paper(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.ndarr
     return part * PAPER_KAPPA2 * scene.noise.sigma**2, (lengths > 0).all((-1, -2))
 
 
-def _influence(u: np.ndarray, known: Quantity, s: slice, points: np.ndarray | None = None) -> np.ndarray:
+def _influence(u: np.ndarray, known: Measurand, s: slice, points: np.ndarray | None = None) -> np.ndarray:
     """h^2 at places u (px) for the unweighted line through ``points`` (px; u itself when not given)."""
     points = u if points is None else points
     mean = points.mean(-1, keepdims=True)
@@ -136,7 +136,7 @@ def _influence(u: np.ndarray, known: Quantity, s: slice, points: np.ndarray | No
     return (a / points.shape[-1] + (b - a * mean) * (u - mean) / ((points - mean) ** 2).sum(-1, keepdims=True)) ** 2
 
 
-def _calibrated(scene: Scene, sensors: np.ndarray, known: Quantity) -> tuple[np.ndarray, np.ndarray]:
+def _calibrated(scene: Scene, sensors: np.ndarray, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of r^6 at the interpolation's nodes; the first takes the square of the range of r^3."""
     scale = scene.locator.scale_px
     per_point = kappa2(scale, scene.camera.blur_px) * scene.noise.variance

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.features.projected_edges import outline, straight
+from planner.features.projected_edges import projected_edges, straight
 from planner.imaging.projection import direction, edge_points, facing, project
 from planner.models.locator import edge_blur
 from render.build import polariser_axes
@@ -119,7 +119,7 @@ def lever(scene: Scene, poses: Poses) -> np.ndarray:
     """
     if not all(isinstance(feature, Corner) for feature in scene.task.corners) or scene.task.kind != "distance":
         return np.full((len(poses.sensors), len(straight(scene))), 2.0)
-    view = outline(scene, poses.sensors)
+    view = projected_edges(scene, poses.sensors)
     along = view.ends[..., 1, :] - view.ends[..., 0, :]
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     normals = np.stack([-along[..., 1], along[..., 0]], -1)
@@ -163,12 +163,12 @@ def _levels(scene: Scene, points: np.ndarray, faces: np.ndarray, poses: Poses, f
     for sensor, light in zip(poses.sensors, poses.lights, strict=True):
         places = scene.camera.distance * direction(sensor), scene.light.distance * direction(light)
         (to_sensor, _), (to_light, distance) = (_towards(points, place) for place in places)
-        swing, analyser = polariser_axes(scene, Pose(*sensor), Pose(*light))
-        swing = None if swing is None else polarised_across(NUMPY, tuple(swing), to_light)
+        polarisation, analyser = polariser_axes(scene, Pose(*sensor), Pose(*light))
+        polarisation = None if polarisation is None else polarised_across(NUMPY, tuple(polarisation), to_light)
         analyser = None if analyser is None else polarised_across(NUMPY, tuple(analyser), to_sensor)
         with np.errstate(all="ignore"):
             level = scene.camera.exposure * brightness(
-                NUMPY, material, index, normal, to_light, to_sensor, swing, analyser
+                NUMPY, material, index, normal, to_light, to_sensor, polarisation, analyser
             )
         level = level * (scene.light.distance / distance) ** 2 if fall_off else level
         found.append(np.where(facing(scene.solid, places[0])[faces][..., None], level, 0.0))

@@ -69,7 +69,7 @@ class SpecularLobe(Effect):
 
 
 class Polarisation(Effect):
-    """Light that swings in one direction: J_parallel and J_perpendicular instead of 1/2 each."""
+    """Linearly polarised light: J_parallel and J_perpendicular instead of 1/2 each."""
 
     name = "polarisation"
     cost = 1.2

@@ -9,7 +9,7 @@ import scenes
 from tests.benchmarks import search as benchmark
 from tests.scalar import variance_evaluate
 
-_SAMPLE = 100  # directions that the scalar version prices; it is the same work for each that can be seen
+_SAMPLE = 100  # directions that the scalar version models; it is the same work for each that can be seen
 
 
 def compare() -> None:
@@ -27,7 +27,7 @@ def compare() -> None:
         fast = []
         for _ in range(5):
             began = time.process_time()
-            values = planner.variance_map(task1, **fixed, space=space, price="paper", objective="image")
+            values = planner.variance_map(task1, **fixed, space=space, model="paper", objective="image")
             fast.append(time.process_time() - began)
         finite = np.isfinite(reference)
         off = np.abs(values[picked][finite] / np.array(reference)[finite] - 1).max()

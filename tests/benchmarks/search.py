@@ -10,7 +10,7 @@ import numpy as np
 
 import planner
 import scenes
-from planner.search.exhaustive import exhaustive, price_pairs
+from planner.search.exhaustive import evaluate_pairs, exhaustive
 from planner.search.viewing import ViewingSpace, local_minima
 
 PAPER_PAIR = np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]])
@@ -30,33 +30,33 @@ def maps(scene: scenes.Scene) -> None:
     """Processor time of one full map, the least of five."""
     space = ViewingSpace()
     print(f"One map of {len(space)} directions, {scene.name}, processor seconds (all threads)")
-    for price in ("paper", "calibrated"):
+    for model in ("paper", "calibrated"):
         for fixed in ({"sensor": (40, 41)}, {"light": (4, 27)}):
             seconds = []
             for _ in range(5):
                 began = time.process_time()
-                planner.variance_map(scene, **fixed, space=space, price=price)
+                planner.variance_map(scene, **fixed, space=space, model=model)
                 seconds.append(time.process_time() - began)
-            print(f"  {price:10s} {next(iter(fixed))} fixed: {min(seconds):.3f}")
+            print(f"  {model:10s} {next(iter(fixed))} fixed: {min(seconds):.3f}")
 
 
 def searches(scene: scenes.Scene) -> None:
     """Exhaustive searches of the upper hemisphere."""
-    print("\nAll pairs of the upper hemisphere; 'priced' of them one by one, the others excluded by a lower bound")
+    print("\nAll pairs of the upper hemisphere; 'evaluated' of them one by one, the others excluded by a lower bound")
     print(
-        "  step  price       units   pairs      priced  seconds  peak GiB  sensor          light           to paper's"
+        "  step  model       units   pairs      evaluated  seconds  peak GiB  sensor         light          to paper's"
     )
     for step in (4.0, 2.0, 1.0, 0.5):
         poses = ViewingSpace(step, (0, 90)).poses
-        for price in ("paper", "calibrated"):
+        for model in ("paper", "calibrated"):
             for units in ("image", "object"):
                 began = time.perf_counter()
-                found = exhaustive(scene, poses, poses, price, units)
+                found = exhaustive(scene, poses, poses, model, units)
                 seconds = time.perf_counter() - began
                 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1 if sys.platform == "darwin" else 1024)
-                there = price_pairs(scene, *PAPER_PAIR, price, units)[0]
+                there = evaluate_pairs(scene, *PAPER_PAIR, model, units)[0]
                 print(
-                    f"  {step:4g}  {price:10s}  {units:6s}  {found.pairs:9.3g}  {found.priced:6d}  {seconds:7.2f}"
+                    f"  {step:4g}  {model:10s}  {units:6s}  {found.pairs:9.3g}  {found.evaluated:6d}  {seconds:7.2f}"
                     f"  {peak / 1024:8.2f}  {_pose(poses[found.sensor]):14s}  {_pose(poses[found.light]):14s}"
                     f"  {100 * (found.variance / there - 1):+.1f} %"
                 )
@@ -67,12 +67,12 @@ def minima(scene: scenes.Scene) -> None:
     space = ViewingSpace(1.0, (0, 90))
     print("\nLocal minima of the maps over the upper hemisphere, image units (the paper: convex, one minimum)")
     for fixed in ({"sensor": (40, 41)}, {"sensor": (30, 135)}, {"light": (4, 27)}, {"light": (14, 303)}):
-        for price in ("paper", "calibrated"):
-            values = planner.variance_map(scene, **fixed, space=space, price=price, objective="image")
+        for model in ("paper", "calibrated"):
+            values = planner.variance_map(scene, **fixed, space=space, model=model, objective="image")
             found = local_minima(space, values)
             deep = (values[found] < 1.1 * values[found[0]]).sum()
             role, pose = next(iter(fixed.items()))
-            print(f"  {role} at {_pose(pose)}, {price}: {len(found)}, {deep} of them within 10 % of the least")
+            print(f"  {role} at {_pose(pose)}, {model}: {len(found)}, {deep} of them within 10 % of the least")
 
 
 def table_1(scene: scenes.Scene, part1: scenes.Scene) -> None:
@@ -80,7 +80,7 @@ def table_1(scene: scenes.Scene, part1: scenes.Scene) -> None:
     ice = [s.paper_ice for s in scene.settings]
     ours = [planner.predict(scene, s.sensor, s.light, "paper").variance_px2 for s in scene.settings]
     scale = float(np.median(np.array(ice) / ours))
-    print("\nTable 1: the paper's search and its price by ours (one free factor, from Table 3)")
+    print("\nTable 1: the paper's search and its model by ours (one free factor, from Table 3)")
     for sensor, light, printed in TABLE_1:
         value = scale * planner.predict(part1, sensor, light, "paper").variance_px2
         off = value / printed - 1

@@ -1,4 +1,4 @@
-"""Spoilt scene files, mesh files and images, by the thousand: ``python -m tests.hard.fuzz [--count 10000] [--seed 1]``.
+"""Corrupted scene, mesh and image files by the thousand: ``python -m tests.hard.fuzz [--count 10000] [--seed 1]``.
 
 Every input is read as the commands read it, and what can be read is predicted and measured. Each must end, within ten
 seconds of the processor and 1 GiB, in an answer or in `scenes.InvalidInput` with one line; anything else, a warning
@@ -91,7 +91,7 @@ def peak_memory() -> int:
 
 
 def _scene(rng: np.random.Generator, folder: Path) -> str:
-    """A bundled scene file with one to three things spoilt."""
+    """A bundled scene file with one to three things corrupted."""
     source = rng.choice(sorted(BUNDLED.glob("*.toml")))
     data = source.read_bytes()
     for _ in range(rng.integers(1, 4)):
@@ -100,7 +100,7 @@ def _scene(rng: np.random.Generator, folder: Path) -> str:
 
 
 def _mesh(rng: np.random.Generator, folder: Path) -> str:
-    """A bundled scene whose mesh file is spoilt."""
+    """A bundled scene whose mesh file is corrupted."""
     name = str(rng.choice(["bracket.obj", "plate.ply", "wedge.stl"]))
     data = (BUNDLED / name).read_bytes()
     if rng.random() < 0.5:
@@ -132,7 +132,7 @@ def _use_scene(rng: np.random.Generator, path: Path, folder: Path) -> str:
 
 
 def _image(rng: np.random.Generator, folder: Path) -> str:
-    """An image file of some kind, spoilt, then measured by itself and as a photograph of task1."""
+    """An image file of some kind, corrupted, then measured by itself and as a photograph of task1."""
     suffix = str(rng.choice(SUFFIXES))
     data = _encoded(rng, _picture(rng), suffix)
     if rng.random() < 0.8:

@@ -10,7 +10,7 @@ from validation.hard.case import EPSILON, TIGHT, judge
 CASES = catalogue()
 
 
-@pytest.mark.parametrize("case", CASES, ids=[f"{c.area}: {c.name}, {c.quantity}" for c in CASES])
+@pytest.mark.parametrize("case", CASES, ids=[f"{c.area}: {c.name}, {c.measurand}" for c in CASES])
 def test_right_or_refused(case):
     row = run(case)
     assert row.verdict in ("right", "refused"), row
@@ -25,7 +25,7 @@ def test_the_issue_is_covered():
     rows = [(case.area, case.name) for case in CASES]
     assert {area for area, _ in rows} >= {"reflectance", "planner", "fit", "measure"}
     assert len(rows) > 150
-    assert len({(c.area, c.name, c.quantity) for c in CASES}) == len(CASES)
+    assert len({(c.area, c.name, c.measurand) for c in CASES}) == len(CASES)
 
 
 @pytest.mark.parametrize(

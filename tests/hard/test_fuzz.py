@@ -12,7 +12,7 @@ from validation import picture_file
 def test_400_spoilt_inputs(tmp_path, capfd):
     before = fuzz.peak_memory()
     found = fuzz.run(400, seed=20261121, folder=tmp_path)
-    capfd.readouterr()  # what the image libraries say of spoilt files
+    capfd.readouterr()  # what the image libraries say of corrupted files
     assert not found.failures
     assert sum(found.outcomes.values()) == 400
     assert found.outcomes["scene: predicted"] > 10

@@ -84,7 +84,7 @@ def test_tan_of_an_angle_near_90_degrees_fails(cosine):
 
 def test_lengths_from_image_coordinates_fail_for_a_tiny_object(monkeypatch):
     """The image's middle added before the difference is taken, as it once was."""
-    case = planner_cases.price("", task1(object={"size": [1.25e-8, 7.5e-9, 2.5e-9]}), (30, 135), (15, 315), "paper")
+    case = planner_cases.variance("", task1(object={"size": [1.25e-8, 7.5e-9, 2.5e-9]}), (30, 135), (15, 315), "paper")
     assert run(case).verdict == "right"
     outline = import_module("planner.features.projected_edges")
     plain = outline.from_axis
@@ -94,7 +94,7 @@ def test_lengths_from_image_coordinates_fail_for_a_tiny_object(monkeypatch):
 
 def test_the_last_digit_counts():
     """A relative error of 10 x the bound of a well-conditioned case is caught, one of a few roundings is not."""
-    case = planner_cases.price("", task1(), (30, 135), (15, 315), "paper")
+    case = planner_cases.variance("", task1(), (30, 135), (15, 315), "paper")
     value = case.ours().value
     for factor, verdict in ((1 + 1e-9, "WRONG"), (1 + 8 * EPSILON, "right")):
         off = Case("planner", "", "", lambda factor=factor: Answer(value * factor), case.reference)

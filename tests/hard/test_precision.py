@@ -15,7 +15,7 @@ from validation.report.precision_figure import draw
 POSES = ViewingSpace(6, (0, 90)).poses
 
 
-def test_in_double_precision_it_is_the_planners_price(task1):
+def test_in_double_precision_it_is_the_planners_model(task1):
     lights = np.broadcast_to([15.0, 315.0], POSES.shape)
     expected = planner.variances(task1, POSES, [15.0, 315.0], "paper")
     found = paper_in(np.float64, task1, POSES, lights)

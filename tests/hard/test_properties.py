@@ -36,15 +36,15 @@ materials = st.fixed_dictionaries({
 diffuse = st.just({"refractive_index": 1.0, "extinction": 0.0})
 
 
-def predicted(scene, sensor, light, price):
+def predicted(scene, sensor, light, model):
     """Variance in both units, and the status."""
-    found = planner.predict(scene, sensor, light, price)
+    found = planner.predict(scene, sensor, light, model)
     return np.array([found.variance_px2, found.variance_cm2]), found.status
 
 
 @few
 @given(sizes, poses, poses, materials, log(-6, 6), log(-3, 3), st.sampled_from(PRICES))
-def test_variance_is_positive_or_infinite_with_a_reason(size, sensor, light, material, exposure, sigma, price):
+def test_variance_is_positive_or_infinite_with_a_reason(size, sensor, light, material, exposure, sigma, model):
     """Any object, material, exposure, noise and pose, both poles and the lower hemisphere included."""
     scene = task1(object={"size": size}, material=material, camera={"exposure": exposure}, noise={"sigma": sigma})
     try:
@@ -52,7 +52,7 @@ def test_variance_is_positive_or_infinite_with_a_reason(size, sensor, light, mat
             scene.check_pose(role, pose)
     except InvalidInput:  # in or on the object
         return
-    variances, status = predicted(scene, sensor, light, price)
+    variances, status = predicted(scene, sensor, light, model)
     assert (variances > 0).all()
     assert np.isfinite(variances).all() or status != "ok"
     assert status in ("ok", "not_visible", "short", "low_contrast", "ill_conditioned")
@@ -66,26 +66,26 @@ def test_the_same_for_the_solids_from_meshes(name, sensor, light):
     import scenes
 
     scene = scenes.load(name)
-    for price in ("paper", "calibrated"):
-        found = planner.predict(scene, sensor, light, price)
+    for model in ("paper", "calibrated"):
+        found = planner.predict(scene, sensor, light, model)
         assert found.variance_image > 0
         assert np.isfinite(found.variance_image) or found.status != "ok"
         assert not np.isnan([found.variance_image, found.variance_object, found.value_object]).any()
 
 
-def conditioned(scene, sensor, light, price):
+def conditioned(scene, sensor, light, model):
     """The variances; the example is dropped where a rounding of the poses alone would show in them."""
-    value, status = predicted(scene, sensor, light, price)
+    value, status = predicted(scene, sensor, light, model)
     nudge = 1 + 1e-9
-    moved, _ = predicted(scene, [nudge * a for a in sensor], [nudge * a for a in light], price)
+    moved, _ = predicted(scene, [nudge * a for a in sensor], [nudge * a for a in light], model)
     finite = np.isfinite(value)
     assume((finite == np.isfinite(moved)).all())
     assume((np.abs(moved[finite] / value[finite] - 1) < 1e-6).all())
     return value, status
 
 
-def same(scene, sensor, light, price, expected, status):
-    value, found = predicted(scene, sensor, light, price)
+def same(scene, sensor, light, model, expected, status):
+    value, found = predicted(scene, sensor, light, model)
     assert value == pytest.approx(expected, rel=RELATIVE, abs=0)
     assert found == status
 
@@ -102,68 +102,68 @@ def mirrored_block(scene):
 
 @few
 @given(*settings_of, st.floats(0, 360))
-def test_turning_everything_about_the_vertical(sensor, light, material, price, turn):
+def test_turning_everything_about_the_vertical(sensor, light, material, model, turn):
     scene = task1(material=material)
-    expected = conditioned(scene, sensor, light, price)
+    expected = conditioned(scene, sensor, light, model)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     old = scene.solid
     turned = Solid(old.vertex_names, old.vertices @ [[c, s, 0], [-s, c, 0], [0, 0, 1]], old.faces, old.edges)
     poses = [(polar, azimuth + turn) for polar, azimuth in (sensor, light)]
-    same(with_solid(scene, turned), *poses, price, *expected)
+    same(with_solid(scene, turned), *poses, model, *expected)
 
 
 @few
 @given(*settings_of)
-def test_reflection(sensor, light, material, price):
+def test_reflection(sensor, light, material, model):
     scene = task1(material=material)
-    expected = conditioned(scene, sensor, light, price)
-    same(mirrored_block(scene), *((polar, -azimuth) for polar, azimuth in (sensor, light)), price, *expected)
+    expected = conditioned(scene, sensor, light, model)
+    same(mirrored_block(scene), *((polar, -azimuth) for polar, azimuth in (sensor, light)), model, *expected)
 
 
 @few
 @given(*settings_of, log(-6, 6))
-def test_scaling_all_lengths(sensor, light, material, price, factor):
+def test_scaling_all_lengths(sensor, light, material, model, factor):
     """px^2 stay, cm^2 grow with the square."""
     scene = task1(material=material)
-    expected, status = conditioned(scene, sensor, light, price)
+    expected, status = conditioned(scene, sensor, light, model)
     larger = task1(
         material=material,
         object={"size": [factor * side for side in scene.object.size]},
         camera={"distance": factor * scene.camera.distance},
         light={"distance": factor * scene.light.distance},
     )
-    same(larger, sensor, light, price, expected * [1, factor**2], status)
+    same(larger, sensor, light, model, expected * [1, factor**2], status)
 
 
 @few
 @given(*settings_of)
-def test_relabelling_edges_and_swapping_the_vertices(sensor, light, material, price):
+def test_relabelling_edges_and_swapping_the_vertices(sensor, light, material, model):
     scene = task1(material=material)
-    expected = conditioned(scene, sensor, light, price)
+    expected = conditioned(scene, sensor, light, model)
     start, end = (c.model_copy(update={"edges": c.edges[::-1]}) for c in scene.task.corners)
     for task in (Task(start=start, end=end), Task(start=end, end=start)):
-        same(scene.model_copy(update={"task": task}), sensor, light, price, *expected)
+        same(scene.model_copy(update={"task": task}), sensor, light, model, *expected)
     old = scene.solid
     edges = tuple(replace(e, ends=e.ends[::-1], faces=e.faces[::-1]) for e in old.edges)
-    same(with_solid(scene, Solid(old.vertex_names, old.vertices, old.faces, edges)), sensor, light, price, *expected)
+    same(with_solid(scene, Solid(old.vertex_names, old.vertices, old.faces, edges)), sensor, light, model, *expected)
 
 
 @few
 @given(*settings_of, log(-9, 9))
-def test_scaling_intensity_and_noise_together(sensor, light, material, price, factor):
+def test_scaling_intensity_and_noise_together(sensor, light, material, model, factor):
     scene = task1(material=material, noise={"bits": None})
-    expected = conditioned(scene, sensor, light, price)
+    expected = conditioned(scene, sensor, light, model)
     camera, noise = {"exposure": factor * scene.camera.exposure}, {"sigma": factor * scene.noise.sigma, "bits": None}
-    same(task1(material=material, camera=camera, noise=noise), sensor, light, price, *expected)
+    same(task1(material=material, camera=camera, noise=noise), sensor, light, model, *expected)
 
 
 @few
 @given(*settings_of, log(0, 6))
-def test_more_light_never_increases_the_variance(sensor, light, material, price, factor):
+def test_more_light_never_increases_the_variance(sensor, light, material, model, factor):
     scene = task1(material=material)
-    before, _ = predicted(scene, sensor, light, price)
+    before, _ = predicted(scene, sensor, light, model)
     brighter = task1(material=material, camera={"exposure": factor * scene.camera.exposure})
-    after, _ = predicted(brighter, sensor, light, price)
+    after, _ = predicted(brighter, sensor, light, model)
     assert (after <= before * (1 + RELATIVE)).all()
 
 

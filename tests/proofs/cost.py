@@ -29,7 +29,7 @@ def main(
     scene: Annotated[str, typer.Argument(help="A bundled scene or a TOML file.")] = "task1",
     accuracy: Annotated[list[float], typer.Option(help="To be asked for; may be repeated.")] = _ACCURACIES,
     budget: Annotated[list[str], typer.Option(help="To be asked for; may be repeated.")] = _BUDGETS,
-    hand: Annotated[bool, typer.Option(help="Also time fixed knobs, the rays swept, for each accuracy.")] = True,
+    hand: Annotated[bool, typer.Option(help="Also time fixed parameters, the rays swept, for each accuracy.")] = True,
 ) -> None:
     """Print asked-for and reached half-widths and seconds."""
     print(f"{scene}\n" + "".join(f"{name:>16}" for name in _COLUMNS), flush=True)
@@ -79,7 +79,7 @@ def _budget(scene: str, text: str) -> None:
 
 
 def _by_hand(loaded: campaign.Campaign, accuracy: float) -> float:
-    """Seconds of the fastest of fixed knobs that reach the accuracy."""
+    """Seconds of the fastest of fixed parameters that reach the accuracy."""
     took = []
     for count in _SWEPT:
         began = time.perf_counter()

@@ -64,7 +64,7 @@ def same(first: Path, second: Path) -> tuple[bool, str]:
 
 _NAMES = ("clean settings", "predictions", "arrays of distances", "runs of failures", "chunks")
 _QUERIES = (
-    "SELECT setting, image, prices, trouble FROM setting ORDER BY setting",
+    "SELECT setting, image, predicted, trouble FROM setting ORDER BY setting",
     "SELECT * FROM propagated ORDER BY setting, method",
     "SELECT * FROM distance ORDER BY setting, chunk, method",
     "SELECT * FROM failure ORDER BY setting, chunk, method, image",

@@ -89,7 +89,7 @@ def test_sharp_corner_is_trimmed_by_its_angle(degrees, limit):
 
 
 def test_flat_corner_is_ill_conditioned():
-    """Edges that meet at 179 degrees: the corner cannot be told along them."""
+    """Edges that meet at 179 degrees: the corner cannot be reported along them."""
     bend = 50 * np.sin(np.radians(0.5))
     corners = np.array([[20.0, 30.0], [70.0, 30.0 - bend], [120.0, 30.0], [120.0, 80.0], [20.0, 80.0]])
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
@@ -158,7 +158,7 @@ def test_edge_that_leaves_the_image(estimator, limit):
 def test_second_edge_too_near_is_clutter(task1):
     """Sensor (12, 45): the side faces are thin slivers along two of the required edges."""
     found = measure.distance(np.zeros((240, 256)), task1, (12, 225))
-    frames = prepared(layout_of(task1, Pose(12, 225)), "gradient", 12.0).frames
+    frames = prepared(layout_of(task1, Pose(12, 225)), "gradient", 12.0).calipers
     assert status.CLUTTER in {frame.status for frame in frames}
     assert found.status == status.LOW_CONTRAST
 

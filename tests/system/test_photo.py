@@ -44,14 +44,14 @@ def test_found_and_measured(corners, rng, contrast, background, blur):
 
 
 def test_quantities_and_their_errors(corners, rng):
-    """Sides, diagonals and angles of 100 photographs: standard deviation as told (standard error 7 %)."""
+    """Sides, diagonals and angles of 100 photographs: standard deviation as reported (standard error 7 %)."""
     clean = polygon_image(corners, SHAPE, 0.7, 100.0, 20.0)
     runs = [measure.measure_quadrilateral(clean + 2 * rng.standard_normal(SHAPE), "gradient") for _ in range(100)]
-    values = np.array([[quantity.value for quantity in run.quantities] for run in runs])
-    told = np.array([[quantity.sigma for quantity in run.quantities] for run in runs]).mean(0)
-    assert [quantity.unit for quantity in runs[0].quantities] == ["px"] * 6 + ["deg"] * 4
+    values = np.array([[quantity.value for quantity in run.measurands] for run in runs])
+    reported = np.array([[quantity.sigma for quantity in run.measurands] for run in runs]).mean(0)
+    assert [quantity.unit for quantity in runs[0].measurands] == ["px"] * 6 + ["deg"] * 4
     assert values[:, 6:].sum(1) == pytest.approx(np.full(100, 360.0))
-    ratio = values.std(0, ddof=1) / told
+    ratio = values.std(0, ddof=1) / reported
     assert np.abs(ratio - 1).max() < 4 / np.sqrt(2 * 99)
     assert np.abs(ratio / 1.5 - 1).max() > 4 / np.sqrt(2 * 99)
 

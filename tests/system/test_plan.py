@@ -8,10 +8,10 @@ import pytest
 
 import planner
 import scenes
-from planner.search.exhaustive import price_pairs
+from planner.search.exhaustive import evaluate_pairs
 from planner.search.robustness import altered
 from scenes import InvalidInput
-from validation import cli
+from validation.cli import main as cli
 
 
 def ice(monkeypatch, capsys, *arguments):
@@ -38,7 +38,7 @@ def test_json_and_pictures(monkeypatch, capsys, tmp_path):
 
 
 def test_table_one_of_the_paper(monkeypatch, capsys):
-    arguments = ("--search", "alternating", "--price", "paper", "--objective", "image")
+    arguments = ("--search", "alternating", "--model", "paper", "--objective", "image")
     code, out, _ = ice(monkeypatch, capsys, "plan", "task1_part1", *arguments)
     assert code == 0
     assert "Alternating search" in out
@@ -76,7 +76,7 @@ def test_robust_plan(task1):
     assert found.nominal <= found.worst <= found.plan_worst
     pair = (np.array([list(pose)]) for pose in (found.sensor, found.light))
     extreme = altered(glossy, {"roughness": 0.8, "noise": 1.1})
-    assert price_pairs(extreme, *pair, "calibrated", "object")[0] <= found.worst * (1 + 1e-9)
+    assert evaluate_pairs(extreme, *pair, "calibrated", "object")[0] <= found.worst * (1 + 1e-9)
     assert {move.input for move in found.moves} == {"roughness", "noise"}
     louder = next(move for move in found.moves if move.input == "noise" and move.factor > 1)
     noise = task1.noise

@@ -86,7 +86,7 @@ def _line_offsets(scene, sensor, image):
     """Offset of each fitted line at the middle of its edge, px."""
     tool = prepared(layout_of(scene, Pose(*sensor)), "gradient", 12.0)
     found = tool.estimate(image[None])
-    return (found.level + found.slope * [frame.length / 2 for frame in tool.frames])[0]
+    return (found.level + found.slope * [frame.length / 2 for frame in tool.calipers])[0]
 
 
 def test_same_seed_is_bit_identical(task1):

@@ -74,9 +74,9 @@ def test_coherent_term_is_that_of_the_complex_amplitudes(n, k):
     assert np.array(ours[:2]) == pytest.approx(np.array(fresnel(cosine, n, k)), abs=1e-12)
 
 
-def seen(material, light, sensor, swing=None, analyser=None):
+def seen(material, light, sensor, polarisation=None, analyser=None):
     up = (np.array(0.0), np.array(0.0), np.array(1.0))
-    axes = (None if axis is None else tuple(np.array(axis, float)) for axis in (swing, analyser))
+    axes = (None if axis is None else tuple(np.array(axis, float)) for axis in (polarisation, analyser))
     return float(brightness(NUMPY, material, plain(material), up, tuple(light), tuple(sensor), *axes))
 
 
@@ -86,7 +86,7 @@ def test_polarisation_in_the_plane_of_incidence():
     brewster = np.degrees(np.arctan(1.5))
     light, sensor = ray(brewster), ray(brewster, 180)
     parallel, across = np.cross([0, 1, 0], light), np.array([0, 1.0, 0])
-    values = [seen(mirror, light, sensor, swing) for swing in (parallel, across)]
+    values = [seen(mirror, light, sensor, polarisation) for polarisation in (parallel, across)]
     assert abs(values[0]) < 1e-12 * values[1]
     assert sum(values) / 2 == pytest.approx(seen(mirror, light, sensor), rel=1e-12)
 
@@ -96,16 +96,16 @@ def test_two_crossed_analysers_pass_everything_together(rng):
     first = np.cross(sensor, [0, 0, 1.0])
     first /= np.linalg.norm(first)
     pair = first, np.cross(sensor, first)
-    swing = np.cross(light, rng.normal(size=3))
-    swing /= np.linalg.norm(swing)
+    polarisation = np.cross(light, rng.normal(size=3))
+    polarisation /= np.linalg.norm(polarisation)
     for material in (METAL, GLASS):
-        for source in (None, swing):
+        for source in (None, polarisation):
             both = sum(seen(material, light, sensor, source, analyser) for analyser in pair)
             assert both == pytest.approx(seen(material, light, sensor, source), rel=1e-12)
 
 
 def test_crossed_polarisers_leave_half_of_the_diffuse_term():
-    """Face on, a mirror keeps the swing: the crossed analyser stops it, the parallel one passes all of it."""
+    """Face on, a mirror keeps the polarisation: the crossed analyser stops it, the parallel one passes all of it."""
     up = ray(0)
     diffuse = 0.5 * 0.6
     mirror = seen(GLASS, up, up) - diffuse

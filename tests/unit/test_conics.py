@@ -1,4 +1,4 @@
-"""The price of a circle's centre is what fitting an ellipse to points with the predicted errors gives."""
+"""The model of a circle's centre is what fitting an ellipse to points with the predicted errors gives."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_rim_is_measured_from_the_ellipses_own_centre():
 
 
 def test_centre_of_a_hole_by_fitting(rng):
-    """The paper price of the plate's hole is that of an ellipse fitted to points with the paper's errors."""
+    """The paper model of the plate's hole is that of an ellipse fitted to points with the paper's errors."""
     plate = scenes.load("plate")
     sensor, light = np.array([40.0, 30.0]), np.array([25.0, 100.0])
     seen = rim(plate, plate.solid.circle("c2"), sensor, light, fall_off=False)
@@ -42,8 +42,8 @@ def test_centre_of_a_hole_by_fitting(rng):
     points, sigma = np.stack([x, y], -1), 1 / np.sqrt(weight)
     keep = sigma < 1.0  # a point worse than a pixel is nearly no point, and its distance is not linear
     predicted = fisher_centre(seen, seen.squared / (PAPER_KAPPA2 * plate.noise.sigma**2) * 1.0, used)
-    priced = paper(plate, sensor, light)
-    assert priced.centres[0] == pytest.approx(predicted)
+    evaluated = paper(plate, sensor, light)
+    assert evaluated.centres[0] == pytest.approx(predicted)
     centres = [
         measure.fit_ellipse(
             points[keep] + sigma[keep, None] * rng.standard_normal((keep.sum(), 2)), sigma[keep] ** 2
@@ -51,4 +51,4 @@ def test_centre_of_a_hole_by_fitting(rng):
         for _ in range(COUNT)
     ]
     check(np.var(centres, axis=0, ddof=1), np.diag(predicted))
-    assert planner.predict(plate, sensor, light, "paper").variance_px2 == pytest.approx(priced.variance)
+    assert planner.predict(plate, sensor, light, "paper").variance_px2 == pytest.approx(evaluated.variance)

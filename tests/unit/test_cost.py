@@ -1,4 +1,4 @@
-"""Stopping rules, the cost model and the slopes of the knobs."""
+"""Stopping rules, the cost model and the slopes of the parameters."""
 
 import math
 
@@ -13,7 +13,7 @@ from validation.batch.stages import Stages
 from validation.cost import goal, interval
 from validation.cost.model import CostModel, Rendered, combined, qualities
 from validation.cost.parameter import slope
-from validation.cost.points import points_knob
+from validation.cost.points import points_parameter
 from validation.statistics import ratio_interval
 
 REPETITIONS = 2000
@@ -134,10 +134,10 @@ def test_stages_add_chunks_and_change_none():
 
 def test_slope_of_points_agrees_with_theory_and_gauss_beats_them():
     """On Task1: the trapezoid's error falls as points^-2, the paper's equal weights' as points^-1."""
-    knob = points_knob(Campaign.of(scenes.load("task1")).case(5))
-    for fit in knob.fits:
+    parameter = points_parameter(Campaign.of(scenes.load("task1")).case(5))
+    for fit in parameter.fits:
         assert fit.slope == pytest.approx(fit.theory, abs=0.1)
-    errors = {(row[0], row[1]): row[3] for row in knob.rows}
+    errors = {(row[0], row[1]): row[3] for row in parameter.rows}
     assert errors["Gauss-Legendre", 4] < 1e-4 * errors["trapezoid", 100]
     assert slope([1, 2, 4], [1, 4, 16]) == pytest.approx(2)
 

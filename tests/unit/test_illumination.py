@@ -137,10 +137,10 @@ def test_whole_viewing_space_without_nan_or_warning(name, task1, metal):
     if name == "glossy":
         scene = scene.model_copy(update={"light": scenes.Light(distance=100, polarisation_deg=30)})
     space = planner.ViewingSpace(4 if scene.solid.is_convex and scene.material.is_diffuse else 15)
-    for price in ("paper", "calibrated", "bound"):
+    for model in ("paper", "calibrated", "bound"):
         for objective in ("image", "object"):
             for fixed in ({"sensor": (90, 90)}, {"light": (15, 315)}):
-                values = planner.variance_map(scene, **fixed, space=space, price=price, objective=objective)
+                values = planner.variance_map(scene, **fixed, space=space, model=model, objective=objective)
                 assert not np.isnan(values).any()
                 assert (values > 0).all()
     hidden = np.flatnonzero(np.isinf(values))[:20]

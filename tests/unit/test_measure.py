@@ -57,13 +57,13 @@ def test_linear_response_against_central_differences(task1, estimator, tolerance
 
 def sample_variance(scene, image, sensor, estimator, rng, count=2000):
     """Sample variance of the distance, batch by batch; the mean variance that the images themselves tell."""
-    values, told = [], []
+    values, reported = [], []
     for _ in range(count // 50):
         noisy = image + scene.noise.sigma * rng.standard_normal((50, *image.shape))
         found = measure.distance(noisy, scene, sensor, estimator=estimator)
         values.append(found.value_px)
-        told.append(found.variance_px2)
-    return np.concatenate(values).var(ddof=1), np.concatenate(told).mean()
+        reported.append(found.variance_px2)
+    return np.concatenate(values).var(ddof=1), np.concatenate(reported).mean()
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +76,10 @@ def test_propagated_variance_and_its_negative_control(quiet, rng):
     """2000 images: the standard error of the ratio is 3.2 %; 1.3 x the prediction and 0 are 7 of them away."""
     image, _ = picture(quiet, (20, 100))
     predicted = measure.propagate(image, quiet, (20, 100))
-    empirical, told = sample_variance(quiet, image, (20, 100), "gradient", rng)
+    empirical, reported = sample_variance(quiet, image, (20, 100), "gradient", rng)
     within = 4 * np.sqrt(2 / 1999)
     assert abs(empirical / predicted.variance_px2 - 1) < within
-    assert abs(empirical / told - 1) < within
+    assert abs(empirical / reported - 1) < within
     assert abs(empirical / (1.3 * predicted.variance_px2) - 1) > within
     assert abs(empirical - 0) > within * predicted.variance_px2
     unit = np.concatenate([predicted.response.ravel()])
@@ -102,7 +102,7 @@ def test_canny_deviates_because_it_chooses_pixels(quiet, rng):
     for _ in range(40):
         noisy = image + quiet.noise.sigma * rng.standard_normal((50, *image.shape))
         lines = [fit_lines(edge.locate(noisy, mask)) for edge, mask in zip(canny, masks, strict=True)]
-        frozen.append(_distances(tool.frames, lines))
+        frozen.append(_distances(tool.calipers, lines))
     ratio = np.concatenate(frozen).var(ddof=1) / predicted
     assert abs(ratio - 1) < 4 * np.sqrt(2 / 1999)
     assert free / predicted > 1 + 4 * np.sqrt(2 / 1999)
@@ -129,7 +129,7 @@ def test_footprint_holds_every_pixel_that_matters(task1, rng):
     """Changing all other pixels changes nothing, for every estimator."""
     image, _ = picture(task1, SENSOR)
     image = image + rng.standard_normal(image.shape)
-    looked_at = measure.footprint(task1, SENSOR, None, measure.ESTIMATORS)
+    looked_at = measure.region_of_interest(task1, SENSOR, None, measure.ESTIMATORS)
     outside = np.where(looked_at, 0, 40 * rng.standard_normal(image.shape))
     for estimator in measure.ESTIMATORS:
         assert measure.distance(image + outside, task1, SENSOR, estimator=estimator).value_px == pytest.approx(

@@ -73,8 +73,8 @@ def test_corner_and_distance(rng, sine):
         assert abs(distance_variance(ends, np.stack([ours, ours])) - expected) <= 1e-12 * largest
 
 
-def exact_price(scene, sensor, light):
-    """The paper's price of a diffuse convex solid, all geometry in 50 digits."""
+def exact_model(scene, sensor, light):
+    """The paper's model of a diffuse convex solid, all geometry in 50 digits."""
     solid, camera = scene.solid, scene.camera
 
     def axes(pose):
@@ -122,13 +122,13 @@ def exact_price(scene, sensor, light):
     ("sensor", "light"),
     [((30, 135), (15, 315)), ((0, 0), (0, 0)), ((86, 333), (4, 28)), ((45, 41), (45, 41)), ((12, 48), (88, 200))],
 )
-def test_whole_price(task1, sensor, light):
+def test_whole_model(task1, sensor, light):
     """Face-on, grazing sensor, grazing light, light = view direction."""
-    exact = exact_price(task1, sensor, light)
+    exact = exact_model(task1, sensor, light)
     ours = paper(task1, np.array(sensor, float), np.array(light, float)).variance
     assert abs(mp.mpf(float(ours)) / exact - 1) < 1e-12
     fixed = planner.variance_map(
-        task1, sensor=sensor, space=_One(light), price="paper", objective="image"
+        task1, sensor=sensor, space=_One(light), model="paper", objective="image"
     )  # the fast sums of the maps
     assert abs(mp.mpf(float(fixed[0])) / exact - 1) < 1e-12
 

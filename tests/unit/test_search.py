@@ -6,7 +6,7 @@ import pytest
 import planner
 import scenes
 from planner.search.alternating import alternate
-from planner.search.exhaustive import _blocks, exhaustive, price_pairs
+from planner.search.exhaustive import _blocks, evaluate_pairs, exhaustive
 from planner.search.separable import separable
 from planner.search.viewing import ViewingSpace, local_minima
 from scenes import InvalidInput
@@ -28,7 +28,7 @@ def test_the_papers_viewing_space():
 @pytest.mark.parametrize("fixed", [{"sensor": (40, 41)}, {"light": (4, 27)}])
 def test_map_agrees_with_the_scalar_reference(task1, fixed):
     space = ViewingSpace(12)
-    ours = planner.variance_map(task1, **fixed, space=space, price="paper", objective="image")
+    ours = planner.variance_map(task1, **fixed, space=space, model="paper", objective="image")
     role, pose = next(iter(fixed.items()))
     pairs = [(pose, other) if role == "sensor" else (other, pose) for other in space.poses.tolist()]
     reference = np.array([variance_evaluate(task1, *pair) for pair in pairs])
@@ -37,15 +37,15 @@ def test_map_agrees_with_the_scalar_reference(task1, fixed):
     assert ours[np.isfinite(ours)] == pytest.approx(reference[np.isfinite(ours)], rel=1e-10)
 
 
-@pytest.mark.parametrize("price", ["paper", "calibrated"])
+@pytest.mark.parametrize("model", ["paper", "calibrated"])
 @pytest.mark.parametrize("objective", ["image", "object"])
 @pytest.mark.parametrize("name", ["task1", "wedge"])
-def test_exhaustive_search_against_every_pair(name, price, objective):
+def test_exhaustive_search_against_every_pair(name, model, objective):
     """The bound exceeds no variance, excludes nearly all pairs, and the optimum is that of all pairs one by one."""
     scene, poses = scenes.load(name), ViewingSpace(10, (0, 90)).poses
-    found = exhaustive(scene, poses, poses, price, objective)
-    exact = price_pairs(scene, *(a.reshape(-1, 2) for a in grid(poses)), price, objective).reshape(len(poses), -1)
-    table = separable(scene, poses, poses, price, objective)
+    found = exhaustive(scene, poses, poses, model, objective)
+    exact = evaluate_pairs(scene, *(a.reshape(-1, 2) for a in grid(poses)), model, objective).reshape(len(poses), -1)
+    table = separable(scene, poses, poses, model, objective)
     covered = 0
     for rows, columns, bound in _blocks(table, scene, poses, poses, None):
         assert (bound <= exact[np.ix_(table.sensors[rows], columns)]).all()
@@ -53,7 +53,7 @@ def test_exhaustive_search_against_every_pair(name, price, objective):
     assert covered >= np.isfinite(exact).sum()  # a pair without a bound is unmeasurable
     assert found.variance == pytest.approx(exact.min(), rel=1e-12)
     assert (found.sensor, found.light) == np.unravel_index(exact.argmin(), exact.shape)
-    assert found.priced < 0.05 * found.pairs
+    assert found.evaluated < 0.05 * found.pairs
     assert found.pairs == exact.size
 
 
@@ -66,7 +66,7 @@ def test_optima_of_the_paper(task1):
     """The paper's pair is no optimum: the true one is far better in image units, and elsewhere in object units."""
     poses = ViewingSpace(2, (0, 90)).poses
     image, thing = (exhaustive(task1, poses, poses, "paper", units) for units in ("image", "object"))
-    there = [price_pairs(task1, *(p[None] for p in PAPER), "paper", units)[0] for units in ("image", "object")]
+    there = [evaluate_pairs(task1, *(p[None] for p in PAPER), "paper", units)[0] for units in ("image", "object")]
     assert image.variance / there[0] - 1 < -0.41
     assert poses[image.sensor][0] > 78
     assert poses[thing.sensor] == pytest.approx([12, 48], abs=4)
@@ -82,16 +82,16 @@ def test_alternating_search_stops_where_no_neighbour_is_better():
     assert found.trace[0].fixed == "sensor"
     for i in space.neighbours(found.light):
         pair = space.poses[[found.sensor]], space.poses[[i]]
-        assert price_pairs(part1, *pair, "paper", "image")[0] >= found.variance
+        assert evaluate_pairs(part1, *pair, "paper", "image")[0] >= found.variance
     for i in space.neighbours(found.sensor):
         pair = space.poses[[i]], space.poses[[found.light]]
-        assert price_pairs(part1, *pair, "paper", "image")[0] >= found.variance
+        assert evaluate_pairs(part1, *pair, "paper", "image")[0] >= found.variance
 
 
 def test_first_row_of_table_1():
     """Sensor at (40, 41): the paper finds the light at (4, 27); nothing on our map is more than 5 % better."""
     part1, space = scenes.load("task1_part1"), ViewingSpace()
-    values = planner.variance_map(part1, sensor=(40, 41), space=space, price="paper", objective="image")
+    values = planner.variance_map(part1, sensor=(40, 41), space=space, model="paper", objective="image")
     best = space.poses[values.argmin()]
     assert best[0] <= 4
     there = planner.predict(part1, (40, 41), (4, 27), "paper").variance_px2
@@ -102,7 +102,7 @@ def test_the_search_space_has_more_than_one_minimum(task1):
     """The paper claims that either map is convex with one minimum; over its own grid both have several."""
     space = ViewingSpace(2, (0, 90))
     for fixed in ({"sensor": (40, 41)}, {"light": (4, 27)}):
-        values = planner.variance_map(task1, **fixed, space=space, price="paper", objective="image")
+        values = planner.variance_map(task1, **fixed, space=space, model="paper", objective="image")
         assert len(local_minima(space, values)) >= 3
 
 
@@ -137,7 +137,7 @@ def test_plans_of_hollow_and_round_objects(name, step, rng):
     assert found.prediction.variance_cm2 == pytest.approx(found.grid_variance, rel=1e-9)
     poses = ViewingSpace(step, (0, 90)).poses
     pairs = poses[rng.integers(len(poses), size=(2, 60))]
-    exact = price_pairs(scene, *pairs, "calibrated", "object")
+    exact = evaluate_pairs(scene, *pairs, "calibrated", "object")
     assert np.isfinite(exact).any()
     assert exact.min() >= found.grid_variance > 0
 

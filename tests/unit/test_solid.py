@@ -37,8 +37,8 @@ def test_the_block_from_a_file_gives_the_boxs_numbers(task1, tmp_path, suffix):
     BLOCK.mesh().export(path)
     read = as_mesh_scene(task1, path)
     for setting in task1.settings:
-        for price in ("paper", "calibrated", "bound"):
-            ours, theirs = (planner.predict(s, setting.sensor, setting.light, price) for s in (read, task1))
+        for model in ("paper", "calibrated", "bound"):
+            ours, theirs = (planner.predict(s, setting.sensor, setting.light, model) for s in (read, task1))
             assert ours.variance_px2 == pytest.approx(theirs.variance_px2, rel=1e-9)
             assert ours.variance_cm2 == pytest.approx(theirs.variance_cm2, rel=1e-9)
             assert ours.status == theirs.status

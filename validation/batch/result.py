@@ -64,7 +64,7 @@ class Row:
 class Validation:
     """The outcome of a run.
 
-    ``paper_scale`` is the free scale: the median of paper_ice / our paper price over all rows that have both.
+    ``paper_scale`` is the free scale: the median of paper_ice / our paper model over all rows that have both.
     ``refused`` tells of each setting without a row why, by its number. ``search`` repeats the paper's Table 1 with the
     same scale: (scene, sensor, light, paper, ours).
     """
@@ -115,7 +115,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     identity = store.fact("identity")
     indices, refused = [], {}
     for i in range(len(campaign)):
-        if store.prices(i):
+        if store.predicted(i):
             indices.append(i)
         else:
             refused[i] = store.trouble(i) or "not yet worked on"
@@ -152,26 +152,26 @@ def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float
     """The paper prints no unit of intensity; the median is deaf to the rows that do not fit."""
     if campaign.grid or campaign.sweep:
         return None
-    known = [(campaign.case(i).setting.paper_ice, store.prices(i)["paper"]) for i in indices]
+    known = [(campaign.case(i).setting.paper_ice, store.predicted(i)["paper"]) for i in indices]
     ratios = [ice / ours for ice, ours in known if ice and math.isfinite(ours)]
     return float(np.median(ratios)) if ratios else None
 
 
 def _row(case: Case, scale: float | None, store: RunFile) -> Row:
-    setting, price = case.setting, store.prices(case.index)
-    main, *classic = (_judged(case.index, method, price["value_px"], store) for method in methods(case.scene))
+    setting, model = case.setting, store.predicted(case.index)
+    main, *classic = (_judged(case.index, method, model["value_px"], store) for method in methods(case.scene))
     return Row(
         index=case.index,
         scene=case.scene.name,
         parameters=case.parameters,
-        value_px=price["value_px"],
+        value_px=model["value_px"],
         sensor=tuple(setting.sensor),
         light=tuple(setting.light),
         paper_ice=setting.paper_ice,
         paper_real=setting.paper_real,
-        paper=price["paper"] * (scale or 1.0),
-        calibrated=price["calibrated"],
-        bound=price["bound"],
+        paper=model["paper"] * (scale or 1.0),
+        calibrated=model["calibrated"],
+        bound=model["bound"],
         main=main,
         classic=tuple(classic),
     )

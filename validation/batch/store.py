@@ -20,7 +20,7 @@ _SCHEMA = """
 BEGIN IMMEDIATE;
 CREATE TABLE IF NOT EXISTS run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS setting (
-    setting INTEGER PRIMARY KEY, height INTEGER, width INTEGER, image BLOB, prices TEXT, seconds TEXT, trouble TEXT);
+    setting INTEGER PRIMARY KEY, height INTEGER, width INTEGER, image BLOB, predicted TEXT, seconds TEXT, trouble TEXT);
 CREATE TABLE IF NOT EXISTS propagated (
     setting INTEGER, method TEXT, variance_px2 REAL, value_px REAL, status TEXT, PRIMARY KEY (setting, method));
 CREATE TABLE IF NOT EXISTS chunk (
@@ -135,9 +135,9 @@ class RunFile:
         """Number of images measured so far."""
         return self._db.execute("SELECT COALESCE(SUM(count), 0) FROM chunk").fetchone()[0]
 
-    def prices(self, setting: int) -> dict[str, float] | None:
-        """Predictions that need no image, as `work.Clean.prices`; None if there are none yet."""
-        row = self._db.execute("SELECT prices FROM setting WHERE setting = ?", (setting,)).fetchone()
+    def predicted(self, setting: int) -> dict[str, float] | None:
+        """Predictions that need no image, as `work.Clean.predicted`; None if there are none yet."""
+        row = self._db.execute("SELECT predicted FROM setting WHERE setting = ?", (setting,)).fetchone()
         return json.loads(row[0]) if row and row[0] else None
 
     def trouble(self, setting: int) -> str | None:
@@ -173,7 +173,7 @@ class RunFile:
         return total
 
     def _add_clean(self, setting: int, clean: Clean) -> None:
-        row = setting, *clean.picture, json.dumps(clean.prices), json.dumps(clean.seconds)
+        row = setting, *clean.picture, json.dumps(clean.predicted), json.dumps(clean.seconds)
         self._db.execute("INSERT OR REPLACE INTO setting VALUES (?, ?, ?, ?, ?, ?, NULL)", row)
         rows = [(setting, method, *found) for method, found in clean.propagated.items()]
         self._db.executemany("INSERT OR REPLACE INTO propagated VALUES (?, ?, ?, ?, ?)", rows)

@@ -70,13 +70,13 @@ class Clean:
     picture : Picture
     propagated : dict
         Variance (px^2), distance in the image (px) and status, by method.
-    prices : dict
+    predicted : dict
         Variances that need no image, px^2 (``paper`` without its free scale), and the model's distance ``value_px``.
     """
 
     picture: Picture
     propagated: dict[str, tuple[float, float, str]]
-    prices: dict[str, float]
+    predicted: dict[str, float]
     seconds: dict[str, float]
 
 
@@ -173,9 +173,9 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     """Render a setting, and predict with and without its image."""
     clock = _Clock()
     scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
-    prices = {price: planner.predict(scene, sensor, light, price) for price in ("paper", "calibrated", "bound")}
-    numbers = {price: found.variance_px2 for price, found in prices.items()}
-    numbers["value_px"] = prices["calibrated"].value_px
+    predicted = {model: planner.predict(scene, sensor, light, model) for model in ("paper", "calibrated", "bound")}
+    numbers = {model: found.variance_px2 for model, found in predicted.items()}
+    numbers["value_px"] = predicted["calibrated"].value_px
     clock.lap("predict")
     image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
     clock.lap("render")
@@ -202,7 +202,7 @@ def measure_chunk(
     cv2.setNumThreads(1)  # workers share the cores among themselves
     clock = _Clock()
     scene, sensor = case.scene, case.setting.sensor
-    where = measure.footprint(scene, sensor)
+    where = measure.region_of_interest(scene, sensor)
     clock.lap("prepare")
     parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
     for batch, first in enumerate(range(0, count, _BATCH)):

@@ -59,7 +59,7 @@ def _finite(values: np.ndarray) -> list[float | None]:
 def _table(found: Calibration) -> Table:
     caption = (
         f"closed form of gradient: kappa^2 {found.closed_kappa2:.3f} over {found.closed_correlation_px:.2f} px; the "
-        f"calibrated price uses it. Bound of kappa^2 x length: {found.bound:.3f} px.\n"
+        f"calibrated model uses it. Bound of kappa^2 x length: {found.bound:.3f} px.\n"
         f"The paper's kappa^2 is {found.paper_kappa2}; the closed form gives that at a lens blur of "
         f"{blur_for(found.paper_kappa2, found.scale_px):.2f} px instead of {found.blur_px:g}.\n"
         "floor: noise-free error of the points. strip and polygon find none: theirs is the variance "

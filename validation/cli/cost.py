@@ -10,7 +10,7 @@ import typer
 
 from validation.batch import campaign
 from validation.cli.common import Json, SceneName, app, progress
-from validation.cost.sweep import survey
+from validation.cost.sweep import sweep
 from validation.cost.table import tables, write_csv
 from validation.report.table import console
 
@@ -22,16 +22,16 @@ def cost_command(
     seed: Annotated[int, typer.Option(min=0, help="Root of all random numbers.")] = 1,
     as_json: Json = False,
 ) -> None:
-    """Measure what each knob costs in time and gives in accuracy on this machine.
+    """Measure what each parameter costs in time and gives in accuracy on this machine.
 
-    Writes cost.json, and a CSV file and a plot of each knob to DIR.
+    Writes cost.json, and a CSV file and a plot of each parameter to DIR.
     """
     from validation.report import cost_figures  # matplotlib takes half a second to load
 
     loaded = campaign.load(scene)
     directory = out or Path("runs") / f"{loaded.name}-cost"
-    with progress(f"{loaded.name}: cost", "knobs") as shown:
-        found = survey(loaded, seed, shown)
+    with progress(f"{loaded.name}: cost", "parameters") as shown:
+        found = sweep(loaded, seed, shown)
     directory.mkdir(parents=True, exist_ok=True)
     text = json.dumps(found.to_json(), indent=1)
     (directory / "cost.json").write_text(text, encoding="utf-8")

@@ -83,7 +83,7 @@ def measure_command(
     if scene is None:
         found = measure.measure_quadrilateral(picture, estimator or "strip", lens and measure.load_lens(lens))
         say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
-        raise typer.Exit(0 if found.quantities else 1)
+        raise typer.Exit(0 if found.measurands else 1)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:
@@ -125,18 +125,18 @@ def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
 def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
     return {
         "status": found.status,
-        "corners": found.corners.tolist() if found.quantities else None,
+        "corners": found.corners.tolist() if found.measurands else None,
         "noise": found.noise,
         "blur_px": found.blur_px,
-        "quantities": [vars(quantity) for quantity in found.quantities],
+        "quantities": [vars(value) for value in found.measurands],
     }
 
 
 def _quadrilateral_text(found: measure.Quadrilateral) -> str:
     lines = [f"quadrilateral: {found.status}; noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px"]
-    if found.quantities:
+    if found.measurands:
         sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
         for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):
             lines.append(f"corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
-    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.quantities]
+    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.measurands]
     return "\n".join([*lines, "(1 sigma)"])

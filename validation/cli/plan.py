@@ -28,7 +28,7 @@ def plan_command(
     scene: SceneName,
     objective: Annotated[str, typer.Option(help="object (cm^2) or image (px^2)")] = "object",
     search: Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")] = "exhaustive",
-    price: Annotated[str, typer.Option(help="calibrated or paper")] = "calibrated",
+    model: Annotated[str, typer.Option(help="calibrated or paper")] = "calibrated",
     edges: Annotated[str, typer.Option(help="given, or best of all sets that measure the same")] = "given",
     step: Annotated[
         float | None, typer.Option(help="Grid step, degrees; default 1, or 10 for hollow or glossy.")
@@ -71,7 +71,7 @@ def plan_command(
     began = time.perf_counter()
     with _progress(f"{loaded.name}: searching") as shown:
         found = planner.plan(
-            loaded, objective, price=price, search=search, edges=edges, step_deg=step, constraints=limits, **poses,
+            loaded, objective, model=model, search=search, edges=edges, step_deg=step, constraints=limits, **poses,
             report=shown,
         )  # fmt: skip
     seconds = time.perf_counter() - began
@@ -134,7 +134,7 @@ def _print_json(found: planner.Plan, safe: planner.Robust | None, seconds: float
     document = {
         "scene": found.scene.name,
         "objective": found.objective,
-        "price": found.price,
+        "model": found.model,
         "sensor": list(found.sensor),
         "light": list(found.light),
         "edges": list(found.scene.task.edges),
@@ -154,7 +154,7 @@ def _print_json(found: planner.Plan, safe: planner.Robust | None, seconds: float
         },
         "guarantee": found.guarantee,
         "pairs": found.pairs,
-        "priced": found.priced,
+        "evaluated": found.evaluated,
         "candidates": [
             {**dataclasses.asdict(c), "sensor": list(c.sensor), "light": list(c.light)} for c in found.candidates
         ],
@@ -172,11 +172,11 @@ def _print(found: planner.Plan, safe: planner.Robust | None, seconds: float, pic
     units = ("cm", "px") if p.kind == "distance" else ("degrees", "degrees")
     shown.print(
         f"{found.scene.title or found.scene.name}\n"
-        f"Best {found.objective} variance ({found.price} price), required edges {' '.join(found.scene.task.edges)}:\n"
+        f"Best {found.objective} variance ({found.model} model), required edges {' '.join(found.scene.task.edges)}:\n"
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}\n"
         f"  standard deviation {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]},"
         f" {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]} in the image\n"
-        f"  {found.pairs} pairs in {seconds:.1f} s, {found.priced} of them priced one by one\n"
+        f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one\n"
         f"  Guarantee: {found.guarantee}.",
         highlight=False,
     )

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: each knob measured, a model of errors and seconds, and runs that ask for either."""
+"""What accuracy costs in time: each parameter measured, a model of errors and seconds, and runs that ask for either."""

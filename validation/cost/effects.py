@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from scenes import InvalidInput
 from validation.batch.campaign import Case
-from validation.cost.parameter import Knob
+from validation.cost.parameter import Parameter
 from validation.effects_check import RENDERED, check
 
 
-def effects_knob(case: Case, variant: str) -> Knob:
+def effects_parameter(case: Case, variant: str) -> Parameter:
     """Influence on the noise-free distance and on its variance, against time, of each effect switched on alone.
 
     Raises
     ------
     InvalidInput
-        If the renderer is so slow that they would take longer than all other knobs.
+        If the renderer is so slow that they would take longer than all other parameters.
     """
     if variant.startswith("scalar"):
         raise InvalidInput(f"effects must be timed in a compiled variant of Mitsuba, got {variant}")
@@ -24,7 +24,7 @@ def effects_knob(case: Case, variant: str) -> Knob:
          s.resolution_variance)
         for s in found
     )  # fmt: skip
-    return Knob(
+    return Parameter(
         name="effects",
         title="Effects that are left out: influence if switched on alone, against time",
         columns=("effect", "seconds", "x time", "change px", "+- px", "change of variance", "+- variance"),

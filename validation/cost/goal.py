@@ -1,4 +1,4 @@
-"""Runs that are given an accuracy or a time instead of knobs."""
+"""Runs that are given an accuracy or a time instead of parameters."""
 
 from __future__ import annotations
 

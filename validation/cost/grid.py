@@ -7,13 +7,13 @@ import time
 import planner
 from planner.search.exhaustive import is_separable
 from scenes import Scene
-from validation.cost.parameter import Fit, Knob, slope
+from validation.cost.parameter import Fit, Parameter, slope
 
 _STEPS = (20.0, 10.0, 5.0, 2.5)
-_COARSE = (30.0, 20.0, 15.0)  # where every pair has to be priced
+_COARSE = (30.0, 20.0, 15.0)  # where every pair has to be evaluated
 
 
-def grid_knob(scene: Scene) -> Knob:
+def grid_parameter(scene: Scene) -> Parameter:
     """Variance of the grid's optimum over the refined one's, less 1, against the step."""
     steps, rows = _STEPS if is_separable(scene, "calibrated") else _COARSE, []
     plans = []
@@ -27,7 +27,7 @@ def grid_knob(scene: Scene) -> Knob:
     rows = tuple((s, step, seconds, found.grid_variance / best - 1) for s, step, seconds, found in plans)
     points = [(row[1], row[3]) for row in rows if row[0] == "exhaustive" and row[3] > 0]
     fits = (Fit("exhaustive: gap against step", slope(*zip(*points, strict=True)), 2.0),) if len(points) > 1 else ()
-    return Knob(
+    return Parameter(
         name="grid",
         title="Step of the viewing space: optimality gap against the refined optimum",
         columns=("search", "step deg", "seconds", "gap"),

@@ -11,12 +11,12 @@ import measure
 import planner
 import render
 from validation.batch.campaign import Case
-from validation.cost.parameter import Knob
+from validation.cost.parameter import Parameter
 
 _IMAGES = 200
 
 
-def estimators_knob(cases: Sequence[Case], images: Sequence[np.ndarray], seed: int) -> Knob:
+def estimators_parameter(cases: Sequence[Case], images: Sequence[np.ndarray], seed: int) -> Parameter:
     """Variance of the distance over its bound, and processor time an image, on the same noisy images."""
     ratios = {name: [] for name in measure.ESTIMATORS}
     seconds, failed = dict.fromkeys(measure.ESTIMATORS, 0.0), dict.fromkeys(measure.ESTIMATORS, 0)
@@ -38,7 +38,7 @@ def estimators_knob(cases: Sequence[Case], images: Sequence[np.ndarray], seed: i
         ratio, spent = float(np.mean(ratios[name] or np.nan)), 1e3 * seconds[name]
         rows.append((name, spent, ratio, 1 / ratio, spent * ratio, failed[name]))
     error = float(np.sqrt(2 / (_IMAGES - 1) / len(cases)))
-    return Knob(
+    return Parameter(
         name="estimators",
         title="Estimators: variance over the Cramer-Rao bound against time",
         columns=("estimator", "ms an image", "variance / bound", "efficiency", "ms x variance / bound", "failed"),

@@ -1,4 +1,4 @@
-"""Errors and seconds of a run as functions of its knobs, with constants that a trial has measured."""
+"""Errors and seconds of a run as functions of its parameters, with constants that a trial has measured."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class CostModel:
         return math.sqrt(rest)
 
     def for_accuracy(self, accuracy: float) -> Choice:
-        """The cheapest knobs that reach an accuracy.
+        """The cheapest parameters that reach an accuracy.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class CostModel:
         return min(options, key=lambda choice: choice.seconds)
 
     def for_budget(self, seconds: float) -> Choice:
-        """The knobs of least error for a duration, the trial's excluded.
+        """The parameters of least error for a duration, the trial's excluded.
 
         Raises
         ------
@@ -125,7 +125,7 @@ def combined(errors: dict[str, float]) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """Knobs of a run, with what they are expected to give."""
+    """Parameters of a run, with what they are expected to give."""
 
     rendered: Rendered
     renders: int

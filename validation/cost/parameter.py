@@ -1,4 +1,4 @@
-"""What turning one knob shows: a table, and slopes on logarithmic axes beside what theory says."""
+"""What turning one parameter shows: a table, and slopes on logarithmic axes beside what theory says."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Knob:
-    """One knob.
+class Parameter:
+    """One parameter.
 
     Attributes
     ----------

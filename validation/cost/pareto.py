@@ -6,12 +6,12 @@ import numpy as np
 
 from validation.cost.interval import LEAST
 from validation.cost.model import CostModel, rays
-from validation.cost.parameter import Knob
+from validation.cost.parameter import Parameter
 
 _LIKE = 1.005  # times the half-width is no worse
 
 
-def pareto_knob(model: CostModel) -> Knob:
+def pareto_parameter(model: CostModel) -> Parameter:
     """Half-width of all sources together against the run's seconds, from the cost model."""
     options = [
         (rays(rendered.quality), n, model.run_seconds(rendered, n), model.total(rendered, n))
@@ -19,7 +19,7 @@ def pareto_knob(model: CostModel) -> Knob:
         for n in np.unique(np.geomspace(LEAST, 50_000, 16).astype(int)).tolist()
     ]
     rows = tuple((*o, "yes" if not any(_beats(other, o) for other in options) else "") for o in options)
-    return Knob(
+    return Parameter(
         name="pareto",
         title="Total error (95 % half-width of a variance ratio) against total time, by rays a pixel",
         columns=("rays", "images", "seconds", "half-width", "front"),

@@ -10,7 +10,7 @@ import numpy as np
 from planner.features.projected_edges import image_fractions
 from planner.imaging.contrast import squared_contrast
 from validation.batch.campaign import Case
-from validation.cost.parameter import Fit, Knob, slope
+from validation.cost.parameter import Fit, Parameter, slope
 
 _POINTS = (2, 3, 4, 6, 8, 12, 16, 25, 50, 100)
 _EXACT = 64  # Gauss-Legendre nodes
@@ -38,7 +38,7 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 RULES: dict[str, Callable] = {"equal weights": equal, "trapezoid": trapezoid, "Gauss-Legendre": gauss}
 
 
-def points_knob(case: Case) -> Knob:
+def points_parameter(case: Case) -> Parameter:
     """Largest relative error over the required edges of a line's end variance, by rule and number of points."""
     exact, rows = _end_variance(case, *gauss(_EXACT)), []
     for name, rule in RULES.items():
@@ -52,7 +52,7 @@ def points_knob(case: Case) -> Knob:
     for name, theory in (("equal weights", -1.0), ("trapezoid", -2.0)):
         points = np.array([row[1:4:2] for row in rows if row[0] == name and row[1] >= 6])
         fits.append(Fit(f"{name}: error against points", slope(*points.T), theory))
-    return Knob(
+    return Parameter(
         name="points",
         title="Points an edge: error of the predicted variance at an edge's end",
         columns=("rule", "points", "ms", "relative error"),
@@ -61,7 +61,7 @@ def points_knob(case: Case) -> Knob:
         y="relative error",
         series="rule",
         fits=tuple(fits),
-        note="Gauss-Legendre falls faster than any power, to rounding; hence the 16 nodes of the calibrated price. "
+        note="Gauss-Legendre falls faster than any power, to rounding; hence the 16 nodes of the calibrated model. "
         "Equal weights: the paper's sum over points is what its estimator really does, no integral; against the edge's "
         "whole information it is off by 1/points.",
     )

@@ -12,7 +12,7 @@ import measure
 import render
 from validation.batch.campaign import Case
 from validation.cost.model import qualities, rays
-from validation.cost.parameter import Fit, Knob, slope
+from validation.cost.parameter import Fit, Parameter, slope
 
 _SAMPLES = (1, 4, 16, 64)
 _SEEDS = 6
@@ -24,14 +24,14 @@ _NOTE = (
 )
 
 
-def rays_knob(cases: Sequence[Case], variant: str) -> Knob:
+def rays_parameter(cases: Sequence[Case], variant: str) -> Parameter:
     """Scatter of the noise-free image's corners (px) and distance (px) over seeds, against rays a pixel."""
     rows = [*_stratified(cases, variant), *_averages(cases, variant)]
     fits = []
     for label, theory in (("stratified", -0.75), ("renders averaged", -0.5)):
         points = np.array([row[1:4] for row in rows if row[0] == label], float)
         fits.append(Fit(f"{label}: corner error against rays", slope(points[:, 0], points[:, 2]), theory))
-    return Knob(
+    return Parameter(
         name="rays",
         title="Rays a pixel at an edge: error of the noise-free image",
         columns=("sampler", "rays", "seconds", "corner px", "distance px", "distance / noise"),

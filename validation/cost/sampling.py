@@ -10,16 +10,16 @@ import measure
 import render
 from validation.batch.campaign import Case
 from validation.cost.interval import half_width
-from validation.cost.parameter import Fit, Knob, slope
+from validation.cost.parameter import Fit, Parameter, slope
 
 _COUNTS = (10, 20, 40, 80, 160, 320)
 _IMAGES = 6400
 
 
-def images_knob(case: Case, image: np.ndarray, seed: int) -> Knob:
+def images_parameter(case: Case, image: np.ndarray, seed: int) -> Parameter:
     """Relative scatter of the variance of n distances, from disjoint groups of images of one setting."""
     scene, sensor = case.scene, case.setting.sensor
-    where, rng = measure.footprint(scene, sensor), np.random.default_rng(seed)
+    where, rng = measure.region_of_interest(scene, sensor), np.random.default_rng(seed)
     began, parts = time.perf_counter(), []
     for _ in range(0, _IMAGES, 50):
         parts.append(measure.distance(render.expose(image, scene.noise, rng, 50, where), scene, sensor).value_px)
@@ -31,7 +31,7 @@ def images_knob(case: Case, image: np.ndarray, seed: int) -> Knob:
         groups = values[: values.size // n * n].reshape(-1, n).var(1, ddof=1)
         rows.append((n, n * seconds, len(groups), float(groups.std(ddof=1) / groups.mean()), half_width(n)))
     n, _, groups, found, widths = np.array(rows).T
-    return Knob(
+    return Parameter(
         name="images",
         title="Noisy images a setting: error of the empirical variance",
         columns=("images", "seconds", "groups", "sigma of the variance", "95 % half-width"),

@@ -11,13 +11,13 @@ import render
 from scenes import Scene
 from validation.batch import work
 from validation.batch.campaign import Case
-from validation.cost.parameter import Fit, Knob, slope
+from validation.cost.parameter import Fit, Parameter, slope
 
 _FACTORS = (0.5, 1.0, 2.0, 4.0)
 _IMAGES = 50
 
 
-def size_knob(case: Case, variant: str, seed: int) -> Knob:
+def size_parameter(case: Case, variant: str, seed: int) -> Parameter:
     """Seconds of a render and of a noisy image, and relative error of the distance, against the image's size."""
     rows = []
     for factor in _FACTORS:
@@ -39,7 +39,7 @@ def size_knob(case: Case, variant: str, seed: int) -> Knob:
         Fit("noisy image against pixels", slope((width * height)[1:], image[1:]), 0.5),
         Fit("relative error against width", slope(width[1:], error[1:]), -1.5),
     )
-    return Knob(
+    return Parameter(
         name="size",
         title="Image size: time, and error of the distance over the distance",
         columns=("width", "height", "render s", "ms an image", "relative error"),

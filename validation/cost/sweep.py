@@ -1,4 +1,4 @@
-"""All knobs of a scene, one after another."""
+"""All parameters of a scene, one after another."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import render
 from render import variant as variants
 from scenes import InvalidInput
 from validation.batch.campaign import Campaign
-from validation.cost.effects import effects_knob
-from validation.cost.grid import grid_knob
-from validation.cost.locators import estimators_knob
+from validation.cost.effects import effects_parameter
+from validation.cost.grid import grid_parameter
+from validation.cost.locators import estimators_parameter
 from validation.cost.model import CostModel
-from validation.cost.parameter import Knob
-from validation.cost.pareto import pareto_knob
-from validation.cost.points import points_knob
-from validation.cost.rays import rays_knob
-from validation.cost.sampling import images_knob
-from validation.cost.scaling import scaling_knob
-from validation.cost.size import size_knob
+from validation.cost.parameter import Parameter
+from validation.cost.pareto import pareto_parameter
+from validation.cost.points import points_parameter
+from validation.cost.rays import rays_parameter
+from validation.cost.sampling import images_parameter
+from validation.cost.scaling import scaling_parameter
+from validation.cost.size import size_parameter
 from validation.cost.trial import spread_cases, trial
 
-_STEPS = 10  # the trial and nine knobs
-_SETTINGS = 2  # of the knobs that render
+_STEPS = 10  # the trial and nine parameters
+_SETTINGS = 2  # of the parameters that render
 
 
 @dataclass(frozen=True)
-class Survey:
-    """What `survey` has measured; ``omitted`` tells which knobs could not be, and why."""
+class Sweep:
+    """What `sweep` has measured; ``omitted`` tells which parameters could not be, and why."""
 
     scene: str
     model: CostModel
-    knobs: tuple[Knob, ...]
+    parameters: tuple[Parameter, ...]
     omitted: dict[str, str]
     seconds: float
 
@@ -42,14 +42,14 @@ class Survey:
         return {
             "scene": self.scene,
             "model": asdict(self.model),
-            "knobs": {knob.name: knob.to_json() for knob in self.knobs},
+            "parameters": {parameter.name: parameter.to_json() for parameter in self.parameters},
             "omitted": self.omitted,
             "seconds": self.seconds,
         }
 
 
-def survey(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], None] | None = None) -> Survey:
-    """Measure each knob of a scene on this machine.
+def sweep(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], None] | None = None) -> Sweep:
+    """Measure each parameter of a scene on this machine.
 
     Raises
     ------
@@ -61,23 +61,23 @@ def survey(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], 
     model = trial(campaign, seed)
     variant, cases = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)[1::2]
     images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]
-    makers: dict[str, Callable[[], Knob]] = {
-        "rays": lambda: rays_knob(cases, variant),
-        "images": lambda: images_knob(cases[0], images[0], seed),
-        "estimators": lambda: estimators_knob(cases, images, seed),
-        "points": lambda: points_knob(cases[0]),
-        "grid": lambda: grid_knob(campaign.scenes[0]),
-        "size": lambda: size_knob(cases[0], variant, seed),
-        "effects": lambda: effects_knob(cases[0], variant),
-        "scaling": lambda: scaling_knob(model),
-        "pareto": lambda: pareto_knob(model),
+    makers: dict[str, Callable[[], Parameter]] = {
+        "rays": lambda: rays_parameter(cases, variant),
+        "images": lambda: images_parameter(cases[0], images[0], seed),
+        "estimators": lambda: estimators_parameter(cases, images, seed),
+        "points": lambda: points_parameter(cases[0]),
+        "grid": lambda: grid_parameter(campaign.scenes[0]),
+        "size": lambda: size_parameter(cases[0], variant, seed),
+        "effects": lambda: effects_parameter(cases[0], variant),
+        "scaling": lambda: scaling_parameter(model),
+        "pareto": lambda: pareto_parameter(model),
     }
-    knobs, omitted = [], {}
+    parameters, omitted = [], {}
     for done, (name, make) in enumerate(makers.items(), 1):
         tell(name, done, _STEPS)
         try:
-            knobs.append(make())
+            parameters.append(make())
         except InvalidInput as error:
             omitted[name] = str(error)
     tell("done", _STEPS, _STEPS)
-    return Survey(campaign.name, model, tuple(knobs), omitted, time.perf_counter() - began)
+    return Sweep(campaign.name, model, tuple(parameters), omitted, time.perf_counter() - began)

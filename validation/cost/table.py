@@ -1,4 +1,4 @@
-"""The tables of a survey, for a terminal, and as CSV."""
+"""The tables of a sweep, for a terminal, and as CSV."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from validation.cost.parameter import Knob
-from validation.cost.sweep import Survey
+from validation.cost.parameter import Parameter
+from validation.cost.sweep import Sweep
 
 
-def tables(found: Survey) -> Group:
-    """One table a knob, its slopes beside the theoretical ones below."""
-    parts = [part for knob in found.knobs for part in (_table(knob), _below(knob))]
+def tables(found: Sweep) -> Group:
+    """One table a parameter, its slopes beside the theoretical ones below."""
+    parts = [part for parameter in found.parameters for part in (_table(parameter), _below(parameter))]
     parts += [Text(f"\n{name} left out: {reason}") for name, reason in found.omitted.items()]
     return Group(*parts, Text(f"\nMeasured in {found.seconds:.0f} s on {found.model.variant}."))
 
 
-def write_csv(found: Survey, directory: Path) -> list[Path]:
-    """One file a knob."""
+def write_csv(found: Sweep, directory: Path) -> list[Path]:
+    """One file a parameter."""
     paths = []
-    for knob in found.knobs:
-        paths.append(directory / f"{knob.name}.csv")
+    for parameter in found.parameters:
+        paths.append(directory / f"{parameter.name}.csv")
         with paths[-1].open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([knob.columns, *knob.rows])
+            csv.writer(file).writerows([parameter.columns, *parameter.rows])
     return paths
 
 
-def _table(knob: Knob) -> Table:
-    made = Table(title=f"\n{knob.title}", title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in knob.columns:
+def _table(parameter: Parameter) -> Table:
+    made = Table(title=f"\n{parameter.title}", title_justify="left", box=None, padding=(0, 1), title_style="bold")
+    for name in parameter.columns:
         made.add_column(name, justify="right")
-    rows = [row for row in knob.rows if "front" not in knob.columns or row[-1]]  # the others are in the CSV
+    rows = [row for row in parameter.rows if "front" not in parameter.columns or row[-1]]  # the others are in the CSV
     for row in rows:
         made.add_row(*map(_cell, row))
     return made
 
 
-def _below(knob: Knob) -> Text:
+def _below(parameter: Parameter) -> Text:
     lines = [
         f"  slope, {fit.what}: {fit.slope:+.2f}" + (f" (theory {fit.theory:+.2f})" if fit.theory is not None else "")
-        for fit in knob.fits
+        for fit in parameter.fits
     ]
-    return Text("\n".join([*lines, *([f"  {knob.note}"] if knob.note else [])]))
+    return Text("\n".join([*lines, *([f"  {parameter.note}"] if parameter.note else [])]))
 
 
 def _cell(value: object) -> str:

@@ -157,7 +157,7 @@ class _Tried:
         Both variances share the noise, so their ratio is known much better than either.
         """
         scene, sensor = self.case.scene, self.case.setting.sensor
-        where = measure.footprint(scene, sensor)
+        where = measure.region_of_interest(scene, sensor)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.case.index, 1 << 30)))
         pictures = render.expose(self.image, scene.noise, rng, _IMAGES, where)
         values = measure.distance(pictures, scene, sensor).value_px

@@ -67,7 +67,7 @@ class Case:
     ----------
     area : str
         ``reflectance``, ``planner``, ``fit``, ``measure`` or ``render``.
-    name, quantity : str
+    name, measurand : str
         What is hard about it, and what is asked.
     ours : callable
         Our answer.
@@ -79,7 +79,7 @@ class Case:
 
     area: str
     name: str
-    quantity: str
+    measurand: str
     ours: Callable[[], Answer]
     reference: Callable[[], Reference]
     refusals: tuple[str, ...] = ()
@@ -91,7 +91,7 @@ class Row:
 
     area: str
     name: str
-    quantity: str
+    measurand: str
     ours: float | None
     reference: float | None
     kind: str
@@ -117,7 +117,7 @@ def run(case: Case) -> Row:
     return Row(
         area=case.area,
         name=case.name,
-        quantity=case.quantity,
+        measurand=case.measurand,
         ours=answer.value,
         reference=truth.value,
         kind=truth.kind,

@@ -39,9 +39,9 @@ def _lines() -> list[Case]:
     }
     found = []
     for name, (points, weights) in settings.items():
-        for quantity, place in (("V(line at the end) px2", "end"), ("V(angle) rad2", "tilt")):
+        for measurand, place in (("V(line at the end) px2", "end"), ("V(angle) rad2", "tilt")):
             ours, reference = partial(_line, points, weights, place), partial(_line_reference, points, weights, place)
-            found.append(Case("fit", name, quantity, ours, reference))
+            found.append(Case("fit", name, measurand, ours, reference))
     same = np.full((5, 2), 7.0)
     ours = partial(_line, same, np.ones(5), "tilt")
     found.append(Case("fit", "all points equal", "V(angle) rad2", ours, lambda: Reference(None, "rule")))
@@ -154,10 +154,10 @@ def _ellipses() -> list[Case]:
     found = []
     for name, parameters, t, tolerance in settings:
         points = _on_ellipse(parameters, t)
-        for quantity, index in (("semi-axis a px", 2), ("semi-axis b px", 3)):
+        for measurand, index in (("semi-axis a px", 2), ("semi-axis b px", 3)):
             truth = Reference(parameters[index], "closed form", None, tolerance)
             found.append(
-                Case("fit", name, quantity, partial(_axis, points, index), partial(_same, truth), ("ill_conditioned",))
+                Case("fit", name, measurand, partial(_axis, points, index), partial(_same, truth), ("ill_conditioned",))
             )
     line = np.stack([np.arange(20.0), 2 * np.arange(20.0)], -1)
     nothing = Reference(None, "rule", reason="ill_conditioned")

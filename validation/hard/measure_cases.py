@@ -87,7 +87,7 @@ def _refused() -> list[Case]:
     size = plain.camera.height, plain.camera.width
     rng = np.random.default_rng(5)
 
-    def spoilt(value: float) -> np.ndarray:
+    def corrupted(value: float) -> np.ndarray:
         image = picture(plain).copy()
         image[100, 100] = value
         return image
@@ -99,8 +99,8 @@ def _refused() -> list[Case]:
         "noise 100 x the contrast, more than the scene says": lambda: (
             picture(plain) + 15000 * rng.standard_normal(size)
         ),
-        "NaN in the image": lambda: spoilt(np.nan),
-        "infinity in the image": lambda: spoilt(np.inf),
+        "NaN in the image": lambda: corrupted(np.nan),
+        "infinity in the image": lambda: corrupted(np.inf),
         "image of 1 x 1 px": lambda: np.ones((1, 1)),
         "no image": lambda: np.ones((0, *size)),
         "contrast of each edge's second half reversed": lambda: _reversed(plain),
@@ -150,7 +150,7 @@ def _noise() -> list[Case]:
 
 
 def _shapes() -> list[Case]:
-    """Polygons by themselves: thin corners, blunt corners, short sides. The quantity is the worst corner's error."""
+    """Polygons by themselves: thin corners, blunt corners, short sides. The measurand is the worst corner's error."""
     found = []
     for pixels in (1, 2, 4, 8):
         corners = _quadrilateral(60.0, pixels, 90.0)

@@ -1,4 +1,4 @@
-"""The paper's price in a chosen floating-point type, to see where single precision is safe."""
+"""The paper's model in a chosen floating-point type, to see where single precision is safe."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from validation.hard.case import Row
 
 _HEAD = (
-    f"{'case':50s} {'quantity':17s} {'ours':>10s} {'reference':>10s} {'from':12s} {'rel. error':>10s} {'allowed':>8s} "
+    f"{'case':50s} {'measurand':17s} {'ours':>10s} {'reference':>10s} {'from':12s} {'rel. error':>10s} {'allowed':>8s} "
     f"{'condition':>9s} {'verdict':8s} {'ms':>6s}  status"
 )
 
@@ -31,7 +31,9 @@ def text(rows: list[Row]) -> str:
 def _line(row: Row) -> str:
     numbers = f"{_number(row.ours):>10s} {_number(row.reference):>10s} {row.kind:12s} {_number(row.error, 2):>10s}"
     judged = f"{_number(row.tolerance, 2):>8s} {_number(row.condition, 2):>9s} {row.verdict:8s}"
-    return f"{row.name[:50]:50s} {row.quantity:17s} {numbers} {judged} {1000 * row.seconds:6.1f}  {row.reason}".rstrip()
+    return (
+        f"{row.name[:50]:50s} {row.measurand:17s} {numbers} {judged} {1000 * row.seconds:6.1f}  {row.reason}".rstrip()
+    )
 
 
 def _number(value: float | None, digits: int = 4) -> str:

@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from planner import Plan, ViewingSpace, variance_map
-from planner.features.projected_edges import outline, straight
+from planner.features.projected_edges import projected_edges, straight
 from planner.imaging.projection import direction, facing, project
 from planner.imaging.visibility import visible_spans
 
@@ -47,7 +47,7 @@ def map_picture(plan: Plan, path: Path) -> Path:
 def _map(plan: Plan, role: str) -> tuple[ViewingSpace, np.ndarray]:
     space = ViewingSpace(_STEP if plan.scene.solid.is_convex and plan.scene.material.is_diffuse else _COARSE, (0, 180))
     fixed = {"sensor": plan.sensor} if role == "light" else {"light": plan.light}
-    return space, variance_map(plan.scene, **fixed, space=space, price=plan.price, objective=plan.objective)
+    return space, variance_map(plan.scene, **fixed, space=space, model=plan.model, objective=plan.objective)
 
 
 def _search_space(plan, space, values, best, title, path: Path) -> Path:
@@ -126,7 +126,7 @@ def _surface(plan, space, values, title, path: Path) -> Path:
 
 
 def _seen(plan: Plan, path: Path) -> Path:
-    """Outline of the object from the optimal sensor: faces by brightness, required edges in colour."""
+    """ProjectedEdges of the object from the optimal sensor: faces by brightness, required edges in colour."""
     scene, pose = plan.scene, np.array(list(plan.sensor))
     solid, camera = scene.solid, scene.camera
     figure, axis = plt.subplots(figsize=(6.5, 6), layout="constrained")
@@ -145,7 +145,7 @@ def _seen(plan: Plan, path: Path) -> Path:
     for edge in solid.edges:
         for span in visible_spans(solid, edge, position):
             _segment(axis, scene, pose, edge, span, color="0.5", lw=0.7)
-    view = outline(scene, pose, tuple(dict.fromkeys(straight(scene))))
+    view = projected_edges(scene, pose, tuple(dict.fromkeys(straight(scene))))
     for i, name in enumerate(view.names):
         for span in visible_spans(solid, solid.edge(name), position):
             _segment(axis, scene, pose, solid.edge(name), span, color=f"C{i % 10}", lw=2.5, label=name)

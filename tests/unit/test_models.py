@@ -1,4 +1,4 @@
-"""The planner's prices: the paper's own columns, and what must hold for any prediction."""
+"""The planner's models: the paper's own columns, and what must hold for any prediction."""
 
 import dataclasses
 
@@ -7,7 +7,7 @@ import pytest
 
 import planner
 import scenes
-from planner.features.projected_edges import outline
+from planner.features.projected_edges import projected_edges
 from planner.features.propagation import corner_covariance, distance_variance
 from planner.imaging.contrast import contrast, side_levels
 from planner.imaging.projection import edge_points, project
@@ -45,10 +45,10 @@ def test_table_1(scaled):
     assert ours[[0, 2]] == pytest.approx([0.1023, 0.0703], rel=0.03)  # row 2 of the table, 0.0960, is not reproduced
 
 
-@pytest.mark.parametrize("price", ["paper", "calibrated", "bound"])
-def test_variance_falls_with_the_square_of_exposure(task1, price):
+@pytest.mark.parametrize("model", ["paper", "calibrated", "bound"])
+def test_variance_falls_with_the_square_of_exposure(task1, model):
     brighter = task1.model_copy(update={"camera": task1.camera.model_copy(update={"exposure": 400.0})})
-    before, after = (planner.variances(s, *poses(task1), price) for s in (task1, brighter))
+    before, after = (planner.variances(s, *poses(task1), model) for s in (task1, brighter))
     assert after == pytest.approx(before / 4, rel=1e-3)
 
 
@@ -94,8 +94,8 @@ def test_unmeasurable_is_infinite_with_a_reason(task1, sensor, light, status):
 def test_every_pose_gives_a_positive_number_or_infinity(task1):
     polar, azimuth = np.meshgrid(np.linspace(0, 180, 19), np.linspace(0, 360, 25))
     grid = np.stack([polar.ravel(), azimuth.ravel()], -1)
-    for price in ("paper", "calibrated", "bound"):
-        variance = planner.variances(task1, grid[:, None], grid[None, ::17], price)
+    for model in ("paper", "calibrated", "bound"):
+        variance = planner.variances(task1, grid[:, None], grid[None, ::17], model)
         assert not np.isnan(variance).any()
         assert (variance > 0).all()
 
@@ -107,7 +107,7 @@ def test_calibrated_against_the_explicit_covariance_of_dense_points(task1, focal
         "camera": task1.camera.model_copy(update={"focal_px": focal}), "locator": scenes.Locator(scale_px=0.8)
     })  # fmt: skip
     sensor, light = np.array([30.0, 135.0]), np.array([60.0, 255.0])
-    view = outline(scene, sensor)
+    view = projected_edges(scene, sensor)
     predicted = planner.predict(scene, sensor, light)
     offsets = []
     for i, corner in enumerate(predicted.corners.repeat(2, axis=0)):
@@ -131,7 +131,7 @@ def test_calibrated_against_the_explicit_covariance_of_dense_points(task1, focal
 
 
 def test_bad_arguments(task1):
-    with pytest.raises(InvalidInput, match="price must be one of paper, calibrated, bound, got 'best'"):
+    with pytest.raises(InvalidInput, match="model must be one of paper, calibrated, bound, got 'best'"):
         planner.predict(task1, (30, 90), (15, 270), "best")
     with pytest.raises(InvalidInput, match="sensor: polar_deg must be between 0 and 180, got 200"):
         planner.predict(task1, (200, 90), (15, 270))

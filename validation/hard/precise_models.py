@@ -1,4 +1,4 @@
-"""Two of the planner's prices at 50 digits: the paper's (Fig. 8 of the paper), and the calibrated one.
+"""Two of the planner's models at 50 digits: the paper's (Fig. 8 of the paper), and the calibrated one.
 
 Where nothing can be measured they are the reason, a text, instead of a number.
 """
@@ -106,7 +106,7 @@ def object_scale(scene, inputs: Inputs):
 
 
 def calibrated(scene, inputs: Inputs, adaptive: bool = True):
-    """The documented closed form of the calibrated price, its integrals by adaptive quadrature.
+    """The documented closed form of the calibrated model, its integrals by adaptive quadrature.
 
     For objects that lie within the image. Without ``adaptive`` 8 nodes an edge, good enough for a condition number.
     """
