@@ -9,10 +9,10 @@ import numpy as np
 from scipy import sparse
 
 from measure.features.calipers import Caliper
-from measure.features.layout import Optics
 from measure.features.lines import unit_covariance
+from measure.features.optics import Optics
 from measure.features.points import EdgePoints
-from planner.models.locator import edge_blur, kappa2
+from planner.features.locator import edge_blur, kappa2
 
 _FIXED_POINT = 64  # Canny takes gradients as 16-bit integers: 1/64 grey level a pixel
 _LARGEST = 32767

@@ -12,10 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from measure.features.calipers import Caliper
-from measure.features.layout import Optics
 from measure.features.lines import regression, trapezoid
+from measure.features.optics import Optics
 from measure.features.points import EdgePoints
-from planner.models.locator import edge_blur
+from planner.features.locator import edge_blur
 
 STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the kernel ends

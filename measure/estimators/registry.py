@@ -17,7 +17,7 @@ from measure.estimators.strip import strip_estimator
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression, trapezoid
-from planner.models.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
+from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
 from scenes import InvalidInput
 
 ESTIMATORS = ("canny", "gradient", "strip", "polygon")

@@ -8,7 +8,7 @@ import numpy as np
 
 from measure import status
 from measure.features.layout import Layout
-from planner.models.locator import MIN_USABLE
+from planner.features.locator import MIN_USABLE
 
 MIN_POSITIONS = 3
 

@@ -10,8 +10,8 @@ import numpy as np
 from measure import status
 from measure.estimators.gradient import GradientLocator
 from measure.features.calipers import MIN_POSITIONS
-from measure.features.layout import Optics
-from planner.models.locator import MIN_CONTRAST, edge_blur
+from measure.features.optics import Optics
+from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput
 
 _STEPS = 12

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from measure.features.points import EdgePoints
-from planner.models.locator import correlation
+from planner.features.locator import correlation
 
 
 class Lines(NamedTuple):

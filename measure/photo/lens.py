@@ -16,7 +16,7 @@ from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
-from planner.models.locator import reach
+from planner.features.locator import reach
 from scenes import InvalidInput
 from scenes.errors import describe
 from scenes.model import Model
