@@ -81,6 +81,22 @@ class LikelihoodEstimator:
         rows = np.concatenate([inverse[:first], columns.start @ levels, columns.stop @ levels])
         return cls(calipers, pixels, rows, rows @ rows.T, optics)
 
+    @classmethod
+    def joined(cls, calipers: tuple[Caliper, ...], parts: list[LikelihoodEstimator | None]) -> LikelihoodEstimator:
+        """Estimators of one edge each as one: they share pixels near the corners, and so their errors are correlated.
+
+        Rows of an edge without an estimator are 0, which shows no contrast.
+        """
+        known = [part for part in parts if part]
+        pixels = np.unique(np.concatenate([np.empty(0, int), *(part.pixels for part in known)]))
+        edges, rows = len(parts), np.zeros((4 * len(parts), len(pixels)))
+        for e, part in enumerate(parts):
+            if part:
+                rows[np.ix_([2 * e, 2 * e + 1, 2 * edges + e, 3 * edges + e], np.searchsorted(pixels, part.pixels))] = (
+                    part.rows
+                )
+        return cls(calipers, pixels, rows, rows @ rows.T, calipers[0].optics)
+
     @property
     def middles(self) -> np.ndarray:
         """Place along each edge about which its tilt is taken, px, shape (E,)."""

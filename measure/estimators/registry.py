@@ -66,7 +66,7 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
             f if p or not _measurable(f) else replace(f, status=status.SHORT)
             for f, p in zip(calipers, parts, strict=True)
         )
-        return SeparateEstimator(calipers, tuple(parts))
+        return LikelihoodEstimator.joined(calipers, parts)
     kernel = (TRUNCATE if name == "canny" else 4) * optics.scale_px
     calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1)
     if name == "gradient":
