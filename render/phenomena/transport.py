@@ -59,6 +59,7 @@ class Interreflection(Effect):
     name = "interreflection"
     cost = 25.0
     random = True
+    has_formula = False
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, scene: Scene, poses: Poses) -> str | None:
