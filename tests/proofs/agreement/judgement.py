@@ -57,18 +57,17 @@ def broken(claims: tuple[Claim, ...]) -> list[Claim]:
 
 def _by_chance(kind: str, estimator: str, rows: list[Row], level: float) -> Claim:
     judged = _ok(estimator, rows)
-    unknown = [row for row in judged if not np.isfinite(row.ratio(kind))]
-    if unknown:
-        return _unknown(kind, estimator, unknown)
-    if not judged:
-        return Claim(kind, estimator, None, "no row is ok")
-    found = verdict([row.ratio(kind) for row in judged], [row.n for row in judged], level)
-    worst = max(judged, key=lambda row: abs(np.log(row.ratio(kind))))
+    known = [row for row in judged if np.isfinite(row.ratio(kind))]
+    unknown = _unknown([row for row in judged if row not in known])
+    if not known:
+        return Claim(kind, estimator, False if unknown else None, unknown or "no row is ok")
+    found = verdict([row.ratio(kind) for row in known], [row.n for row in known], level)
+    worst = max(known, key=lambda row: abs(np.log(row.ratio(kind))))
     text = (
         f"{found.inside} of {found.rows} rows inside their 95 % interval, smallest p-value {found.smallest_p:.2g} "
-        f"against {found.limit:.2g}; farthest {worst.ratio(kind):.3f} at {_name(worst)}"
+        f"against {found.limit:.2g}; farthest {worst.ratio(kind):.3f} at {_name(worst)}{unknown}"
     )
-    return Claim(kind, estimator, found.agrees, text)
+    return Claim(kind, estimator, found.agrees and not unknown, text)
 
 
 def _closed_form(group: str, rows: list[Row]) -> Claim:
@@ -78,17 +77,18 @@ def _closed_form(group: str, rows: list[Row]) -> Claim:
     left_out = f"{len(here) - len(ok)} not ok, {len(ok) - len(judged)} with effects that have no formula"
     if not judged:
         return Claim("calibrated", group, None, f"no row is judged: {left_out}")
-    unknown = [row for row in judged if not np.isfinite([row.calibrated, row.propagated]).all()]
-    if unknown:
-        return _unknown("calibrated", group, unknown)
-    ratios = np.array([row.calibrated / row.propagated for row in judged])
+    known = [row for row in judged if np.isfinite([row.calibrated, row.propagated]).all()]
+    unknown = _unknown([row for row in judged if row not in known])
+    if not known:
+        return Claim("calibrated", group, False, unknown)
+    ratios = np.array([row.calibrated / row.propagated for row in known])
     mean, worst = float(np.exp(np.log(ratios).mean())), int(np.abs(np.log(ratios)).argmax())
-    holds = abs(mean - 1) <= MEAN and bool((np.abs(ratios - 1) <= EACH).all())
+    near = abs(mean - 1) <= MEAN and bool((np.abs(ratios - 1) <= EACH).all())
     text = (
-        f"calibrated / propagated {mean:.3f} in the mean of {len(judged)} rows ({left_out}), "
-        f"farthest {ratios[worst]:.3f} at {_name(judged[worst])}"
+        f"calibrated / propagated {mean:.3f} in the mean of {len(known)} rows ({left_out}), "
+        f"farthest {ratios[worst]:.3f} at {_name(known[worst])}{unknown}"
     )
-    return Claim("calibrated", group, holds, text)
+    return Claim("calibrated", group, near and not unknown, text)
 
 
 def _bias(estimator: str, rows: list[Row]) -> Claim:
@@ -104,8 +104,9 @@ def _bias(estimator: str, rows: list[Row]) -> Claim:
     return Claim("bias", estimator, None, text)
 
 
-def _unknown(kind: str, subject: str, rows: list[Row]) -> Claim:
-    return Claim(kind, subject, False, f"{len(rows)} rows are ok and have no variance, the first {_name(rows[0])}")
+def _unknown(rows: list[Row]) -> str:
+    """Words for rows that are ok and have no variance; none where there are none."""
+    return f"; {len(rows)} ok without a variance, the first {_name(rows[0])}" if rows else ""
 
 
 def _ok(estimator: str, rows: list[Row]) -> list[Row]:

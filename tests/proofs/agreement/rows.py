@@ -22,7 +22,7 @@ from validation.statistics import ratio_interval
 KINDS = "calibrated", "propagated", "reported"
 ESTIMATORS = "gradient", "canny", "strip", "polygon"
 _BATCH = 50  # pictures held in memory at a time
-_STRAY = 0.01  # part of the pictures that may say otherwise without the setting having another status
+_STRAY = 0.01  # part of the noisy pictures that may be refused where a setting is ok
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Row:
         Degrees.
     estimator : str
     status : str
-        Of the noise-free picture, unless more than 1 % of the noisy ones say something else: then what most of those
-        say. ``refused`` where the setting cannot be worked on, for the `reason`.
+        ``ok`` where the noise-free picture and at least 99 % of the noisy ones are; else that of the noise-free one,
+        or what most of the others say. ``refused`` where the setting cannot be worked on, for the `reason`.
     n, failed : int
         Noisy pictures measured, and not.
     empirical : float
@@ -159,7 +159,9 @@ def _measured(place: Place, clean: np.ndarray, renders: int, seed: int) -> dict[
 
 
 def common(clean: str, noisy: np.ndarray) -> str:
-    """Status of a setting: the noise-free picture's, unless more than 1 % of the noisy ones have others.
+    """Status of a setting: ``ok`` if the noise-free picture is and at least 99 % of the noisy ones are.
+
+    Where many are refused, the rest is a selection, whose scatter says nothing.
 
     Examples
     --------
@@ -167,9 +169,13 @@ def common(clean: str, noisy: np.ndarray) -> str:
     'ok'
     >>> common("ok", np.array(["ok"] * 9 + ["short"]))
     'short'
+    >>> common("low_contrast", np.array(["ok"] * 9))
+    'low_contrast'
     """
-    others = Counter(noisy[noisy != clean].tolist())
-    return others.most_common(1)[0][0] if others.total() > _STRAY * noisy.size else clean
+    others = Counter(noisy[noisy != status.OK].tolist())
+    if clean != status.OK or others.total() <= _STRAY * noisy.size:
+        return clean
+    return others.most_common(1)[0][0]
 
 
 def _refused(place: Place, estimator: str, reason: str) -> Row:
