@@ -57,11 +57,6 @@ def beckmann(cosine: np.ndarray, sine: np.ndarray, m: float) -> np.ndarray:
     return np.where(lit, np.exp(np.where(lit, exponent, -np.inf)), 0.0)
 
 
-def attenuation(nh: np.ndarray, nv: np.ndarray, nl: np.ndarray, vh: np.ndarray) -> np.ndarray:
-    """Geometric attenuation G of V-cavities from N.H, N.V, N.L and V.H (= L.H)."""
-    return np.minimum(1.0, 2 * nh * np.minimum(nv, nl) / vh)
-
-
 def perpendicular_share(to_light: np.ndarray, half: np.ndarray, field: np.ndarray | None) -> np.ndarray | float:
     """J_perp of light of unit strength: the share of its field across the plane of incidence, spanned by L and H.
 
