@@ -77,20 +77,17 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
-    poses = {name: pose and parse_pose(f"--{name}", pose) for name, pose in (("sensor", sensor), ("light", light))}
-    poses["start"] = parse_pose("--start", start)
-    tolerances = _tolerances(tolerance or [])
     how = {"model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
+    poses, tolerances = _poses(sensor=sensor, light=light, start=start), _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = None if no_check else _check(found, check)
-    pictures = _pictures(found, map_file, out)
-    if as_json:
-        print(json.dumps(_facts(found, checked, safe, seconds, pictures), indent=1))
-        return
-    console().print(plan_table.report(found, checked, safe, seconds), highlight=False)
-    for path in pictures:
-        console().print(f"picture: {path}", highlight=False)
+    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json)
+
+
+def _poses(**texts: str | None) -> dict[str, scenes.Pose | None]:
+    """Poses by name, from what the options of that name say."""
+    return {name: text and parse_pose(f"--{name}", text) for name, text in texts.items()}
 
 
 def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan, float]:
@@ -148,6 +145,20 @@ def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> l
     if map_file:
         paths.append(plan_figures.map_picture(found, map_file))
     return paths
+
+
+def _show(
+    found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path],
+    as_json: bool,
+) -> None:  # fmt: skip
+    """The plan, as JSON or as tables."""
+    if as_json:
+        print(json.dumps(_facts(found, checked, safe, seconds, pictures), indent=1))
+        return
+    shown_on = console()
+    shown_on.print(plan_table.report(found, checked, safe, seconds), highlight=False)
+    for path in pictures:
+        shown_on.print(f"picture: {path}", highlight=False)
 
 
 def _facts(
