@@ -13,7 +13,7 @@ import planner
 import render
 from measure import status
 from render import Quality, Tolerance
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Picture, Pose, Scene
 
 ESTIMATOR = "gradient"  # whose closed form the calibrated model is
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
@@ -154,7 +154,7 @@ def _checked(
     measured = measure.propagate(picture, scene, sensor, None, ESTIMATOR)
     planned, calibrated = (planner.predict(scene, sensor, light, model) for model in (found.model, "calibrated"))
     to_unit = planned.variance_object / planned.variance_image if found.objective == "object" else 1.0
-    chosen = render.choose(scene, "auto", Tolerance(), sensor, light)
+    chosen = render.choose(scene, "auto", Tolerance(), Picture.of(scene, sensor, light))
     return CheckedSetting(
         sensor=sensor,
         light=light,
