@@ -26,8 +26,8 @@ class Ellipse:
     Attributes
     ----------
     parameters : ndarray, shape (..., 5)
-        Centre (x, y), semi-axes a and b, px, and the angle of a from the x axis towards y, degrees. For a circle a = b and
-        the angle is 0.
+        Centre (x, y), semi-axes a and b, px, and the angle of a from the x axis towards y, degrees. For a circle a = b
+        and the angle is 0.
     covariance : ndarray, shape (..., 5, 5)
         Of the parameters. For a circle a and b are the same number, and the angle has no error.
     status : ndarray of str, shape (...)
