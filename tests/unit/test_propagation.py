@@ -8,8 +8,8 @@ from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
-from planner.features.locator import correlation
 from measure.measurement import separation
+from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
 from tests.scalar import weighted_points
 
