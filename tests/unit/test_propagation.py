@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from planner.models.models import paper
 
 from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
@@ -11,6 +10,8 @@ from measure.features.points import EdgePoints
 from measure.measurement import separation
 from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
+from planner.imaging.pictures import Pictures
+from planner.models.paper import paper
 from tests.scalar import weighted_points
 
 SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)
@@ -53,7 +54,7 @@ def displacement(edge, place):
 
 @pytest.fixture(scope="module")
 def predicted(task1):
-    return paper(task1, np.array(SENSOR), np.array(LIGHT))
+    return paper(Pictures.of(task1, SENSOR, LIGHT))
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0, 1.7])
