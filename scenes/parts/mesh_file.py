@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from scenes.model import Model
@@ -27,14 +28,19 @@ class Mesh(Model):
     def __hash__(self) -> int:
         return hash((self.file, tuple(sorted(self.names.items()))))
 
+    def __eq__(self, other: object) -> bool:
+        """A file that has changed is another mesh, so that nothing that was kept of the old one is taken for it."""
+        same = isinstance(other, Mesh) and (self.file, self.names) == (other.file, other.names)
+        return same and np.array_equal(self.solid.triangles, other.solid.triangles)
+
     @field_validator("file")
     @classmethod
     def _beside_the_scene(cls, file: Path, info: ValidationInfo) -> Path:
         return (info.context or {}).get("directory", Path()) / file
 
-    @property
+    @cached_property
     def solid(self) -> Solid:
-        """Vertices, faces, edges and circles of the mesh."""
+        """Vertices, faces, edges and circles of the mesh as it was first read; it travels with the record."""
         try:
             stamp = self.file.stat().st_mtime_ns
         except OSError:
