@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from scenes.model import Model
@@ -29,12 +30,9 @@ class Mesh(Model):
         return hash((self.file, tuple(sorted(self.names.items()))))
 
     def __eq__(self, other: object) -> bool:
-        """Equal if named alike and read at once: a file may change."""
-        return (
-            isinstance(other, Mesh)
-            and (self.file, self.names) == (other.file, other.names)
-            and self.solid is other.solid
-        )
+        """A file that has changed is another mesh, so that nothing that was kept of the old one is taken for it."""
+        same = isinstance(other, Mesh) and (self.file, self.names) == (other.file, other.names)
+        return same and np.array_equal(self.solid.triangles, other.solid.triangles)
 
     @field_validator("file")
     @classmethod
