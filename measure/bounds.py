@@ -12,7 +12,7 @@ from measure.features.corners import corner_response
 from measure.features.layout import Layout, layout_of
 from measure.measurement import distance, separation
 from planner import predict
-from scenes import Scene
+from scenes import Picture, Scene
 
 
 def bound(scene: Scene, sensor: Any, light: Any) -> float:
@@ -42,7 +42,7 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
         As for `measure.distance`.
     """
     found = distance(clean, scene, sensor, light, "polygon")
-    layout = layout_of(scene, scene.check_pose("sensor", sensor), scene.check_pose("light", light))
+    layout = layout_of(Picture.of(scene, sensor, light))
     covariance = corner_bound(layout, found.edge_contrast, scene.noise.variance)
     _, gradient = separation(found.corners[None])
     return float(gradient[0] @ covariance @ gradient[0])

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from measure import status
-from measure.features.layout import Layout, layout_of
+from measure.features.layout import layout_of
 from measure.features.shape import find_shape
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Picture, Scene
 
+DEFAULT_ESTIMATOR = "gradient"
 _BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
@@ -54,10 +55,10 @@ class Measurement:
 
 def distance(
     image: np.ndarray,
-    scene: Scene,
-    sensor: Any,
+    scene: Scene | Picture,
+    sensor: Any = None,
     light: Any = None,
-    estimator: str = "gradient",
+    estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
 ) -> Measurement:
     """Measure the task's distance.
@@ -66,7 +67,8 @@ def distance(
     ----------
     image : array_like, shape (..., height, width)
         One image or a stack, grey levels, float or integer.
-    scene : Scene
+    scene : Scene or Picture
+        A picture has its poses; it is as if sensor and light were given.
     sensor : Pose or pair of float
         Where the image was taken from; edges are sought where this pose projects them, up to 4 px and 2 degrees away.
     light : Pose or pair of float, optional
@@ -83,8 +85,10 @@ def distance(
     InvalidInput
         If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
     """
-    layout, threshold = sought(scene, sensor, light, threshold)
-    images = checked_image(image, (scene.camera.height, scene.camera.width))
+    picture = Picture.of(scene, sensor, light)
+    camera, layout = picture.scene.camera, layout_of(picture)
+    threshold = picture.scene.locator.thresholds[0] if threshold is None else threshold
+    images = checked_image(image, (camera.height, camera.width))
     stack = images.reshape(-1, *images.shape[-2:])
     parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
     lead = images.shape[:-2]
@@ -92,13 +96,6 @@ def distance(
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
     )
-
-
-def sought(scene: Scene, sensor: Any, light: Any, threshold: float | None) -> tuple[Layout, float]:
-    """Where the edges should be, and Canny's threshold: arguments of `distance`, checked."""
-    sensor = scene.check_pose("sensor", sensor)
-    light = None if light is None else scene.check_pose("light", light)
-    return layout_of(scene, sensor, light), scene.locator.thresholds[0] if threshold is None else threshold
 
 
 def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
@@ -112,6 +109,8 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     images = np.asarray(image, float)
     if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
         raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
+    if images.flags.c_contiguous and images.reshape(-1) @ images.reshape(-1) < _BRIGHTEST**2:  # reads them once
+        return images
     low, high = float(images.min()), float(images.max())
     if not np.isfinite([low, high]).all():
         raise InvalidInput("image must be of finite numbers, got NaN or infinity")

@@ -9,9 +9,11 @@ import numpy as np
 
 from measure import status
 from measure.features.corners import corner_response
+from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from measure.measurement import distance, separation, sought
-from scenes import Scene
+from measure.measurement import DEFAULT_ESTIMATOR, distance, separation
+from planner.imaging.sensor import recorded
+from scenes import Picture, Scene
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,10 @@ class Propagated:
 
 def propagate(
     clean: np.ndarray,
-    scene: Scene,
-    sensor: Any,
+    scene: Scene | Picture,
+    sensor: Any = None,
     light: Any = None,
-    estimator: str = "gradient",
+    estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
 ) -> Propagated:
     """Propagate pixel noise through lines and corners to the distance.
@@ -59,15 +61,16 @@ def propagate(
     scene, sensor, light, estimator, threshold
         As for `measure.distance`.
     """
-    noise = scene.noise.variance_at(clean).ravel()  # of each pixel: shot noise grows with light, saturation ends it
-    clean = scene.noise.mean_at(clean)
-    found = distance(clean, scene, sensor, light, estimator, threshold)
+    picture = Picture.of(scene, sensor, light)
+    clean, noise = recorded(picture.scene.noise, clean)
+    noise = np.broadcast_to(noise, clean.shape).ravel()
+    found = distance(clean, picture, estimator=estimator, threshold=threshold)
     if str(found.status) not in status.MEASURED:
         return _nothing(clean, str(found.status))
-    layout, threshold = sought(scene, sensor, light, threshold)
-    tool = prepared(layout, estimator, threshold)
+    layout = layout_of(picture)
+    tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
-    ends = response @ tool.respond(clean).lines
+    ends = response @ tool.respond(clean)
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends
     if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is

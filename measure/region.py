@@ -8,11 +8,11 @@ import numpy as np
 
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from scenes import Scene
+from scenes import Picture, Scene
 
 
 def region_of_interest(
-    scene: Scene, sensor: Any, light: Any = None, estimators: tuple[str, ...] = ("gradient", "canny")
+    scene: Scene | Picture, sensor: Any = None, light: Any = None, estimators: tuple[str, ...] = ("gradient", "canny")
 ) -> np.ndarray:
     """Pixels that can change the measured distance, as long as the edges are where the pose projects them.
 
@@ -26,9 +26,9 @@ def region_of_interest(
     -------
     ndarray of bool, shape (height, width)
     """
-    light = None if light is None else scene.check_pose("light", light)
-    layout = layout_of(scene, scene.check_pose("sensor", sensor), light)
+    picture = Picture.of(scene, sensor, light)
+    layout = layout_of(picture)
     used = np.zeros(layout.optics.shape, bool)
     for name in estimators:
-        used.flat[prepared(layout, name, scene.locator.thresholds[0]).pixels] = True
+        used.flat[prepared(layout, name, picture.scene.locator.thresholds[0]).pixels] = True
     return used

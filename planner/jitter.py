@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.imaging.projection import project
+from planner.imaging.projection import project_ideal
 from scenes import Scene
 
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
@@ -54,5 +54,5 @@ def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
 
 def _distance(scene: Scene, sensors: np.ndarray) -> np.ndarray:
     ends = np.array([scene.solid.vertex(corner.vertex) for corner in scene.task.corners])
-    image = project(ends, sensors, scene.camera)
+    image = project_ideal(ends, sensors, scene.camera)
     return np.linalg.norm(image[:, 1] - image[:, 0], axis=-1)

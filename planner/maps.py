@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.prediction import ModelName, Objective, check_objective, evaluator, in_units
+from planner.imaging.pictures import Pictures
+from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.prediction import DEFAULT_OBJECTIVE, Objective, in_units, minimised
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene
 
@@ -19,8 +21,8 @@ def variance_map(
     light: Any = None,
     *,
     space: ViewingSpace | None = None,
-    model: ModelName = "calibrated",
-    objective: Objective = "object",
+    model: ModelName = DEFAULT_MODEL,
+    objective: Objective = DEFAULT_OBJECTIVE,
 ) -> np.ndarray:
     """Variance for every direction of the viewing space, one of sensor and light being held fixed.
 
@@ -55,10 +57,10 @@ def variance_map(
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
     fixed = np.array(list(scene.check_pose("sensor" if light is None else "light", sensor if light is None else light)))
-    evaluate, field = evaluator(model), "variance" if check_objective(objective) == "image" else "variance_object"
+    evaluate = variance_model(model)
     values = np.empty(len(space))
     for at in range(0, len(space), _CHUNK):
         part = slice(at, at + _CHUNK)
         poses = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
-        values[part] = getattr(evaluate(scene, *poses), field)
+        values[part] = minimised(evaluate(Pictures.of(scene, *poses)), objective)
     return in_units(scene, values, 2)

@@ -8,11 +8,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.features.measurand import required_edges
-from planner.prediction import ModelName, Objective, Prediction, check_objective, evaluator, in_units, predict
+from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.prediction import DEFAULT_OBJECTIVE, Objective, Prediction, check_objective, in_units, predict
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import Found, Report, exhaustive, is_separable
+from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.refinement import refine
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
@@ -79,9 +80,9 @@ class Plan:
 
 def plan(
     scene: Scene,
-    objective: Objective = "object",
+    objective: Objective = DEFAULT_OBJECTIVE,
     *,
-    model: ModelName = "calibrated",
+    model: ModelName = DEFAULT_MODEL,
     search: Search = "exhaustive",
     edges: Literal["given", "best"] = "given",
     step_deg: float | None = None,
@@ -129,7 +130,7 @@ def plan(
     ('ok', True, 10)
     """
     check_objective(objective)
-    evaluator(model)
+    variance_model(model)
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
     constraints = constraints or Constraints()
@@ -177,7 +178,7 @@ class _Option:
 
     @classmethod
     def of(cls, scene, model, step_deg, constraints, sensor, light) -> _Option:
-        fast = is_separable(scene, model)
+        fast = has_bound(scene, model)
         step = step_deg or (1.0 if fast else COARSE_STEP)
         sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
         lights = ViewingSpace(step, constraints.light_polar_deg).poses
@@ -217,7 +218,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
     choice = candidates(options, results, objective)
     if refined and option.free:
         starts = [(sensor, light)]
-        if found is None or not is_separable(scene, option.model):
+        if found is None or not has_bound(scene, option.model):
             others = [c for c in choice[1:3] if c.edges == scene.task.edges]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
         descents = [refine(scene, *at, option.model, objective, option.step_deg, option.constraints) for at in starts]

@@ -7,15 +7,16 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from planner.features.locator import MIN_CONTRAST, MIN_USABLE
 from planner.features.measurand import normals
 from planner.features.propagation import corner_covariance
-from planner.models import models as models
-from planner.models.locator import MIN_CONTRAST, MIN_USABLE
-from scenes import Corner, InvalidInput, Scene
+from planner.imaging.pictures import Pictures
+from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.models.errors import Errors
+from scenes import Corner, InvalidInput, Picture, Scene
 
-ModelName = Literal["paper", "calibrated", "bound"]
 Objective = Literal["object", "image"]
-_MODELS = {"paper": models.paper, "calibrated": models.calibrated, "bound": models.bound}
+DEFAULT_OBJECTIVE: Objective = "object"
 _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 
@@ -40,7 +41,7 @@ class Prediction:
     kind : str
         ``distance`` or ``angle``.
     value_image, value_object : float
-        The quantity itself, as the model projects it and in the object: px and cm, or degrees.
+        The measurand itself, as the model projects it and in the object: px and cm, or degrees.
     variance_image, variance_object : float
         Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
         cannot be measured. The ``paper`` model is right only up to one factor common to all settings, and infinite
@@ -88,9 +89,13 @@ class Prediction:
 
 
 def variances(
-    scene: Scene, sensors: Any, lights: Any, model: ModelName = "calibrated", objective: Objective = "image"
+    scene: Scene,
+    sensors: Any,
+    lights: Any,
+    model: ModelName = DEFAULT_MODEL,
+    objective: Objective = DEFAULT_OBJECTIVE,
 ) -> np.ndarray:
-    """Variance of the measured quantity for arrays of settings.
+    """Variance of the measurand for arrays of settings.
 
     Parameters
     ----------
@@ -98,9 +103,9 @@ def variances(
     sensors, lights : array_like, shape (..., 2)
         Poses (polar, azimuth) in degrees, broadcast against each other.
     model : {"calibrated", "paper", "bound"}
-    objective : {"image", "object"}
-        In the image (px^2) or in the object (cm^2: px^2 over the squared derivative of the image's distance by the
-        object's, both ends moving apart alike); degrees^2 for an angle.
+    objective : {"object", "image"}
+        In the object (cm^2: px^2 over the squared derivative of the image's distance by the object's, both ends moving
+        apart alike) or in the image (px^2); degrees^2 for an angle.
 
     Returns
     -------
@@ -111,24 +116,23 @@ def variances(
     --------
     >>> import scenes
     >>> task1 = scenes.load("task1")
-    >>> v = variances(task1, [30, 135], [[15, 315], [60, 255]], "paper")
+    >>> v = variances(task1, [30, 135], [[15, 315], [60, 255]], "paper", "image")
     >>> round(float(v[1] / v[0]), 1)  # the paper's Table 3: 0.595 / 0.070 = 8.5
     9.0
     """
-    evaluated = evaluator(model)(scene, sensors, lights)
-    return in_units(
-        scene, evaluated.variance if check_objective(objective) == "image" else evaluated.variance_object, 2
-    )
+    return in_units(scene, minimised(variance_model(model)(Pictures.of(scene, sensors, lights)), objective), 2)
 
 
-def predict(scene: Scene, sensor: Any, light: Any, model: ModelName = "calibrated") -> Prediction:
+def predict(
+    scene: Scene | Picture, sensor: Any = None, light: Any = None, model: ModelName = DEFAULT_MODEL
+) -> Prediction:
     """Predict the precision of one setting.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Picture
     sensor, light : Pose or pair of float
-        Polar angle and azimuth, degrees.
+        Polar angle and azimuth, degrees; not with a picture, which has its own.
     model : {"calibrated", "paper", "bound"}
         ``calibrated`` is absolute; ``paper`` follows the paper and has a free scale; ``bound`` is what no
         unbiased estimator can beat.
@@ -145,17 +149,20 @@ def predict(scene: Scene, sensor: Any, light: Any, model: ModelName = "calibrate
     >>> p.status, round(p.value_px, 1), 1e-4 < p.variance_px2 < 1.3e-4
     ('ok', 100.8, True)
     """
-    sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
-    evaluated = evaluator(model)(scene, list(sensor), list(light))
+    picture = Picture.of(scene, sensor, light)
+    if not picture.lights:
+        raise InvalidInput("light must be a pose, got nothing")
+    scene, evaluated = picture.scene, variance_model(model)(Pictures.of(picture))
     known = evaluated.measurand
     edges = tuple(
-        EdgePrediction(name, float(length), float(step), _edge_status(scene, seen, whole, usable, step))
-        for name, length, whole, usable, step, seen in zip(
+        EdgePrediction(name, float(length), float(step), _edge_status(noise, seen, whole, usable, step))
+        for name, length, whole, usable, step, noise, seen in zip(
             known.view.names,
             known.view.lengths,
             known.view.lengths - known.view.trims.sum(-1),
             known.view.usable,
             evaluated.contrast,
+            evaluated.noise_variance,
             known.view.visible,
             strict=True,
         )
@@ -174,17 +181,9 @@ def predict(scene: Scene, sensor: Any, light: Any, model: ModelName = "calibrate
     )
 
 
-def evaluator(model: str):
-    """The function that models arrays of settings.
-
-    Raises
-    ------
-    InvalidInput
-        If there is no such model.
-    """
-    if model not in _MODELS:
-        raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {model!r}")
-    return _MODELS[model]
+def minimised(errors: Errors, objective: str) -> np.ndarray:
+    """The variance that an objective is about (rad^2 for an angle)."""
+    return errors.variance if check_objective(objective) == "image" else errors.variance_object
 
 
 def check_objective(objective: str) -> str:
@@ -199,7 +198,7 @@ def in_units(scene: Scene, value, power: int):
     return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
 
 
-def _covariances(scene: Scene, evaluated: models.Evaluated) -> np.ndarray:
+def _covariances(scene: Scene, evaluated: Errors) -> np.ndarray:
     """Covariances of the two features, px^2."""
     if not scene.task.corners:
         return np.full((2, 2, 2), np.nan)
@@ -218,15 +217,15 @@ def _covariances(scene: Scene, evaluated: models.Evaluated) -> np.ndarray:
     return np.stack(found)
 
 
-def _edge_status(scene: Scene, visible: bool, whole: float, usable: float, step: float) -> str:
+def _edge_status(noise: float, visible: bool, whole: float, usable: float, step: float) -> str:
     if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
         return "not_visible"
     if usable < MIN_USABLE:  # first, for where nothing is left there is no contrast either
         return "short"
-    return "ok" if step > MIN_CONTRAST * np.sqrt(scene.noise.variance) else "low_contrast"
+    return "ok" if step > MIN_CONTRAST * np.sqrt(noise) else "low_contrast"
 
 
-def _status(scene: Scene, evaluated: models.Evaluated, edges: tuple[EdgePrediction, ...]) -> str:
+def _status(scene: Scene, evaluated: Errors, edges: tuple[EdgePrediction, ...]) -> str:
     for worst in ("not_visible", "short", "low_contrast"):
         if any(edge.status == worst for edge in edges):
             return worst

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from planner import projected_edges
+from planner import Pictures, projected_edges
 from render.rays import Rays
-from scenes import Pose, Scene
+from scenes import Picture
 
 _STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 _TILE = 8  # fine pixels
@@ -27,13 +27,13 @@ def crossed(fine: np.ndarray, reach: int = 0) -> np.ndarray:
     return maximum_filter(marked, 2 * reach + 1) if reach else marked
 
 
-def near_edges(scene: Scene, sensor: Pose, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
+def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
     """Fine pixels of the crop that the task's straight edges are located from, and their surroundings, as a mask."""
-    locator, shape = scene.locator, [(part.stop - part.start) // supersample for part in crop]
+    locator, shape = picture.scene.locator, [(part.stop - part.start) // supersample for part in crop]
     rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
     pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
     found = np.zeros(shape, bool)
-    for start, stop in projected_edges(scene, np.array(list(sensor))).ends:
+    for start, stop in projected_edges(Pictures.of(picture)).recorded:
         along = stop - start
         part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
         away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)

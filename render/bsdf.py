@@ -5,31 +5,36 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from render.reflectance import Index, Ops, brightness, polarised_across
+from planner.imaging.reflectance import Index, Ops, across, brightness
 from scenes import Material
 
 NAME = "ice_torrance_sparrow"
 _ROUNDING = 1e-6  # of a cosine, in single precision
 
 
+class Lamp(NamedTuple):
+    """A polarised light: its place (cm), direction of polarisation, and the angle (radians) that its size spans."""
+
+    at: tuple[float, float, float]
+    polarisation: tuple[float, float, float]
+    angle: float
+
+
 @dataclass(frozen=True)
 class Surface:
     """What the BSDF needs to know; positions and directions in space, cm.
 
-    ``polarisation`` is the direction of polarisation of the light at ``light``, ``analyser`` what the polariser before
-    the sensor at ``sensor`` passes; None without one. Light between two surfaces counts as unpolarised; light and
-    sensor are known by their directions, within the angles (radians) that their sizes span.
+    ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
+    surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span.
     """
 
     material: Material
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
-    light: tuple[float, float, float]
-    polarisation: tuple[float, float, float] | None = None
+    lamps: tuple[Lamp, ...] = ()
     analyser: tuple[float, float, float] | None = None
-    light_angle: float = 0.0
     sensor_angle: float = 0.0
 
 
@@ -50,7 +55,7 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    ops = Ops(dr.sqrt, dr.exp, dr.minimum, dr.maximum, dr.select)
+    ops = Ops(dr.sqrt, dr.exp, dr.log, dr.minimum, dr.maximum, dr.select, tiny=1e-30, flat=1e-10)
 
     class TorranceSparrow(mi.BSDF):
         def __init__(self, props):
@@ -70,26 +75,27 @@ def _register(variant: str) -> None:
 
         def eval(self, ctx, si, wo, active=True):
             known = self.surface
-            lit, seen = (_towards(dr, mi, si, at) for at in (known.light, known.sensor))
-            polarisation = None if known.polarisation is None else _local(dr, mi, si, known.polarisation, wo)
             analyser = None if known.analyser is None else _local(dr, mi, si, known.analyser, si.wi)
-            from_light = dr.dot(lit, wo) > math.cos(known.light_angle) - _ROUNDING
-            to_sensor = dr.dot(seen, si.wi) > math.cos(known.sensor_angle) - _ROUNDING
-            value = self._value(wo, si.wi, None, None)
-            if polarisation is not None:
-                value = dr.select(from_light, self._value(wo, si.wi, polarisation, None), value)
-            if analyser is not None:
-                passed = self._value(wo, si.wi, None, analyser)
-                if polarisation is not None:
-                    passed = dr.select(from_light, self._value(wo, si.wi, polarisation, analyser), passed)
-                value = dr.select(to_sensor, passed, value)
+            to_sensor = _along(dr, mi, si, known.sensor, si.wi, known.sensor_angle)
+            value = self._seen(dr, wo, si.wi, None, analyser, to_sensor)
+            for lamp in known.lamps:
+                polarisation = _local(dr, mi, si, lamp.polarisation, wo)
+                lit = self._seen(dr, wo, si.wi, polarisation, analyser, to_sensor)
+                value = dr.select(_along(dr, mi, si, lamp.at, wo, lamp.angle), lit, value)
             return mi.Spectrum(value / math.pi) & active
+
+        def _seen(self, dr, wo, wi, polarisation, analyser, to_sensor):
+            """The sensor looks through the analyser, other surfaces do not."""
+            value = self._value(wo, wi, polarisation, None)
+            return (
+                value if analyser is None else dr.select(to_sensor, self._value(wo, wi, polarisation, analyser), value)
+            )
 
         def _value(self, wo, wi, polarisation, analyser):
             known = self.surface
             up = (0.0 * wi.x, 0.0 * wi.x, 1.0 + 0.0 * wi.x)
             light, sensor = (wo.x, wo.y, wo.z), (wi.x, wi.y, wi.z)
-            return brightness(ops, known.material, known.index, up, light, sensor, polarisation, analyser)
+            return brightness(known.material, known.index, up, light, sensor, polarisation, analyser, ops)
 
         def pdf(self, ctx, si, wo, active=True):
             above = (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)
@@ -103,11 +109,12 @@ def _register(variant: str) -> None:
 
     def _local(dr, mi, si, axis, beam):
         local = si.to_local(mi.Vector3f(*axis))
-        return polarised_across(ops, (local.x, local.y, local.z), (beam.x, beam.y, beam.z))
+        return across((local.x, local.y, local.z), (beam.x, beam.y, beam.z), ops)
 
     mi.register_bsdf(NAME, lambda props: TorranceSparrow(props))
 
 
-def _towards(dr, mi, si, position):
-    """Unit vector in the surface's frame towards a place in space."""
-    return si.to_local(dr.normalize(mi.Point3f(*position) - si.p))
+def _along(dr, mi, si, position, way, angle: float):
+    """Whether a way in the surface's frame leads to a place in space, within an angle."""
+    towards = si.to_local(dr.normalize(mi.Point3f(*position) - si.p))
+    return dr.dot(towards, way) > math.cos(angle) - _ROUNDING

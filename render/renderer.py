@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from planner.imaging.projection import depth, project
+from planner.imaging.lens import confusion, recorded
+from planner.imaging.projection import depth, project_ideal
 from render import variant as variants
 from render.adaptive import crossed, near_edges, refine, refine_tiles
 from render.build import CUSTOM, description, view
-from render.optics import blur_and_bin, distort, distorted
+from render.optics import blur_and_bin
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
 from render.rays import SURFACES, Rays
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Picture, Scene
 
 STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
 
@@ -61,9 +61,9 @@ class Quality:
 
 
 def image(
-    scene: Scene,
-    sensor: Any,
-    light: Any,
+    scene: Scene | Picture,
+    sensor: Any = None,
+    light: Any = None,
     quality: Quality = Quality(),
     variant: str | None = None,
     effects: str | Iterable[str] = "auto",
@@ -73,9 +73,9 @@ def image(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Picture
     sensor, light : Pose or pair of float
-        Polar angle and azimuth, degrees.
+        Polar angle and azimuth, degrees; not with a picture, which has its own.
     quality : Quality
         Rays a pixel.
     variant : str, optional
@@ -97,30 +97,29 @@ def image(
     InvalidInput
         If a pose stands in or on the object, an effect is unknown, or the focal length is too long.
     """
-    sensor, light = scene.check_pose("sensor", sensor), scene.check_pose("light", light)
-    chosen = choose(scene, effects, tolerance, sensor, light)
-    scene, camera, k = chosen.scene, chosen.scene.camera, quality.supersample
-    picture = np.zeros((camera.height, camera.width))
-    rows, columns = window(scene, sensor)
-    if picture[rows, columns].size:
+    picture = Picture.of(scene, sensor, light)
+    if not picture.lights:
+        raise InvalidInput("light must be a pose, got nothing")
+    chosen = choose(picture.scene, effects, tolerance, picture)
+    picture, camera, k = picture.with_scene(chosen.scene), chosen.scene.camera, quality.supersample
+    levels = np.full((camera.height, camera.width), chosen.scene.noise.dark_level)
+    rows, columns = window(picture)
+    if levels[rows, columns].size:
         check_precision(camera)
         crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
-        fine = _fine(scene, sensor, light, chosen.active, crop, quality, variant or variants.choose())
-        start = crop[1].start, crop[0].start
-        warp = partial(distort, camera=camera, start=start, supersample=k) if camera.lens.distortion else None
-        picture[rows, columns] = blur_and_bin(fine, camera.blur_px, k, warp)
-    return picture + camera.black_level
+        fine = _fine(picture, chosen.active, crop, quality, variant or variants.choose())
+        levels[rows, columns] += blur_and_bin(fine, camera, k, (crop[1].start, crop[0].start))
+    return levels
 
 
-def window(scene: Scene, sensor: Pose) -> tuple[slice, slice]:
+def window(picture: Picture) -> tuple[slice, slice]:
     """Rows and columns of the image that have to be rendered: all with a floor, else what object and blur can reach."""
-    camera = scene.camera
-    solids = [scene.solid, *(obstacle.solid for obstacle in scene.obstacles)]
-    corners = project(np.concatenate([solid.vertices for solid in solids]), np.array(list(sensor)), camera)
+    scene, camera = picture.scene, picture.scene.camera
+    corners = project_ideal(scene.bodies.vertices, np.array(list(picture.sensor)), camera)
+    corners = np.concatenate([corners, recorded(corners, camera)])
     if np.isnan(corners).any() or scene.floor is not None:
         return slice(0, camera.height), slice(0, camera.width)
-    corners = np.concatenate([corners, distorted(corners, camera)])
-    margin = 2 + 6 * camera.blur_px + _defocus(scene, sensor)
+    margin = 2 + 6 * camera.blur_px + _defocus(picture)
     low, high = np.floor(corners.min(0) - margin), np.ceil(corners.max(0) + margin + 1)
     (left, top), (right, bottom) = (
         np.clip(edge, 0, [camera.width, camera.height]).astype(int).tolist() for edge in (low, high)
@@ -128,37 +127,38 @@ def window(scene: Scene, sensor: Pose) -> tuple[slice, slice]:
     return slice(top, bottom), slice(left, right)
 
 
-def _defocus(scene: Scene, sensor: Pose) -> float:
+def _defocus(picture: Picture) -> float:
     """Radius of the largest circle of confusion, px."""
-    lens, camera = scene.camera.lens, scene.camera
-    near = max(float(depth(scene.solid.vertices, np.array(list(sensor)), camera).min()), 1e-3 * camera.distance)
-    return lens.aperture_radius * camera.focal_px * abs(1 / near - 1 / (lens.focus or camera.distance))
+    camera = picture.scene.camera
+    away = depth(picture.scene.bodies.vertices, np.array(list(picture.sensor)), camera)
+    return float(confusion(camera, np.maximum(away, 1e-3 * camera.distance)).max())
 
 
-def _fine(scene, sensor, light, active, crop, quality: Quality, variant: str) -> np.ndarray:
+def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.ndarray:
     """Image of fine pixels, before lens and pixel aperture."""
+    camera = picture.scene.camera
     mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
     sharp, interpreted = active - STOCHASTIC, scalar and bool(active & CUSTOM)
-    size = scene.camera.width * k, scene.camera.height * k
+    size = camera.width * k, camera.height * k
 
     def load(active, samples):
-        parts = description(mitsuba, scene, sensor, light, active, size, crop, samples)
+        parts = description(mitsuba, picture, active, size, crop, samples)
         return mitsuba.load_dict(parts, parallel=False)
 
     def tile(samples: int, part: tuple[slice, slice]) -> dict:
         shifted = tuple(slice(a.start + b.start, a.start + b.stop) for a, b in zip(crop, part, strict=True))
-        return view(mitsuba, scene, sensor, active, size, shifted, samples)
+        return view(mitsuba, picture, active, size, shifted, samples)
 
     loaded = load(sharp, 1 if interpreted else quality.samples)
     fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
-    marked = crossed(fine, math.ceil(k * _defocus(scene, sensor)))
+    marked = crossed(fine, math.ceil(k * _defocus(picture)))
     many = quality.edge_samples or (16 if interpreted else 64 if scalar else 256)
     few = quality.random_samples or 16
     bounces = SURFACES - 1 if "interreflection" in active else 0
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed)
     if sharp != active:
         loaded = load(active, few)
-        marked |= near_edges(scene, sensor, crop, k)
+        marked |= near_edges(picture, crop, k)
         if scalar:
             fine = np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
         else:

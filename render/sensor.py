@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.imaging.sensor import recorded, shot_noise
 from scenes import InvalidInput, Noise
 
 TILE = 16  # px; large enough that making a tile's stream costs little, small enough to follow an edge
@@ -45,7 +46,7 @@ def expose(
     if count < 1:
         raise InvalidInput(f"count must be at least 1, got {count}")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
-    sigma = np.sqrt(noise.sigma**2 + noise.gain * np.maximum(image - noise.dark_level, 0.0))
+    sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
     pictures = np.repeat((np.asarray(image, float) + fixed_pattern(image, noise))[None], count, axis=0)
     height, width = image.shape
     across = -(-width // TILE)
@@ -63,7 +64,7 @@ def expose(
 
 def variance(image: np.ndarray, noise: Noise) -> np.ndarray:
     """Variance over repeated pictures (not sigma) of each pixel, squared grey levels, shape as the image."""
-    return noise.variance_at(image)
+    return recorded(noise, image).noise_variance
 
 
 def fixed_pattern(image: np.ndarray, noise: Noise) -> np.ndarray:

@@ -11,12 +11,13 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Circle, Edge, Solid, block
+from scenes.picture import Picture
 from scenes.pose import Pose
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
 
 __all__ = [
     "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
-    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Pose", "Scene", "Setting", "Solid", "Task", "block", "load",
-    "names",
+    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Scene", "Setting", "Solid", "Task", "block",
+    "load", "names",
 ]  # fmt: skip

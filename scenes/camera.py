@@ -8,16 +8,16 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from scenes.lens import Lens
 from scenes.model import Model
-from scenes.ranges import Curve, Darkness, Length, Level, rising
+from scenes.ranges import Coordinate, Curve, Length, Level, rising
 
 
 class Camera(Model):
-    """A pinhole camera on a sphere around the origin, looking at the origin, the object's z axis up.
+    """A pinhole camera on a sphere around ``look_at`` (cm; the origin as in the paper), which it looks at, z axis up.
 
     ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
-    blur, ``exposure`` the grey level of a white diffuse surface at the origin that faces the light, and
-    ``black_level`` the grey level of darkness, which keeps noise from being clipped. ``analyser_deg`` is the
-    direction that an ideal linear polariser in front of the lens lets through, from the image's x towards its y.
+    blur and ``exposure`` the grey level above darkness that the light gives a white diffuse surface at the reference
+    point ``look_at`` that faces it. ``analyser_deg`` is the direction that an ideal linear polariser in front of the
+    lens lets through, from the image's x towards its y.
     ``transmission`` (of the lens) and ``responsivity`` (of the sensor) are C and S of eq. 1 by wavelength, rows
     [nm, relative value], constant where not given.
     """
@@ -28,7 +28,7 @@ class Camera(Model):
     distance: Length
     blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
     exposure: Level = 200.0
-    black_level: Darkness = 0.0
+    look_at: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
     lens: Lens = Lens()
     analyser_deg: float | None = None
     transmission: Curve = ()

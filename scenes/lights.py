@@ -11,7 +11,7 @@ from scenes.ranges import Curve, Length, rising
 
 
 class Light(Model):
-    """A light on a sphere around the origin; ``distance`` in cm.
+    """A light on a sphere around the reference point (`Camera.look_at`); ``distance`` in cm.
 
     ``radius`` (cm) is 0 for a point. ``polarisation_deg`` is the direction of polarisation, seen along the
     beam: from the direction away from the pole (0) towards that of growing azimuth (90); None for unpolarised light.

@@ -5,6 +5,7 @@ Lengths in space are cm, lengths in the image px, brightness is in grey levels.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,7 +20,7 @@ from scenes.model import Model
 from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
-from scenes.parts.solid import Solid
+from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
@@ -30,6 +31,11 @@ def _tag_of_object(value: Any) -> str:
 
 
 Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")], Discriminator(_tag_of_object)]
+
+
+@lru_cache(maxsize=64)
+def _bodies(measured: Block | Mesh, obstacles: tuple[Obstacle, ...]) -> Solid:
+    return assembled(measured.solid, *(obstacle.solid for obstacle in obstacles))
 
 
 class Setting(Model):
@@ -72,11 +78,22 @@ class Scene(Model):
         """Vertices, faces and edges of the object."""
         return self.object.solid
 
+    @property
+    def bodies(self) -> Solid:
+        """The object and the obstacles as one solid: all that hides and shades. The object's faces come first."""
+        return _bodies(self.object, self.obstacles)
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """All lights."""
+        return (self.light,)
+
     def position(self, role: Literal["sensor", "light"], pose: Pose) -> np.ndarray:
-        """Where the sensor or the light stands, cm, shape (3,)."""
+        """Where the sensor or the light stands, cm, shape (3,): on a sphere around the reference point."""
         polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
         direction = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
-        return (self.camera if role == "sensor" else self.light).distance * np.array(direction)
+        radius = (self.camera if role == "sensor" else self.light).distance
+        return np.array(self.camera.look_at) + radius * np.array(direction)
 
     def check_pose(self, role: Literal["sensor", "light"], pose: Any, key: str | None = None) -> Pose:
         """The pose, once it is known to stand outside the object.
@@ -96,6 +113,19 @@ class Scene(Model):
         if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
             raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_dark_level(cls, data: Any) -> Any:
+        """Older files call the level of darkness ``camera.black_level``."""
+        camera, noise = (data.get(key) if isinstance(data, dict) else None for key in ("camera", "noise"))
+        if not (isinstance(camera, dict) and isinstance(noise, dict) and "black_level" in camera):
+            return data
+        level = camera["black_level"]
+        if noise.get("dark_level", level) != level:
+            raise ValueError(f"noise.dark_level must be camera.black_level ({level}), got {noise['dark_level']}")
+        rest = {key: value for key, value in camera.items() if key != "black_level"}
+        return {**data, "camera": rest, "noise": {**noise, "dark_level": level}}
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -131,16 +161,11 @@ class Scene(Model):
             raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
 
     def _check_surroundings(self) -> None:
-        """Floor below the object, light and sensor above it and outside obstacles, one level of darkness."""
+        """Floor below the object, a light that does not reach the object."""
         low = float(self.solid.vertices[:, 2].min())
         if self.floor is not None and self.floor.height > low:
             raise ValueError(
                 f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
-            )
-        if self.noise.needs_darkness and self.noise.dark_level != self.camera.black_level:
-            raise ValueError(
-                f"noise.dark_level must be camera.black_level ({self.camera.black_level:g}) where noise depends on the "
-                f"light, got {self.noise.dark_level:g}"
             )
         if self.light.radius >= self.light.distance / 2:
             raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")

@@ -73,4 +73,4 @@ def block_image(scene, sensor, light):
         )
         if seen
     ]
-    return camera.black_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)
+    return noise.dark_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)

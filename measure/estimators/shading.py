@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.imaging.projection import project
-from planner.imaging.reflectance import reflected
-from scenes import Pose, Scene
+from planner.imaging.appearance import signal
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import project_ideal
 
 _DEGREE = 3
 _GRID = np.linspace(0.02, 0.98, 7)
@@ -45,19 +45,13 @@ class Shading:
         return np.stack([x**i * y**j for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)], -1)
 
 
-def face_shadings(scene: Scene, sensor: Pose, light: Pose) -> list[Shading | None]:
-    """The shading of each face of the object; None for a face that the light or the sensor does not reach."""
-    eye, lamp = scene.position("sensor", sensor), scene.position("light", light)
-    found: list[Shading | None] = []
-    for normal, face in zip(scene.solid.normals, scene.solid.faces, strict=True):
-        points = _spread(scene.solid.vertices[list(face)])
-        to_light, to_eye = lamp - points, eye - points
-        distance = np.linalg.norm(to_light, axis=1, keepdims=True)
-        levels = reflected(
-            scene.material, normal, to_light / distance, to_eye / np.linalg.norm(to_eye, axis=1, keepdims=True)
-        )
-        levels = levels * (scene.light.distance / distance[:, 0]) ** 2
-        image = project(points, np.array(list(sensor)), scene.camera)
+def face_shadings(pictures: Pictures) -> list[Shading | None]:
+    """The shading of each face of object and obstacles; None for one that the lights or the sensor do not reach."""
+    scene, found = pictures.scene, []
+    for normal, face in zip(scene.bodies.normals, scene.bodies.faces, strict=True):
+        points = _spread(scene.bodies.vertices[list(face)])
+        levels = signal(pictures, points, normal, 1)
+        image = project_ideal(points, pictures.sensors, scene.camera)
         found.append(Shading(image, levels) if levels.min() > 0 and np.isfinite(image).all() else None)
     return found
 

@@ -10,8 +10,8 @@ import numpy as np
 from measure import status
 from measure.estimators.gradient import GradientLocator
 from measure.features.calipers import MIN_POSITIONS
-from measure.features.layout import Optics
-from planner.models.locator import MIN_CONTRAST, edge_blur
+from measure.features.optics import Optics
+from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput
 
 _STEPS = 12
@@ -123,7 +123,7 @@ def find_ellipse(
     points = places + (found.offset + inward)[..., None] * normals
     start = np.broadcast_to(expected, (len(stack), 5))
     parameters, good = _descend(points, found.valid.astype(float), start, circle)
-    unit = locator.unit_noise()
+    unit = locator.unit_noise().response
     covariances = []
     for row, valid, contrast in zip(parameters, found.valid, found.contrast, strict=True):
         response, known = _solve(_free(_distances(places, row)[1], circle), valid.astype(float))

@@ -9,34 +9,14 @@ import numpy as np
 from skimage.draw import polygon2mask
 
 from measure.estimators.shading import Shading, face_shadings
+from measure.features.optics import Optics
 from planner.features.projected_edges import projected_edges
-from planner.imaging.projection import depth, direction, facing, project
-from scenes import Corner, InvalidInput, Pose, Scene
+from planner.imaging.lens import signed_confusion
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import depth, facing, project_ideal
+from scenes import Corner, InvalidInput, Picture, Scene
 
 BACKGROUND = -1
-
-
-@dataclass(frozen=True)
-class Optics:
-    """What the estimators have to know of the image: its size, blur and noise, and the locators' settings.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        (height, width), px.
-    blur_px : float
-        Standard deviation of the lens' blur, px; the pixels' own box comes on top.
-    noise_variance : float
-        Variance of a grey level.
-    scale_px, window_px : float
-        Smoothing scale and half search window of the point locators, px.
-    """
-
-    shape: tuple[int, int]
-    blur_px: float = 0.6
-    noise_variance: float = 1.0
-    scale_px: float = 1.0
-    window_px: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +27,7 @@ class Layout:
     ----------
     names : tuple of str
     ends : ndarray, shape (E, 2, 2)
-        End points (x, y) of each edge, px; NaN where it is not in front of the sensor.
+        End points (x, y) of each edge, ideal px; NaN where it is not in front of the sensor.
     visible : ndarray of bool, shape (E,)
     shown : ndarray, shape (E, 2)
         The piece of each edge that nothing hides, as fractions (from, to) of its length.
@@ -68,6 +48,8 @@ class Layout:
     shadings : tuple
         For each of the faces its `Shading`, or None where the light is not known.
     optics : Optics
+    defocus : ndarray, shape (E, 2)
+        Signed radius of the circle of confusion at both ends of each edge, px; it changes linearly in between.
     """
 
     names: tuple[str, ...]
@@ -83,6 +65,7 @@ class Layout:
     sides: np.ndarray
     shadings: tuple[Shading | None, ...]
     optics: Optics
+    defocus: np.ndarray
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -154,36 +137,30 @@ class Layout:
         """Which face each pixel belongs to, int, shape (height, width)."""
         found = np.full(self.optics.shape, BACKGROUND)
         for index, face in enumerate(self.faces):
-            found[polygon2mask(self.optics.shape, face[:, ::-1])] = index
+            found[polygon2mask(self.optics.shape, self.optics.recorded(face)[:, ::-1])] = index
         return found
 
 
-def optics_of(scene: Scene) -> Optics:
-    """The scene's camera, noise and locator settings."""
-    camera, locator = scene.camera, scene.locator
-    shape = camera.height, camera.width
-    return Optics(shape, camera.blur_px, scene.noise.variance, locator.scale_px, locator.window_px)
-
-
 @lru_cache(maxsize=64)
-def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
-    """The task's edges as a sensor pose projects them.
+def layout_of(picture: Picture) -> Layout:
+    """The task's edges as a sensor pose projects them, in ideal image coordinates.
+
+    With the lights known, the shading of each face is known too, and a face that is not lit is background.
 
     Raises
     ------
     InvalidInput
         If the task is not the distance between two corners.
-
-    With the light known, the shading of each face is known too, and a face that is not lit is background.
     """
+    scene = picture.scene
     if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
         raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
-    solid, pose = scene.solid, np.array(list(sensor))
-    view = projected_edges(scene, pose)
-    points = project(solid.vertices, pose, scene.camera)
-    seen = facing(solid, scene.camera.distance * direction(pose))
-    shadings = [None] * len(solid.faces) if light is None else face_shadings(scene, sensor, light)
-    if light is not None and any(shadings):
+    pictures, solid, pose = Pictures.of(picture), scene.bodies, np.array(list(picture.sensor))
+    view = projected_edges(pictures)
+    points = project_ideal(solid.vertices, pose, scene.camera)
+    seen = facing(solid, pictures.sensor_at)
+    shadings = face_shadings(pictures) if picture.lights else [None] * len(solid.faces)
+    if any(shadings):
         seen = seen & np.array([shading is not None for shading in shadings])
     required = [solid.edge(name) for name in view.names]
     shown = [edge for edge in solid.edges if seen[list(edge.faces)].any()]
@@ -206,7 +183,8 @@ def layout_of(scene: Scene, sensor: Pose, light: Pose | None = None) -> Layout:
         faces=faces,
         sides=np.array([_sides(points, edge, solid.faces, place) for edge in required]),
         shadings=tuple(shadings[f] for f in order),
-        optics=optics_of(scene),
+        optics=Optics.of(scene),
+        defocus=_defocus(scene, pose, required),
     )
 
 
@@ -236,7 +214,14 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         sides=np.tile([0, BACKGROUND] if clockwise else [BACKGROUND, 0], (count, 1)),
         shadings=(Shading.uniform(corners),),
         optics=optics,
+        defocus=np.zeros((count, 2)),
     )
+
+
+def _defocus(scene: Scene, pose: np.ndarray, required) -> np.ndarray:
+    """Signed radii of confusion at the edges' ends: inverse depth is linear in the image, and so are they."""
+    ends = np.array([list(edge.ends) for edge in required])
+    return signed_confusion(scene.camera, depth(scene.solid.vertices, pose, scene.camera)[ends])
 
 
 def _joints(ends: list[tuple[int, int]]) -> tuple:

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from scipy.special import ndtri
 
-from measure.features.layout import Optics, polygon_layout
+from measure.features.layout import polygon_layout
+from measure.features.optics import Optics
 from scenes import InvalidInput
 
 _LEVELS = 24

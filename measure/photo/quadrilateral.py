@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure import status
-from measure.features.layout import Optics, polygon_layout
+from measure.features.layout import polygon_layout
+from measure.features.optics import Optics
 from measure.features.shape import find_shape
 from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
 from measure.measurement import checked_image

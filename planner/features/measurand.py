@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.projected_edges import ProjectedEdges, projected_edges
-from planner.imaging.projection import depth, frame, from_axis, image_centre, project
+from planner.features.projected_edges import ProjectedEdges, projected_edges, straight
+from planner.imaging.lens import image_centre
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import from_axis, jacobian_ideal, project_ideal
 from scenes import Centre, Corner, Edge, Scene, Task
 
 
@@ -25,7 +27,7 @@ class Measurand:
     view : ProjectedEdges
         The E different straight edges that it depends on.
     value : ndarray, shape (...)
-        In the image.
+        In the image (ideal coordinates: the lens' distortion undone).
     value_object : float
         In the object.
     scale : ndarray, shape (...)
@@ -35,7 +37,7 @@ class Measurand:
     pull : ndarray, shape (..., 2)
         Unit vector along a distance; the derivative by the position of the end, its negative by that of the start.
     points : ndarray, shape (..., 2, 2)
-        Images of the two features (x, y), px; of the edges' middles for an angle.
+        Images of the two features (x, y), ideal px; of the edges' middles for an angle.
     """
 
     view: ProjectedEdges
@@ -48,14 +50,16 @@ class Measurand:
     points: np.ndarray
 
 
-def measurand(scene: Scene, sensors: np.ndarray) -> Measurand:
-    """The task's quantity seen from sensor poses (..., 2), degrees."""
-    sensors = np.asarray(sensors, float)
-    circles = {circle.name for circle in scene.solid.circles}
-    names = tuple(name for name in dict.fromkeys(scene.task.edges) if name not in circles)
-    view = projected_edges(scene, sensors, names)
+def measurand(pictures: Pictures) -> Measurand:
+    """The task's measurand as the sensors see it, found once for each set of pictures."""
+    return pictures.once("measurand", lambda: _measurand(pictures))
+
+
+def _measurand(pictures: Pictures) -> Measurand:
+    scene = pictures.scene
+    view = projected_edges(pictures, tuple(dict.fromkeys(straight(scene))))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (_distance if scene.task.kind == "distance" else _angle)(scene, sensors, view)
+        return (_distance if scene.task.kind == "distance" else _angle)(scene, pictures.sensors, view)
 
 
 def required_edges(scene: Scene) -> tuple[Task, ...]:
@@ -82,15 +86,6 @@ def required_edges(scene: Scene) -> tuple[Task, ...]:
     return tuple(Task(start=start, end=end) for start in options[0] for end in options[1])
 
 
-def jacobian(points: np.ndarray, poses: np.ndarray, camera) -> np.ndarray:
-    """Derivative of the image (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
-    axes = frame(poses)
-    z = depth(points, poses, camera)[..., None, None]
-    screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
-    beside = points @ np.moveaxis(screen[..., 0, :, :], -2, -1)
-    return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)
-
-
 def _distance(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand:
     solid = scene.solid
     places = np.array([_place(scene, feature) for feature in scene.task.corners])
@@ -105,7 +100,7 @@ def _distance(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measur
         if isinstance(feature, Corner):
             _add_corner(sign * pull, view, [solid.edge(name) for name in feature.edges], feature, solid, offset, tilt)
     length = float(np.linalg.norm(places[1] - places[0]))
-    derivative = jacobian(places, sensors, scene.camera).sum(-3) / 2 @ ((places[1] - places[0]) / length)
+    derivative = jacobian_ideal(places, sensors, scene.camera).sum(-3) / 2 @ ((places[1] - places[0]) / length)
     scale = np.einsum("...i,...i->...", pull, derivative)
     return Measurand(view, value, length, scale, offset, tilt, pull, points)
 
@@ -151,7 +146,7 @@ def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand
     axis = np.cross(*lines)
     inside = np.arctan2(np.linalg.norm(axis), lines[0] @ lines[1])
     pivots = np.array([solid.vertices[e[0]] if shared else solid.vertices[e].mean(0) for e in ends])
-    derivative = jacobian(pivots, sensors, scene.camera)
+    derivative = jacobian_ideal(pivots, sensors, scene.camera)
     images = np.einsum("...kij,kj->...ki", derivative, lines)
     turning = np.cross(axis / max(np.linalg.norm(axis), np.finfo(float).tiny), lines)
     moved = np.einsum("...kij,kj->...ki", derivative, turning)
@@ -161,7 +156,7 @@ def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand
     sign = np.sign(crossing)
     scale = sign * rates.sum(-1) / 2
     tilt = np.stack([-sign, sign], -1)
-    points = project(pivots, sensors, scene.camera)
+    points = project_ideal(pivots, sensors, scene.camera)
     return Measurand(view, value, float(inside), scale, np.zeros_like(tilt), tilt, np.zeros((*value.shape, 2)), points)
 
 

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.projection import depth, direction, facing, from_axis, image_centre
+from planner.features.locator import reach
+from planner.imaging.lens import image_centre, recorded
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import depth, facing, from_axis
 from planner.imaging.visibility import longest_span, turned
-from planner.models.locator import reach
 from scenes import Edge, Scene
 
 
@@ -25,8 +27,8 @@ class ProjectedEdges:
     ----------
     names : tuple of str
         Edge names, as `Task.edges`.
-    ends : ndarray, shape (..., E, 2, 2)
-        The two end points (x, y), px.
+    ends, recorded : ndarray, shape (..., E, 2, 2)
+        The two end points (x, y), px: in ideal coordinates, where edges are straight, and where they are recorded.
     along : ndarray, shape (..., E, 2)
         From the first end to the last, px; exact too where it is small against the image.
     trims : ndarray, shape (..., E, 2)
@@ -42,6 +44,7 @@ class ProjectedEdges:
 
     names: tuple[str, ...]
     ends: np.ndarray
+    recorded: np.ndarray
     along: np.ndarray
     trims: np.ndarray
     framed: np.ndarray
@@ -65,19 +68,22 @@ def straight(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in scene.task.edges if name not in circles)
 
 
-def projected_edges(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | None = None) -> ProjectedEdges:
-    """Project edges and decide how much of each can be measured.
+def projected_edges(pictures: Pictures, names: tuple[str, ...] | None = None) -> ProjectedEdges:
+    """Project edges and decide how much of each can be measured; found once for each set of pictures.
 
     Parameters
     ----------
-    sensors : ndarray, shape (..., 2)
-        Sensor poses, degrees.
+    pictures : Pictures
+        Their lights do not matter.
     names : tuple of str, optional
         Edges; the task's straight ones when not given.
     """
-    solid, names = scene.solid, straight(scene) if names is None else names
-    sensors = np.asarray(sensors, float)
-    positions = scene.camera.distance * direction(sensors)
+    names = straight(pictures.scene) if names is None else names
+    return pictures.once(("edges", names), lambda: _project(pictures, names))
+
+
+def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
+    scene, solid, sensors, positions = pictures.scene, pictures.scene.solid, pictures.sensors, pictures.sensor_at
     seen = facing(solid, positions)
     edges = [solid.edge(name) for name in names]
     needed, clear = _near(solid.edges, edges), reach(scene.locator.scale_px, scene.camera.blur_px)
@@ -86,19 +92,25 @@ def projected_edges(scene: Scene, sensors: np.ndarray, names: tuple[str, ...] | 
     )
     trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
     trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
-    shown = image_fractions(scene, names, sensors, _stack([longest_span(solid, e, positions) for e in edges], -2))
+    shown = image_fractions(
+        scene, names, sensors, _stack([longest_span(scene.bodies, e, positions) for e in edges], -2)
+    )
     along = ends[..., 1, :] - ends[..., 0, :]
     lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
-    if not solid.is_convex:
+    if not scene.bodies.is_convex:
         trims = cut(trims, shown, lengths, clear)
+    bent = recorded(ends, scene.camera)
     return ProjectedEdges(
         names=names,
         ends=ends,
         along=along,
         trims=trims,
-        framed=cut(trims, within_image(scene, ends), lengths, 0.0),
+        recorded=bent,
+        framed=cut(trims, within_image(scene, bent), lengths, 0.0),
         shown=shown,
-        visible=_stack([turned(solid, edge, positions).any(-1) for edge in edges], -1) & (shown[..., 1] > 0),
+        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], -1)
+        & (shown[..., 1] > 0)
+        & np.isfinite(bent).all((-1, -2)),
     )
 
 

@@ -1,4 +1,4 @@
-"""Poses, projection and visibility: how the sensor and the light see the object.
+"""Poses and projection: where the sensor and the light stand, and where points of the scene land in the image.
 
 Everything takes arrays of poses, shape (..., 2) = (polar, azimuth) in degrees, and keeps the leading shape.
 Image coordinates are px with (0, 0) the centre of the first pixel, x to the right, y down.
@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenes import Camera, Solid
+from planner.imaging.lens import image_centre, lens_jacobian, recorded
+from scenes import Camera, Light, Solid
 
 _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
 
@@ -41,8 +42,18 @@ def frame(poses: np.ndarray) -> Frame:
     return Frame(right, down, -direction(poses))
 
 
+def sensor_position(camera: Camera, poses: np.ndarray) -> np.ndarray:
+    """Where the sensor stands, cm, shape (..., 3)."""
+    return np.array(camera.look_at) + camera.distance * direction(poses)
+
+
+def light_position(camera: Camera, light: Light, poses: np.ndarray) -> np.ndarray:
+    """Where a light stands, cm, shape (..., 3): on a sphere around the point that the camera looks at."""
+    return np.array(camera.look_at) + light.distance * direction(poses)
+
+
 def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Perspective image of points.
+    """Where the camera records points, the lens' distortion included.
 
     Parameters
     ----------
@@ -54,27 +65,42 @@ def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray
     Returns
     -------
     ndarray, shape (..., n, 2)
-        Image coordinates, px; NaN for points that are not in front of the sensor.
+        Recorded image coordinates, px; NaN for points that are not in front of the sensor.
     """
+    return recorded(project_ideal(points, poses, camera), camera)
+
+
+def project_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Ideal image coordinates of points (n, 3): a pinhole camera's, px, shape (..., n, 2)."""
     return image_centre(camera) + from_axis(points, poses, camera)
 
 
 def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """The same from the image's middle, px: what is small against the image keeps its digits in differences."""
     axes = frame(poses)
-    beside = points @ np.stack([axes.right, axes.down], -1)
+    beside = (points - np.array(camera.look_at)) @ np.stack([axes.right, axes.down], -1)
     away = depth(points, poses, camera)[..., None]
     return camera.focal_px * beside / np.where(away > 0, away, np.nan)
 
 
-def image_centre(camera: Camera) -> np.ndarray:
-    """Image of the origin (x, y), px."""
-    return np.array([camera.width - 1, camera.height - 1]) / 2
-
-
 def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Distance of points (..., n, 3) from the sensor along its axis, cm, shape (..., n)."""
-    return camera.distance + np.einsum("...ni,...i->...n", points, frame(poses).forward)
+    return camera.distance + np.einsum("...ni,...i->...n", points - np.array(camera.look_at), frame(poses).forward)
+
+
+def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Derivative of `project` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
+    ideal = project_ideal(points, poses, camera)
+    return lens_jacobian(ideal, camera) @ jacobian_ideal(points, poses, camera)
+
+
+def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Derivative of `project_ideal` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
+    axes = frame(poses)
+    z = depth(points, poses, camera)[..., None, None]
+    screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
+    beside = (points - np.array(camera.look_at)) @ np.moveaxis(screen[..., 0, :, :], -2, -1)
+    return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)
 
 
 def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:

@@ -1,1 +1,30 @@
-"""Variance models: how precisely the features of a picture can be located, without an image."""
+"""Variance models: how precisely the measurand can be known in pictures, without an image of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+from planner.imaging.pictures import Pictures
+from planner.models.bound import bound
+from planner.models.calibrated import calibrated
+from planner.models.errors import Errors
+from planner.models.paper import paper
+from scenes import InvalidInput
+
+ModelName = Literal["paper", "calibrated", "bound"]
+DEFAULT_MODEL: ModelName = "calibrated"
+_MODELS: dict[str, Callable[[Pictures], Errors]] = {"paper": paper, "calibrated": calibrated, "bound": bound}
+
+
+def variance_model(name: str) -> Callable[[Pictures], Errors]:
+    """The variance model of a name: a function of `Pictures`.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such model.
+    """
+    if name not in _MODELS:
+        raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {name!r}")
+    return _MODELS[name]

@@ -10,22 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 from planner.features.projected_edges import image_fractions
-from planner.imaging.contrast import squared_contrast, step_on_unit_sphere
+from planner.imaging.appearance import is_separable, paper_contrast2, paper_step
+from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction, edge_points
-from scenes import Scene
 
 _BLOCK = 256  # poses at a time, so that their points stay in the processor's cache
 
 
-def moments(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, lights: np.ndarray, count: int):
+def moments(pictures: Pictures, names: tuple[str, ...], count: int):
     """Sum, mean and variance of the edge points' places with their squared contrasts as weights.
 
     Parameters
     ----------
     names : tuple of str
         E edges, with ``count`` points each, equally spaced in space.
-    sensors, lights : ndarray, shape (..., 2)
-        Poses, degrees; broadcast against each other.
 
     Returns
     -------
@@ -33,9 +31,10 @@ def moments(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, lights: n
         Sum of the weights, grey levels^2; mean and variance of the fractions of the image's length; number of points
         with any weight.
     """
-    plain = scene.solid.is_convex and scene.material.is_diffuse
-    if plain and names and 1 in (sensors.ndim, lights.ndim):
-        strength = step_on_unit_sphere(scene, names, sensors, lights) ** 2
+    scene, sensors = pictures.scene, pictures.sensors
+    lights = pictures.lights[0]
+    if is_separable(scene) and names and 1 in (sensors.ndim, lights.ndim):
+        strength = paper_step(pictures, names) ** 2
         if sensors.ndim == 1:
             parts = _many_lights(scene, names, sensors, lights.reshape(-1, 2), count)
             shape = lights.shape[:-1]
@@ -46,7 +45,7 @@ def moments(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, lights: n
         mean = first / zeroth
         return strength * zeroth, mean, second / zeroth - mean**2, np.full(strength.shape, count)
     fractions = np.linspace(0, 1, count)
-    squared = squared_contrast(scene, names, fractions, sensors, lights, fall_off=False)
+    squared = paper_contrast2(pictures, names, fractions)
     u = image_fractions(scene, names, sensors, fractions)
     total = squared.sum(-1)
     mean = np.einsum("...n,...n->...", squared, u) / total
@@ -60,6 +59,7 @@ def _many_lights(scene, names, sensor, lights, count):
     u = image_fractions(scene, names, sensor, fractions)
     powers = np.stack([np.ones_like(u), u, u * u], -1)
     points = edge_points(scene.solid, names, fractions).reshape(-1, 3)
+    points = points - np.array(scene.camera.look_at)
     plan = np.vstack([-2 * points.T, (points**2).sum(1) + scene.light.distance**2])
     found = np.empty((3, len(lights), len(names)))
     for at in range(0, len(lights), _BLOCK):
@@ -72,7 +72,7 @@ def _many_lights(scene, names, sensor, lights, count):
 def _many_sensors(scene, names, sensors, light, count):
     """The same sums for one light and many sensors."""
     fractions = np.linspace(0, 1, count)
-    points = edge_points(scene.solid, names, fractions)
+    points = edge_points(scene.solid, names, fractions) - np.array(scene.camera.look_at)
     weights = 1 / ((scene.light.distance * direction(light) - points) ** 2).sum(-1)
     plan = np.vstack([-points.reshape(-1, 3).T, np.full(points.shape[0] * count, scene.camera.distance)])
     found = np.empty((3, len(sensors), len(names)))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.features.projected_edges import projected_edges, straight
-from planner.imaging.projection import direction, project
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import direction, light_position, project
 from scenes import InvalidInput, Scene
 
 Region = tuple[float, float, float]  # polar, azimuth, radius, degrees
@@ -63,7 +64,7 @@ class Constraints:
         """Which sensor poses (n, 2) are allowed; bool, shape (n,)."""
         allowed = _polar(poses, self.sensor_polar_deg) & _outside(poses, self.forbidden_sensor)
         if self.min_edge_px > 0 or self.min_clearance_px > 0:
-            view = projected_edges(scene, poses, tuple(dict.fromkeys(straight(scene))))
+            view = projected_edges(Pictures.of(scene, poses), tuple(dict.fromkeys(straight(scene))))
             allowed &= (view.usable >= self.min_edge_px).all(-1) & view.visible.all(-1)
             if self.min_clearance_px > 0:
                 allowed &= _clearance(scene, view) >= self.min_clearance_px
@@ -104,7 +105,7 @@ def _outside(poses: np.ndarray, regions: tuple[Region, ...]) -> np.ndarray:
 def _in_view(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
     """Whether the light's image falls into the sensor's."""
     sensors, lights = np.broadcast_arrays(sensors, lights)
-    image = project(scene.light.distance * direction(lights)[..., None, :], sensors, scene.camera)[..., 0, :]
+    image = project(light_position(scene.camera, scene.light, lights)[..., None, :], sensors, scene.camera)[..., 0, :]
     size = np.array([scene.camera.width, scene.camera.height])
     return ((image > -0.5) & (image < size - 0.5)).all(-1)
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.prediction import evaluator
+from planner.imaging.appearance import is_separable
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from planner.prediction import minimised
 from planner.search.constraints import Constraints
 from planner.search.separable import Separable, separable
 from scenes import Scene
@@ -50,10 +53,10 @@ class Found:
     guaranteed: bool
 
 
-def is_separable(scene: Scene, model: str) -> bool:
-    """Whether the fast search applies: convex, diffuse, straight edges only."""
+def has_bound(scene: Scene, model: str) -> bool:
+    """Whether the fast search applies: a separable scene, straight edges only."""
     straight = all(name in {edge.name for edge in scene.solid.edges} for name in scene.task.edges)
-    return scene.solid.is_convex and scene.material.is_diffuse and straight and model in ("paper", "calibrated")
+    return is_separable(scene) and straight and model in ("paper", "calibrated")
 
 
 def exhaustive(
@@ -65,7 +68,7 @@ def exhaustive(
     For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
     not exceed the best variance known are evaluated. Otherwise every pair is evaluated.
     """
-    search = _by_bound if is_separable(scene, model) else _one_by_one
+    search = _by_bound if has_bound(scene, model) else _one_by_one
     return search(scene, sensors, lights, model, objective, constraints, report or (lambda *_: None))
 
 
@@ -75,8 +78,7 @@ def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str) ->
     size = _PAIRS // 8
     for at in range(0, len(sensors), size):
         part = slice(at, at + size)
-        evaluated = evaluator(model)(scene, sensors[part], lights[part])
-        values[part] = evaluated.variance if objective == "image" else evaluated.variance_object
+        values[part] = minimised(variance_model(model)(Pictures.of(scene, sensors[part], lights[part])), objective)
     return values
 
 
@@ -130,12 +132,11 @@ def _blocks(table: Separable, scene, sensors, lights, constraints, wanted=None):
 
 def _one_by_one(scene, sensors, lights, model, objective, constraints, report) -> Found:
     least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
-    evaluate = evaluator(model)
+    evaluate = variance_model(model)
     size = max(1, 20_000 // max(len(lights), 1))
     for at in range(0, len(sensors), size):
         part = sensors[at : at + size]
-        evaluated = evaluate(scene, part[:, None], lights[None])
-        values = evaluated.variance if objective == "image" else evaluated.variance_object
+        values = minimised(evaluate(Pictures.of(scene, part[:, None], lights[None])), objective)
         if constraints is not None and constraints.on_pairs:
             values = np.where(constraints.pairs(scene, part[:, None], lights[None]), values, np.inf)
         best[at : at + size] = values.argmin(1)

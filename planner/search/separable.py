@@ -3,7 +3,8 @@
 On a convex diffuse solid an edge's contrast is K / r (or K / r^3 with fall-off): K depends on the light and on which
 faces the sensor sees, r on the light and the place along the edge. For the paper's model the line's variance is a
 convex function of the weights K^2 / r^2, so it lies above its tangent at equal weights, which is linear in 1 / r^2.
-The calibrated model is linear in r^6 itself. Both are then, edge by edge, a sum of products (sensor) x (light).
+The calibrated model is linear in r^6 itself, and with shot noise in r^3, too. All are then, edge by edge, a sum of
+products (sensor) x (light).
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.features.locator import MIN_USABLE, correlation
 from planner.features.measurand import Measurand, measurand
-from planner.features.projected_edges import end_depths, image_fractions
-from planner.imaging.contrast import squared_distance, step_on_unit_sphere
-from planner.imaging.projection import direction, facing
-from planner.models.locator import MIN_USABLE, correlation, kappa2
-from planner.models.models import NODE_WEIGHTS, NODES, PAPER_KAPPA2, PAPER_POINTS
+from planner.features.projected_edges import image_fractions
+from planner.imaging.appearance import edge_distance2, of_sides, paper_step, side_strengths
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import facing
+from planner.imaging.sensor import headroom, shot_noise
+from planner.models.along import NODE_WEIGHTS, place_nodes
+from planner.models.calibrated import SHORT, line_slope, line_weight, point_variance, second_order
+from planner.models.paper import PAPER_KAPPA2, PAPER_POINTS
 from scenes import Scene
 
 _DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the smooth functions here
@@ -26,7 +31,7 @@ _MARGIN = 3e-6  # relative; single precision in sums of about 30 terms of like s
 
 @dataclass(frozen=True)
 class Separable:
-    """Lower bound of the variance: sum over k of sensor_part[s, k] light_part[l, k] / K^2[class of s, l, edge of k].
+    """Lower bound of the variance: sum over k of sensor_part[s, k] light_part[l, k] strength[class of s, l, kind of k].
 
     Attributes
     ----------
@@ -36,8 +41,9 @@ class Separable:
         Which set of faces each of them sees.
     sensor_part : ndarray, shape (S, E, k)
     light_part : ndarray, shape (L, E, k)
-    strength : ndarray, shape (classes, L, E)
-        K^2.
+        The k are in equal parts of the kinds of strength.
+    strength : ndarray, shape (classes, L, E, kinds)
+        What an edge's contrast makes of them; 0 where there is none.
     """
 
     sensors: np.ndarray
@@ -49,8 +55,9 @@ class Separable:
     def of_class(self, which: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Indices of sensors (into `sensors`) and lights that see contrast on all edges, and the lights' matrix."""
         strength = self.strength[which]
-        lights = np.flatnonzero((strength > 0).all(-1))
-        part = (self.light_part[lights] / strength[lights][..., None]).reshape(len(lights), -1)
+        lights = np.flatnonzero((strength[..., 0] > 0).all(-1))
+        part = self.light_part[lights].reshape(*strength[lights].shape, -1) * strength[lights][..., None]
+        part = part.reshape(len(lights), -1)
         return np.flatnonzero(self.classes == which), lights, np.ascontiguousarray(part.T, np.float32)
 
     def rows(self, which: np.ndarray, lights: np.ndarray) -> np.ndarray:
@@ -60,7 +67,7 @@ class Separable:
 
 
 def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str) -> Separable:
-    """Set up the bound for a convex diffuse solid and a task of straight edges.
+    """Set up the bound for a separable scene and a task of straight edges.
 
     Parameters
     ----------
@@ -69,22 +76,56 @@ def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str,
     model : {"paper", "calibrated"}
     objective : {"image", "object"}
     """
+    pictures = Pictures.of(scene, sensors)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        known = measurand(scene, sensors)
+        known = measurand(pictures)
         make = _paper if model == "paper" else _calibrated
-        sensor_part, good = make(scene, sensors, known)
+        sensor_part, good = make(pictures, known)
         if objective == "object":
             sensor_part = sensor_part / known.scale[:, None, None] ** 2
     good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2))
     light_part = _light_part(scene, known.view.names, lights, model)
     slack = 1 - _MARGIN * np.sign(sensor_part * light_part.mean(0))  # less where it adds, more where it takes away
-    seen = facing(scene.solid, scene.camera.distance * direction(sensors[good]))
+    seen = facing(scene.solid, pictures.sensor_at[good])
     kinds, classes = np.unique(seen, axis=0, return_inverse=True)
     first = [int(np.flatnonzero(good)[np.argmax(classes == k)]) for k in range(len(kinds))]
-    strength = [step_on_unit_sphere(scene, known.view.names, sensors[k], lights) ** 2 for k in first]
+    strength = [_strengths(scene, known.view.names, sensors[k], lights, model) for k in first]
     return Separable(
         np.flatnonzero(good), classes.ravel(), (sensor_part * slack)[good], light_part, np.array(strength)
     )  # fmt: skip
+
+
+def _strengths(scene: Scene, names: tuple[str, ...], sensor: np.ndarray, lights: np.ndarray, model: str) -> np.ndarray:
+    """1 / K^2 of each edge and, for the calibrated model, (K_1 + K_2) / K^2 / 2: shape (L, E, 1 or 2), 0 for none.
+
+    With K_1 / r^3 and K_2 / r^3 the sides' signals, K their difference, the noise over the squared contrast is
+    sigma^2 r^6 / K^2 + gain (K_1 + K_2) / 2 r^3 / K^2, times what the end of the scale makes of it.
+    """
+    pictures = Pictures.of(scene, sensor, lights)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if model == "paper":
+            inverse = 1 / paper_step(pictures, names)[..., None] ** 2
+        else:
+            sides = side_strengths(pictures, names)
+            kinds = [np.ones(sides.shape[:-1]), sides.sum(-1) / 2][: 2 if scene.noise.gain > 0 else 1]
+            inverse = np.stack(kinds, -1) / (sides[..., :1] - sides[..., 1:]) ** 2
+            inverse *= _cut_off(scene, sides, edge_distance2(pictures, names, np.linspace(0, 1, 9)))[..., None]
+    return np.where(np.isfinite(inverse).all(-1, keepdims=True), inverse, 0.0)
+
+
+def _cut_off(scene: Scene, sides: np.ndarray, r2: np.ndarray) -> np.ndarray:
+    """Least factor by which the end of the scale changes noise over squared contrast along an edge, (L, E); 1 mostly.
+
+    The factor is smooth along an edge: 9 points and 2 % to spare.
+    """
+    hot = sides.max(-1) > 0.99 * headroom(scene.noise) * r2.min(-1) ** 1.5
+    factor = np.ones(hot.shape)
+    signals = sides[hot][..., None] / r2[hot][:, None] ** 1.5
+    found = of_sides(scene, signals)
+    plain = (scene.noise.variance + shot_noise(scene.noise, signals.mean(-2))) / (signals[:, 0] - signals[:, 1]) ** 2
+    ratio = found.noise_variance / found.squared / plain
+    factor[hot] = 0.98 * np.where(np.isfinite(ratio), ratio, np.inf).min(-1, initial=np.inf)
+    return np.minimum(factor, 1.0)
 
 
 def _nodes() -> np.ndarray:
@@ -101,19 +142,24 @@ def _lagrange(at: np.ndarray) -> np.ndarray:
 
 def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, model: str) -> np.ndarray:
     """What an edge's bound takes from the light, shape (L, E, k)."""
+    pictures = Pictures.of(scene, np.zeros(2), lights)
     if model == "paper":
         points = np.linspace(0, 1, PAPER_POINTS)
-        inverse = 1 / squared_distance(scene, names, points, lights)
+        inverse = 1 / edge_distance2(pictures, names, points)
         mean = inverse.mean(-1, keepdims=True)
         smooth = (inverse / mean**2) @ _lagrange(points)
         return np.concatenate([1 / mean, smooth], -1)
-    sixth = squared_distance(scene, names, _nodes(), lights) ** 3 / scene.light.distance**4
-    cubes = squared_distance(scene, names, np.linspace(0, 1, 33), lights) ** 1.5 / scene.light.distance**2
-    return np.concatenate([np.ptp(cubes, axis=-1)[..., None] ** 2, sixth], -1)
+    cubes = edge_distance2(pictures, names, np.linspace(0, 1, 33)) ** 1.5
+    nodes = edge_distance2(pictures, names, _nodes())
+    gain = scene.noise.gain
+    dark = [np.ptp(cubes, axis=-1)[..., None] ** 2, nodes**3]
+    shot = [gain * np.ptp(np.sqrt(cubes), axis=-1)[..., None] ** 2, gain * nodes**1.5] if gain > 0 else []
+    return np.concatenate(dark + shot, -1)
 
 
-def _paper(scene: Scene, sensors: np.ndarray, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
+def _paper(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
     """Tangent at equal weights: 2 sum h^2 - sum h^2 w, h the weight of each point's error in A d + B theta."""
+    scene, sensors = pictures.scene, pictures.sensors
     names, lengths = known.view.names, known.view.lengths[..., None]
     fractions = np.linspace(0, 1, PAPER_POINTS)
     part = np.empty((len(sensors), len(names), _DEGREE + 1))
@@ -136,34 +182,29 @@ def _influence(u: np.ndarray, known: Measurand, s: slice, points: np.ndarray | N
     return (a / points.shape[-1] + (b - a * mean) * (u - mean) / ((points - mean) ** 2).sum(-1, keepdims=True)) ** 2
 
 
-def _calibrated(scene: Scene, sensors: np.ndarray, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of r^6 at the interpolation's nodes; the first takes the square of the range of r^3."""
-    scale = scene.locator.scale_px
-    per_point = kappa2(scale, scene.camera.blur_px) * scene.noise.variance
-    whole, trims = known.view.lengths[..., None], known.view.framed
-    length = whole - trims.sum(-1, keepdims=True)
-    good = (length[..., 0] >= MIN_USABLE).all(-1)
-    length = np.where(length > 0, length, np.nan)
-    middle = trims[..., :1] + length / 2
-    t = length / 2 * np.concatenate([[-1], NODES, [1]])
-    near, far = end_depths(scene, known.view.names, sensors)
-    fractions = (middle + t) / whole
-    spatial = fractions * near / (far + fractions * (near - far))
-    a = known.offset[..., None]
-    lever = known.tilt[..., None] - a * middle
-    weight = (a + 12 * lever * t / length**2) / length
-    inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * length / 2
-    ends = np.array([1.0] + [0.0] * len(NODES) + [1.0])
-    slope = 12 * lever / length**3
-    factor = 2 * np.sqrt(np.pi) * scale * inside * (weight**2 - (scale * slope) ** 2) - 2 * scale**2 * ends * weight**2
-    extra = np.zeros_like(length)
-    short = good & np.isfinite(length[..., 0]).all(-1) & (length[..., 0] < 10 * scale).any(-1)
-    crowd, spare = _short(weight[short] * inside[short], t[short], scale)
-    is_short = length[short] < 10 * scale
+def _calibrated(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of r^6 and of r^3 at the interpolation's nodes; the first of each takes the square of its range.
+
+    r^3 itself is no polynomial of the place: what the interpolation misses of it is 1e-9.
+    """
+    scene, scale = pictures.scene, pictures.scene.locator.scale_px
+    nodes = place_nodes(pictures, known.view, known.view.framed)
+    good = (nodes.length[..., 0] >= MIN_USABLE).all(-1)
+    weight, slope = (make(nodes, known.offset, known.tilt) for make in (line_weight, line_slope))
+    per_point = point_variance(nodes, scale) * np.ones(1)
+    factor = second_order(nodes, weight, slope, scale) * per_point
+    extra = np.zeros_like(nodes.length)
+    short = good & np.isfinite(nodes.length[..., 0]).all(-1) & (nodes.length[..., 0] < SHORT * scale).any(-1)
+    inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
+    weighted = weight * inside * np.sqrt(per_point)
+    crowd, spare = _short(weighted[short], nodes.t[short], scale)
+    is_short = nodes.length[short] < SHORT * scale
     factor[short] = np.where(is_short, crowd, factor[short])
     extra[short] = np.where(is_short, -spare, 0.0)
-    values = np.einsum("...j,...jk->...k", factor, _lagrange(spatial))
-    return np.concatenate([extra, values], -1) * per_point, good
+    values = np.einsum("...j,...jk->...k", factor, _lagrange(nodes.spatial))
+    part = np.concatenate([extra, values], -1)
+    dark = scene.noise.variance * part
+    return np.concatenate([dark, part], -1) if scene.noise.gain > 0 else dark, good
 
 
 def _short(weighted: np.ndarray, t: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:

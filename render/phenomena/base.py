@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from planner import Pictures
 from scenes import InvalidInput, Scene
 
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
@@ -46,13 +47,6 @@ class Tolerance:
         return influence.bias_px > self.bias_px or influence.variance > self.variance
 
 
-class Poses(NamedTuple):
-    """The settings asked about: sensors and lights, degrees, shape (S, 2) each."""
-
-    sensors: np.ndarray
-    lights: np.ndarray
-
-
 class Effect(ABC):
     """One effect.
 
@@ -78,11 +72,11 @@ class Effect(ABC):
     switch: ClassVar[str]
 
     @abstractmethod
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
         """Why the effect is exactly zero; None where it can matter."""
 
     @abstractmethod
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """Bound of the influence; only asked for where the effect can matter."""
 
     def without(self, scene: Scene) -> Scene:

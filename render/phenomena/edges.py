@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner import Pictures
+from planner.features.locator import edge_blur
+from planner.features.measurand import normals
 from planner.features.projected_edges import projected_edges, straight
-from planner.imaging.projection import direction, edge_points, facing, project
-from planner.models.locator import edge_blur
-from render.build import polariser_axes
-from render.phenomena.base import Influence, Poses, largest
-from render.reflectance import NUMPY, brightness, indices, polarised_across
-from scenes import Corner, Pose, Scene
+from planner.imaging.appearance import signal
+from planner.imaging.projection import edge_points, facing, project_ideal
+from render.phenomena.base import Influence, largest
+from scenes import Corner, Scene
 
 NEAR_STEP = float(np.exp(-0.5))
 _FRACTIONS = np.linspace(0.03, 0.97, 24)
@@ -48,57 +49,60 @@ class Sides(NamedTuple):
             return variance * self.slopes.sum(2) / self.contrast
 
 
-def sides(scene: Scene, poses: Poses, *, fall_off: bool = True) -> Sides:
-    """Levels and slopes of a scene's required edges, unshadowed, before a black background."""
-    solid, names = scene.solid, straight(scene)
+def sides(pictures: Pictures, *, fall_off: bool = True) -> Sides:
+    """Levels and slopes of a scene's required edges, without cast shadows, before a black background."""
+    return pictures.once(("sides", fall_off), lambda: _sides(pictures, fall_off))
+
+
+def _sides(pictures: Pictures, fall_off: bool) -> Sides:
+    scene, solid, names = pictures.scene, pictures.scene.solid, straight(pictures.scene)
     points = edge_points(solid, names, _FRACTIONS)
     faces = np.array([solid.edge(name).faces for name in names])
     inner = points[:, None] + _inward(scene, faces)[:, :, None]
-    here = [_levels(scene, p, faces, poses, fall_off) for p in (np.broadcast_to(points[:, None], inner.shape), inner)]
-    steps = np.stack(
-        [
-            np.linalg.norm(
-                project(inner.reshape(-1, 3), sensor, scene.camera).reshape(*inner.shape[:-1], 2)
-                - project(points.reshape(-1, 3), sensor, scene.camera).reshape(*points.shape[:-1], 2)[:, None],
-                axis=-1,
-            )
-            for sensor in poses.sensors
-        ]
+    seen = facing(solid, pictures.sensor_at)[..., faces, None]
+    here = [
+        np.where(seen, signal(pictures, p, solid.normals[faces][:, :, None], 3, fall_off=fall_off), 0.0)
+        for p in (np.broadcast_to(points[:, None], inner.shape), inner)
+    ]
+    there = (project_ideal(p.reshape(-1, 3), pictures.sensors, scene.camera) for p in (inner, points))
+    inside, edge = (
+        p.reshape(len(p), *shape, 2) for p, shape in zip(there, (inner.shape[:-1], points.shape[:-1]), strict=True)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = (here[1] - here[0]) / steps
+        slopes = (here[1] - here[0]) / np.linalg.norm(inside - edge[:, :, None], axis=-1)
     lit = here[0] > 0
     return Sides(here[0], np.where(lit, slopes, 0.0), lit, points, solid.normals[faces])
 
 
-def compare(scene: Scene, other: Scene, poses: Poses) -> Influence:
-    """Bound of how two scenes' distances differ, their shading being all that differs."""
-    variance = total_variance(scene)
-    first, second = sides(scene, poses), sides(other, poses)
+def compare(pictures: Pictures, other: Scene) -> Influence:
+    """Bound of how another scene's distances differ, its shading being all that differs."""
+    variance = total_variance(pictures.scene)
+    first, second = sides(pictures), sides(pictures.with_scene(other))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs((first.contrast / second.contrast) ** 2 - 1)
         ratio = np.maximum(ratio, np.abs((second.contrast / first.contrast) ** 2 - 1))
     moved = np.abs(first.shift(variance) - second.shift(variance)).max(-1)
-    return largest((lever(scene, poses) * moved).sum(-1), ratio.max((-1, -2)))
+    return largest((lever(pictures) * moved).sum(-1), ratio.max((-1, -2)))
 
 
-def added_light(scene: Scene, poses: Poses, levels: np.ndarray, near: float) -> Influence:
+def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influence:
     """Bound of what light added smoothly to either side (grey levels, shape (S, E, n)) does to the distance.
 
     ``near`` is the length (cm) over which it changes by its own size.
     """
-    own = sides(scene, poses)
-    share = np.abs(levels / np.where(own.contrast == 0, np.nan, own.contrast))
-    slope = px_per_cm(scene, poses)[:, None, None] * near
-    moved = (total_variance(scene) * share / slope).max(-1)
-    return largest((lever(scene, poses) * moved).sum(-1), _loss(share).max((-1, -2)))
+    contrast = sides(pictures).contrast
+    share = np.abs(levels / np.where(contrast == 0, np.nan, contrast))
+    slope = px_per_cm(pictures)[:, None, None] * near
+    moved = (total_variance(pictures.scene) * share / slope).max(-1)
+    return largest((lever(pictures) * moved).sum(-1), _loss(share).max((-1, -2)))
 
 
-def near_steps(scene: Scene, poses: Poses, levels: np.ndarray) -> Influence:
+def near_steps(pictures: Pictures, levels: np.ndarray) -> Influence:
     """Bound of what an edge of a further step (grey levels, shape (S, E, n)) anywhere near does to the distance."""
-    share = np.abs(levels / np.where(sides(scene, poses).contrast == 0, np.nan, sides(scene, poses).contrast))
-    moved = (NEAR_STEP * np.sqrt(total_variance(scene)) * share).max(-1)
-    return largest((lever(scene, poses) * moved).sum(-1), _loss(share).max((-1, -2)))
+    contrast = sides(pictures).contrast
+    share = np.abs(levels / np.where(contrast == 0, np.nan, contrast))
+    moved = (NEAR_STEP * np.sqrt(total_variance(pictures.scene)) * share).max(-1)
+    return largest((lever(pictures) * moved).sum(-1), _loss(share).max((-1, -2)))
 
 
 def total_variance(scene: Scene) -> float:
@@ -106,31 +110,29 @@ def total_variance(scene: Scene) -> float:
     return scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
 
 
-def px_per_cm(scene: Scene, poses: Poses) -> np.ndarray:
-    """Image scale at the origin, shape (S,)."""
-    return np.full(len(poses.sensors), scene.camera.focal_px / scene.camera.distance)
+def px_per_cm(pictures: Pictures) -> np.ndarray:
+    """Image scale at the reference point, shape (S,)."""
+    return np.full(len(pictures.sensors), pictures.scene.camera.focal_px / pictures.scene.camera.distance)
 
 
-def lever(scene: Scene, poses: Poses) -> np.ndarray:
+def lever(pictures: Pictures) -> np.ndarray:
     """|d distance / d offset| of each required edge when all its points may move by up to 1 px, shape (S, E).
 
     Twice the response to a shift of the whole edge: extrapolating a fitted line from the points to its end at most
     doubles what moves them. For anything but a distance between two corners the plain bound 2.
     """
+    scene = pictures.scene
     if not all(isinstance(feature, Corner) for feature in scene.task.corners) or scene.task.kind != "distance":
-        return np.full((len(poses.sensors), len(straight(scene))), 2.0)
-    view = projected_edges(scene, poses.sensors)
-    along = view.ends[..., 1, :] - view.ends[..., 0, :]
-    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    normals = np.stack([-along[..., 1], along[..., 0]], -1)
-    start, end = (
-        project(scene.solid.vertex(corner.vertex)[None], poses.sensors, scene.camera)[:, 0]
-        for corner in scene.task.corners
-    )
-    unit = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
+        return np.full((len(pictures.sensors), len(straight(scene))), 2.0)
     with np.errstate(all="ignore"):
+        across = normals(projected_edges(pictures))
+        start, end = (
+            project_ideal(scene.solid.vertex(corner.vertex)[None], pictures.sensors, scene.camera)[:, 0]
+            for corner in scene.task.corners
+        )
+        unit = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
         found = [
-            np.abs(np.einsum("si,sij->sj", unit, np.linalg.pinv(np.nan_to_num(normals[:, k : k + 2])))) for k in (0, 2)
+            np.abs(np.einsum("si,sij->sj", unit, np.linalg.pinv(np.nan_to_num(across[:, k : k + 2])))) for k in (0, 2)
         ]
     return 2 * np.concatenate(found, -1)
 
@@ -155,36 +157,10 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
     return _INWARD * np.ptp(solid.vertices) * np.array(steps).reshape(-1, 2, 3)
 
 
-def _levels(scene: Scene, points: np.ndarray, faces: np.ndarray, poses: Poses, fall_off: bool) -> np.ndarray:
-    """Grey levels above darkness of points (E, 2, n, 3) on faces (E, 2), shape (S, E, 2, n)."""
-    material, index = scene.material, indices(scene)
-    normal = tuple(np.broadcast_to(scene.solid.normals[faces][:, :, None], points.shape)[..., i] for i in range(3))
-    found = []
-    for sensor, light in zip(poses.sensors, poses.lights, strict=True):
-        places = scene.camera.distance * direction(sensor), scene.light.distance * direction(light)
-        (to_sensor, _), (to_light, distance) = (_towards(points, place) for place in places)
-        polarisation, analyser = polariser_axes(scene, Pose(*sensor), Pose(*light))
-        polarisation = None if polarisation is None else polarised_across(NUMPY, tuple(polarisation), to_light)
-        analyser = None if analyser is None else polarised_across(NUMPY, tuple(analyser), to_sensor)
-        with np.errstate(all="ignore"):
-            level = scene.camera.exposure * brightness(
-                NUMPY, material, index, normal, to_light, to_sensor, polarisation, analyser
-            )
-        level = level * (scene.light.distance / distance) ** 2 if fall_off else level
-        found.append(np.where(facing(scene.solid, places[0])[faces][..., None], level, 0.0))
-    return np.stack(found)
-
-
-def _towards(points: np.ndarray, place: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    away = place - points
-    distance = np.linalg.norm(away, axis=-1)
-    return tuple((away / distance[..., None])[..., i] for i in range(3)), distance
-
-
-def background(scene: Scene, poses: Poses, points: np.ndarray) -> np.ndarray:
+def background(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     """Where the sensor sees the floor behind points (E, n, 3), cm; NaN where it does not, shape (S, E, n, 3)."""
-    places = scene.camera.distance * direction(poses.sensors)[:, None, None]
+    places = pictures.sensor_at[:, None, None]
     rays = points - places
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = (scene.floor.height - places[..., 2]) / rays[..., 2]
+        reach = (pictures.scene.floor.height - places[..., 2]) / rays[..., 2]
     return np.where((reach > 0)[..., None], places + reach[..., None] * rays, np.nan)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner import Pictures
+from planner.features.locator import edge_blur
 from planner.features.projected_edges import straight
-from planner.imaging.projection import depth, edge_points, project
-from planner.models.locator import edge_blur
-from render.optics import distorted
-from render.phenomena.base import EVERYTHING, Effect, Influence, Poses, changed, largest
+from planner.imaging.lens import confusion, lens_jacobian, recorded
+from planner.imaging.projection import depth, edge_points, project_ideal
+from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
 from render.phenomena.edges import lever, sides
-from scenes import Scene
+from scenes import Lens, Scene
 
 
 class LensBlur(Effect):
@@ -19,46 +20,41 @@ class LensBlur(Effect):
     name = "lens_blur"
     switch = "a Gaussian filter of the supersampled image, then averaging; costs nothing beside the rays"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
         return None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """A point's variance is as (s^2 + s_e^2)^3."""
+        scene = pictures.scene
         own, blur = scene.locator.scale_px**2, edge_blur(scene.camera.blur_px) ** 2
-        found = sides(scene, poses)
+        found = sides(pictures)
         moved = np.abs(found.shift(blur)).max(-1)
-        return largest((lever(scene, poses) * moved).sum(-1), np.array([((own + blur) / own) ** 3 - 1]))
+        return largest((lever(pictures) * moved).sum(-1), np.array([((own + blur) / own) ** 3 - 1]))
 
 
 class LensDistortion(Effect):
-    """Radial distortion k1."""
+    """Radial and tangential distortion, five coefficients."""
 
     name = "lens_distortion"
     cost = 1.1
-    switch = "the blurred supersampled image is resampled"
+    switch = "the supersampled image is resampled before it is blurred"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
-        return "k1 is 0" if scene.camera.lens.distortion == 0 else None
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
+        return None if scene.camera.lens.bends else "all coefficients are 0"
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """How far the required edges' points move, and how much the image is stretched there."""
+        scene = pictures.scene
         points = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 33))
-        moved = []
-        for sensor in poses.sensors:
-            image = project(points.reshape(-1, 3), sensor, scene.camera)
-            moved.append(np.linalg.norm(distorted(image, scene.camera) - image, axis=1).reshape(points.shape[:2]))
-        bias = np.array(moved).max(-1)
-        stretch = 3 * abs(scene.camera.lens.distortion) * self._radius2(scene, poses)
-        return largest((lever(scene, poses) * bias).sum(-1), 6 * stretch)
+        image = project_ideal(points.reshape(-1, 3), pictures.sensors, scene.camera)
+        moved = np.linalg.norm(recorded(image, scene.camera) - image, axis=-1)
+        bias = moved.reshape(len(moved), *points.shape[:2]).max(-1)
+        stretch = np.linalg.norm(lens_jacobian(image, scene.camera) - np.eye(2), axis=(-2, -1)).max(-1)
+        return largest((lever(pictures) * bias).sum(-1), 6 * stretch)
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "camera", lens=scene.camera.lens.model_copy(update={"distortion": 0.0}))
-
-    @staticmethod
-    def _radius2(scene: Scene, poses: Poses) -> np.ndarray:
-        centre = np.array([scene.camera.width - 1, scene.camera.height - 1]) / 2
-        corners = [project(scene.solid.vertices, sensor, scene.camera) - centre for sensor in poses.sensors]
-        return (np.array(corners) ** 2).sum(-1).max(-1) / scene.camera.focal_px**2
+        return changed(scene, "camera", lens=scene.camera.lens.model_copy(update={"distortion": Lens().distortion}))
 
 
 class DepthOfField(Effect):
@@ -69,24 +65,26 @@ class DepthOfField(Effect):
     random = True
     switch = "a thin lens instead of a pinhole; random, so edge pixels cannot be singled out"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "the aperture is a pinhole" if scene.camera.lens.aperture_radius == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """A disc of radius r adds r^2 / 4 to the blur; it is an even blur only as far as r is small beside it.
 
         The edge moves by shading, and by up to r^2 / 4 of a pixel where the blur changes along it.
         """
-        camera, lens = scene.camera, scene.camera.lens
+        scene = pictures.scene
+        camera = scene.camera
         ends = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
-        z = depth(ends, poses.sensors, camera)
+        z = depth(ends, pictures.sensors, camera)
         if (z <= 0).any():
             return EVERYTHING
-        radius = lens.aperture_radius * camera.focal_px * np.abs(1 / z - 1 / (lens.focus or camera.distance))
+        radius = confusion(camera, z)
         added = (radius.max(-1)) ** 2 / 4
         own = scene.locator.scale_px**2 + edge_blur(camera.blur_px) ** 2
-        moved = np.abs(sides(scene, poses).shift(1.0)).max(-1) * added[:, None]
-        bias = (lever(scene, poses) * (moved + 0.02 * added[:, None])).sum(-1)
+        moved = np.abs(sides(pictures).shift(1.0)).max(-1) * added[:, None]
+        bias = (lever(pictures) * (moved + 0.02 * added[:, None])).sum(-1)
         return largest(bias, (1 + added / own) ** 3 - 1)
 
     def without(self, scene: Scene) -> Scene:

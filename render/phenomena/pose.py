@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import pose_spread, variances
+from planner import Pictures, pose_spread, variances
 from planner.jitter import LEAST_SINE
-from render.phenomena.base import SAFETY, Effect, Influence, Poses, changed
+from render.phenomena.base import SAFETY, Effect, Influence, changed
 from scenes import Pose, Scene
 
 
@@ -17,13 +17,15 @@ class PoseJitter(Effect):
     cost = 1000.0
     switch = "each picture is rendered from its own pose (render.shots)"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "poses are exact" if scene.jitter.sensor_deg == 0 and scene.jitter.light_deg == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """By how much the projected distance changes with the sensor's pose; the light only changes contrasts."""
-        spread = pose_spread(scene, poses.sensors)
-        own = variances(scene, poses.sensors, poses.lights)
+        scene = pictures.scene
+        spread = pose_spread(scene, pictures.sensors)
+        own = variances(scene, pictures.sensors, pictures.lights[0])
         contrast = 6 * np.radians(scene.jitter.light_deg) ** 2  # the mean of 1 / cos^2 over small tilts
         share = float(np.max(spread.variance / own) + contrast)
         return Influence(SAFETY * float(spread.bias.max()), SAFETY * share)

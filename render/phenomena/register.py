@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from render.phenomena.base import NOTHING, Effect, Influence, Poses, Tolerance
+from planner import Pictures
+from render.phenomena.base import NOTHING, Effect, Influence, Tolerance
 from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
 from render.phenomena.pose import PoseJitter
 from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
@@ -21,7 +22,7 @@ from render.phenomena.shading import (
     Wavelength,
 )
 from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
-from scenes import InvalidInput, Pose, Scene, Setting
+from scenes import InvalidInput, Picture, Scene
 
 REGISTER: dict[str, Effect] = {
     effect.name: effect
@@ -81,19 +82,11 @@ def effects(
     asked = None if wanted == "auto" else named(wanted)
     if not scene.settings:
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
-    pairs = np.array([[list(setting.sensor), list(setting.light)] for setting in scene.settings])
-    poses = Poses(pairs[:, 0], pairs[:, 1])
-    found = tuple(_decide(effect, scene, poses, tolerance) for effect in REGISTER.values())
+    found = _decisions(of_settings(scene), tolerance)
     return found if asked is None else tuple(_overruled(decision, asked) for decision in found)
 
 
-def choose(
-    scene: Scene,
-    wanted: str | Iterable[str],
-    tolerance: Tolerance,
-    sensor: Pose | None = None,
-    light: Pose | None = None,
-) -> Choice:
+def choose(scene: Scene, wanted: str | Iterable[str], tolerance: Tolerance, picture: Picture | None = None) -> Choice:
     """Reduce a scene to the wanted effects.
 
     Parameters
@@ -101,7 +94,7 @@ def choose(
     wanted : {"auto", "all"} or iterable of str
     tolerance : Tolerance
         What ``auto`` may leave out.
-    sensor, light : Pose, optional
+    picture : Picture, optional
         Decide for one setting; for all of the scene's when not given.
 
     Raises
@@ -110,10 +103,7 @@ def choose(
         If an effect is unknown.
     """
     if wanted == "auto":
-        here = (
-            scene if sensor is None else scene.model_copy(update={"settings": (Setting(sensor=sensor, light=light),)})
-        )
-        decisions = effects(here, tolerance)
+        decisions = _decisions(of_settings(scene) if picture is None else of_settings(scene, picture), tolerance)
         active = frozenset(decision.effect.name for decision in decisions if decision.on)
     else:
         decisions, active = (), named(wanted)
@@ -145,11 +135,22 @@ def _overruled(decision: Decision, asked: frozenset[str]) -> Decision:
     return replace(decision, on=on, reason="asked for" if on else "not asked for")
 
 
-def _decide(effect: Effect, scene: Scene, poses: Poses, tolerance: Tolerance) -> Decision:
-    absent = effect.absent(scene, poses)
+def of_settings(scene: Scene, *pictures: Picture) -> Pictures:
+    """The pictures asked about, as one set: those given, or those of the scene's settings."""
+    pictures = pictures or tuple(Picture.of(scene, each.sensor, each.light) for each in scene.settings)
+    lights = tuple(np.array([list(p.lights[i]) for p in pictures]) for i in range(len(scene.lights)))
+    return Pictures(scene, np.array([list(p.sensor) for p in pictures]), lights)
+
+
+def _decisions(pictures: Pictures, tolerance: Tolerance) -> tuple[Decision, ...]:
+    return tuple(_decide(effect, pictures, tolerance) for effect in REGISTER.values())
+
+
+def _decide(effect: Effect, pictures: Pictures, tolerance: Tolerance) -> Decision:
+    absent = effect.absent(pictures)
     if absent is not None:
         return Decision(effect, False, absent, NOTHING)
-    influence = effect.influence(scene, poses)
+    influence = effect.influence(pictures)
     if effect.cost == 1.0:
         return Decision(effect, True, "free", influence)
     on = tolerance.exceeded_by(influence)

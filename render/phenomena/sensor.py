@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import variances
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Poses, changed
+from planner import Pictures, variances
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
 from render.phenomena.edges import sides
 from scenes import Scene
 
 
-def _brightest(scene: Scene, poses: Poses) -> float:
+def _brightest(pictures: Pictures) -> float:
     """Highest level above darkness beside a required edge."""
+    scene = pictures.scene
     floor = scene.camera.exposure * scene.floor.reflectance if scene.floor else 0.0
-    return max(float(sides(scene, poses).levels.max()), floor)
+    return max(float(sides(pictures).levels.max()), floor)
 
 
 def _relative(part: float, rest: float) -> Influence:
@@ -27,11 +28,13 @@ class ShotNoise(Effect):
     name = "shot_noise"
     switch = "noise.gain in the exposure; costs nothing beside the rays"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "gain is 0" if scene.noise.gain == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return _relative(scene.noise.gain * _brightest(scene, poses), scene.noise.variance)
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return _relative(scene.noise.gain * _brightest(pictures), scene.noise.variance)
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "noise", gain=0.0)
@@ -43,10 +46,12 @@ class ReadNoise(Effect):
     name = "read_noise"
     switch = "noise.sigma in the exposure; costs nothing beside the rays"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "sigma is 0" if scene.noise.sigma == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
         return _relative(scene.noise.sigma**2, scene.noise.variance - scene.noise.sigma**2)
 
     def without(self, scene: Scene) -> Scene:
@@ -59,15 +64,17 @@ class FixedPattern(Effect):
     name = "fixed_pattern"
     switch = "noise.prnu and noise.dsnu in the exposure; costs nothing beside the rays"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "prnu and dsnu are 0" if scene.noise.prnu == 0 and scene.noise.dsnu == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """One camera's pattern moves the mean, by less than 4 standard deviations of what cameras differ by."""
+        scene = pictures.scene
         noise, temporal = scene.noise, max(scene.noise.variance, 1e-12)
-        pattern = noise.dsnu**2 + (noise.prnu * _brightest(scene, poses)) ** 2
+        pattern = noise.dsnu**2 + (noise.prnu * _brightest(pictures)) ** 2
         reference = scene.model_copy(update={"noise": noise.model_copy(update={"sigma": temporal**0.5, "bits": None})})
-        spread = float(variances(reference, poses.sensors, poses.lights).max())
+        spread = float(variances(reference, pictures.sensors, pictures.lights[0]).max())
         return Influence(4 * float(np.sqrt(spread * pattern / temporal)), 0.0)
 
     def without(self, scene: Scene) -> Scene:
@@ -80,11 +87,13 @@ class Quantisation(Effect):
     name = "quantisation"
     switch = "noise.bits in the exposure; costs nothing beside the rays"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "noise.bits is not given" if scene.noise.bits is None else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """1/12 beside the rest; below half a grey level of noise it is not noise any more."""
+        scene = pictures.scene
         rest = scene.noise.variance - 1 / 12
         return EVERYTHING if rest < 0.25 else _relative(1 / 12, rest)
 
@@ -96,18 +105,21 @@ class Saturation(Effect):
     switch = "clipping in the exposure; costs nothing beside the rays"
     _MARGIN = 6.0  # standard deviations
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         if scene.noise.bits is None:
             return "noise.bits is not given"
-        top = self._top(scene, poses)
+        top = self._top(pictures)
         full = 2**scene.noise.bits - 1
         return f"levels reach {top:.0f} of {full}, {self._MARGIN:.0f} sigma included" if top < full else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return EVERYTHING if self._top(scene, poses) >= 2**scene.noise.bits - 1 else NOTHING
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return EVERYTHING if self._top(pictures) >= 2**scene.noise.bits - 1 else NOTHING
 
-    def _top(self, scene: Scene, poses: Poses) -> float:
-        level = scene.camera.black_level + _brightest(scene, poses)
+    def _top(self, pictures: Pictures) -> float:
+        scene = pictures.scene
+        level = scene.noise.dark_level + _brightest(pictures)
         noise = scene.noise
         sigma = np.sqrt(noise.variance + noise.gain * level + (noise.prnu * level) ** 2 + noise.dsnu**2)
         return level + self._MARGIN * float(sigma)

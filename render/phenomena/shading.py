@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.projection import direction
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Poses, changed, largest
+from planner import Pictures
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest
 from render.phenomena.edges import compare, lever, sides, total_variance
 from scenes import Scene
 
@@ -16,16 +16,16 @@ class AttachedShadow(Effect):
     name = "attached_shadow"
     switch = "part of every reflectance; costs nothing"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
         return None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """Without it a face would be lit through the object."""
-        found = sides(scene, poses)
-        away = np.einsum("efi,si->sef", found.normals, _light_positions(scene, poses)) < np.einsum(
+        found = sides(pictures)
+        away = np.einsum("efi,si->sef", found.normals, pictures.lights_at[0]) < np.einsum(
             "efi,ei->ef", found.normals, found.points[:, 0]
         )
-        seen = np.einsum("efi,si->sef", found.normals, _sensor_positions(scene, poses)) > np.einsum(
+        seen = np.einsum("efi,si->sef", found.normals, pictures.sensor_at) > np.einsum(
             "efi,ei->ef", found.normals, found.points[:, 0]
         )
         return EVERYTHING if (away & seen).any() else NOTHING
@@ -37,16 +37,17 @@ class FallOff(Effect):
     name = "fall_off"
     switch = "a point light has it; costs nothing"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
         return None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
         variance = total_variance(scene)
-        first, second = (sides(scene, poses, fall_off=on) for on in (True, False))
+        first, second = (sides(pictures, fall_off=on) for on in (True, False))
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs((first.contrast / second.contrast) ** 2 - 1).max((-1, -2))
         moved = np.abs(first.shift(variance) - second.shift(variance)).max(-1)
-        return largest((lever(scene, poses) * moved).sum(-1), ratio)
+        return largest((lever(pictures) * moved).sum(-1), ratio)
 
 
 class SpecularLobe(Effect):
@@ -56,13 +57,15 @@ class SpecularLobe(Effect):
     cost = 1.5
     switch = "the paper's reflectance as a BSDF instead of a diffuse one"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         if scene.material.specular_fraction == 0:
             return "specular_fraction is 0"
         return "n = 1 and k = 0: no Fresnel reflection" if scene.material.is_diffuse else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return compare(scene, self.without(scene), poses)
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "material", refractive_index=1.0, extinction=0.0, index_table=())
@@ -75,13 +78,15 @@ class Polarisation(Effect):
     cost = 1.2
     switch = "J_parallel, J_perpendicular in the BSDF"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         if scene.light.polarisation_deg is None:
             return "the light is unpolarised"
         return "diffuse reflection forgets polarisation" if scene.material.is_diffuse else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return compare(scene, self.without(scene), poses)
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "light", polarisation_deg=None)
@@ -94,11 +99,13 @@ class Analyser(Effect):
     cost = 1.2
     switch = "both components, with their phase, in the BSDF"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "there is no analyser" if scene.camera.analyser_deg is None else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return compare(scene, self.without(scene), poses)
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "camera", analyser_deg=None)
@@ -111,13 +118,15 @@ class Wavelength(Effect):
     cost = 1.2
     switch = "the specular term summed over the wavelengths"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         if scene.material.is_diffuse:
             return "the diffuse term does not depend on the index"
         return None if scene.material.index_table else "the material has no table of indices"
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return compare(scene, self.without(scene), poses)
+    def influence(self, pictures: Pictures) -> Influence:
+        scene = pictures.scene
+        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "material", index_table=())
@@ -132,31 +141,25 @@ class LightSize(Effect):
     has_formula = False
     switch = "a sphere or a disc instead of a point"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "the light is a point" if scene.light.radius == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """Second order in the light's angle a: cos / r^2 changes by at most 2 a^2, a lobe m wide by (a / m)^2.
 
         Unbounded where a face is lit at less than 2 a, or where there is something to cast a penumbra on.
         """
+        scene = pictures.scene
         angle = scene.light.radius / scene.light.distance
-        found = sides(scene, poses)
-        towards = _light_positions(scene, poses)[:, None, None, None] - found.points[:, None]
+        found = sides(pictures)
+        towards = pictures.lights_at[0][:, None, None, None] - found.points[:, None]
         sine = np.einsum("sefni,efi->sefn", towards, found.normals) / np.linalg.norm(towards, axis=-1)
         if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
             return EVERYTHING
         share = 2 * angle**2 + (0 if scene.material.is_diffuse else (angle / scene.material.roughness) ** 2)
         moved = np.abs(found.shift(total_variance(scene))).max(-1) * share
-        return largest((lever(scene, poses) * moved).sum(-1), np.array([2 * share]))
+        return largest((lever(pictures) * moved).sum(-1), np.array([2 * share]))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "light", radius=0.0)
-
-
-def _light_positions(scene: Scene, poses: Poses) -> np.ndarray:
-    return scene.light.distance * direction(poses.lights)
-
-
-def _sensor_positions(scene: Scene, poses: Poses) -> np.ndarray:
-    return scene.camera.distance * direction(poses.sensors)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.projection import direction
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Poses
+from planner import Pictures
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides
 from scenes import Scene, Solid
 
@@ -16,19 +16,21 @@ class CastShadow(Effect):
     name = "cast_shadow"
     switch = "obstacles in the scene; every hit is tested against the light anyway, so it costs nothing"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "one convex body before darkness: nothing to fall on" if _alone(scene) else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """Everything where a body hides a required edge from the light; the floor's own step otherwise."""
+        scene = pictures.scene
         if not scene.solid.is_convex:
             return EVERYTHING
-        lights = scene.light.distance * direction(poses.lights)
-        points = sides(scene, poses).points.reshape(-1, 3)
+        lights = pictures.lights_at[0]
+        points = sides(pictures).points.reshape(-1, 3)
         for obstacle in scene.obstacles:
             if any(_hides(obstacle.solid, points, light).any() for light in lights):
                 return EVERYTHING
-        return near_steps(scene, poses, _floor_levels(scene, poses)) if scene.floor else NOTHING
+        return near_steps(pictures, _floor_levels(pictures)) if scene.floor else NOTHING
 
     def without(self, scene: Scene) -> Scene:
         return scene.model_copy(update={"obstacles": ()})
@@ -41,13 +43,14 @@ class FloorReflectance(Effect):
     cost = 2.5
     switch = "a plane below the object; the whole frame is rendered"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         if scene.floor is None:
             return "there is no floor"
         return "the floor is black" if scene.floor.reflectance == 0 else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
-        return near_steps(scene, poses, _floor_levels(scene, poses))
+    def influence(self, pictures: Pictures) -> Influence:
+        return near_steps(pictures, _floor_levels(pictures))
 
     def without(self, scene: Scene) -> Scene:
         return scene.model_copy(update={"floor": None})
@@ -62,12 +65,14 @@ class Interreflection(Effect):
     has_formula = False
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
-    def absent(self, scene: Scene, poses: Poses) -> str | None:
+    def absent(self, pictures: Pictures) -> str | None:
+        scene = pictures.scene
         return "one convex body before darkness: no surface sees another" if _alone(scene) else None
 
-    def influence(self, scene: Scene, poses: Poses) -> Influence:
+    def influence(self, pictures: Pictures) -> Influence:
         """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height."""
-        own, albedo, bodies = sides(scene, poses), _albedo(scene), _bodies(scene)
+        scene = pictures.scene
+        own, albedo, bodies = sides(pictures), _albedo(scene), _bodies(scene)
         reflectance = scene.floor.reflectance if scene.floor else 0.0
         down = np.broadcast_to(((1 - own.normals[..., 2]) / 2)[..., None], own.levels.shape[1:])
         brightest = scene.camera.exposure * _gain(scene)
@@ -78,7 +83,7 @@ class Interreflection(Effect):
         behind = reflectance * 0.5 * albedo * brightest
         levels = multiple * (faces.max(1) + behind)
         near = min([_clearance(own.points, body) for body in bodies] + _above_floor(scene, own.points))
-        return added_light(scene, poses, np.broadcast_to(levels, own.contrast.shape), max(near, 1e-3))
+        return added_light(pictures, np.broadcast_to(levels, own.contrast.shape), max(near, 1e-3))
 
 
 def _alone(scene: Scene) -> bool:
@@ -105,10 +110,11 @@ def _gain(scene: Scene) -> float:
     return (scene.light.distance / (scene.light.distance - reach)) ** 2
 
 
-def _floor_levels(scene: Scene, poses: Poses) -> np.ndarray:
+def _floor_levels(pictures: Pictures) -> np.ndarray:
     """Unshadowed level of the floor behind each edge point, shape (S, E, n); 0 where the floor is not seen."""
-    points = background(scene, poses, sides(scene, poses).points)
-    away = scene.light.distance * direction(poses.lights)[:, None, None] - points
+    points = background(pictures, sides(pictures).points)
+    scene = pictures.scene
+    away = pictures.lights_at[0][:, None, None] - points
     distance = np.linalg.norm(away, axis=-1)
     level = scene.floor.reflectance * scene.camera.exposure * away[..., 2] * scene.light.distance**2 / distance**3
     inside = (np.abs(points[..., :2]) <= scene.floor.half_side).all(-1)

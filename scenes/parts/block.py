@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import lru_cache
 from typing import Literal
 
 from scenes.model import Model
@@ -16,7 +16,10 @@ class Block(Model):
     kind: Literal["block"] = "block"
     size: tuple[Length, Length, Length]
 
-    @cached_property
+    @property
     def solid(self) -> Solid:
         """Vertices, faces and edges, named as in the paper's Fig. 6."""
-        return block(self.size)
+        return _made(self.size)
+
+
+_made = lru_cache(maxsize=64)(block)  # of the size, not of the record: copies of a record share its caches

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -32,7 +32,16 @@ class Mesh(Model):
     def _beside_the_scene(cls, file: Path, info: ValidationInfo) -> Path:
         return (info.context or {}).get("directory", Path()) / file
 
-    @cached_property
+    @property
     def solid(self) -> Solid:
         """Vertices, faces, edges and circles of the mesh."""
-        return mesh.renamed(mesh.read(self.file), self.names)
+        try:
+            stamp = self.file.stat().st_mtime_ns
+        except OSError:
+            stamp = 0
+        return _read(self.file, tuple(self.names.items()), stamp)
+
+
+@lru_cache(maxsize=16)
+def _read(file: Path, names: tuple, _stamp: int) -> Solid:
+    return mesh.renamed(mesh.read(file), dict(names))

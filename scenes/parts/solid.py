@@ -198,3 +198,43 @@ def block(size: tuple[float, float, float]) -> Solid:
             for i, ends in enumerate(_BLOCK_EDGES, 1)
         ),
     )
+
+
+def assembled(first: Solid, *others: Solid) -> Solid:
+    """Several solids as one; names of the others' parts are marked by a number, circles are those of the first.
+
+    Examples
+    --------
+    >>> two = assembled(block((1, 1, 1)), block((2, 2, 2)))
+    >>> len(two.faces), two.edge("e4").faces == block((1, 1, 1)).edge("e4").faces, two.edges[-1].name
+    (12, True, 'e12@1')
+    """
+    if not others:
+        return first
+    names, vertices, faces, edges = list(first.vertex_names), [first.vertices], list(first.faces), list(first.edges)
+    triangles, owners = [first.triangles], [first.triangle_faces]
+    for number, other in enumerate(others, 1):
+        corner, face = sum(map(len, vertices)), len(faces)
+        names += [f"{name}@{number}" for name in other.vertex_names]
+        edges += [
+            Edge(
+                f"{e.name}@{number}",
+                (e.ends[0] + corner, e.ends[1] + corner),
+                tuple(f + face for f in e.faces),
+                e.convex,
+            )
+            for e in other.edges
+        ]
+        faces += [tuple(v + corner for v in loop) for loop in other.faces]
+        vertices.append(other.vertices)
+        triangles.append(other.triangles)
+        owners.append(other.triangle_faces + face)
+    return Solid(
+        vertex_names=tuple(names),
+        vertices=np.concatenate(vertices),
+        faces=tuple(faces),
+        edges=tuple(edges),
+        triangles=np.concatenate(triangles),
+        triangle_faces=np.concatenate(owners),
+        circles=first.circles,
+    )

@@ -20,7 +20,8 @@ from scipy.special import ndtr
 
 from measure.bounds import corner_bound
 from measure.estimators.registry import ESTIMATORS
-from measure.features.layout import Layout, Optics, polygon_layout
+from measure.features.layout import Layout, polygon_layout
+from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
 from measure.measurement import separation
 from planner.imaging.projection import project

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import planner
 from measure.estimators.registry import ESTIMATORS
-from measure.features.layout import Optics, polygon_layout
+from measure.features.layout import polygon_layout
+from measure.features.optics import Optics
 from measure.features.shape import find_shape
 from scenes import InvalidInput, Task
 from scenes.parts.solid import Solid

@@ -5,7 +5,7 @@ import pytest
 
 import measure
 from measure import status
-from measure.features.layout import Optics
+from measure.features.optics import Optics
 from scenes import InvalidInput
 from tests.oracle import polygon_image
 

@@ -7,7 +7,8 @@ import measure
 import render
 from measure import status
 from measure.estimators.registry import ESTIMATORS
-from measure.features.layout import Optics, layout_of, polygon_layout
+from measure.features.layout import layout_of, polygon_layout
+from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
 from scenes import Pose
 from tests.benchmarks.estimators import SHAPE, random_block, rectangle, trial, worst_bias

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from render.reflectance import NUMPY, Index, brightness, polarised_across
 
 import render
 from planner.imaging.projection import direction, frame
 from render import variant
 from render.build import polariser_axes
-from render.reflectance import NUMPY, Index, brightness, polarised_across
 from scenes import Material, Pose
 
 pytestmark = pytest.mark.render
@@ -55,7 +55,7 @@ def compare(scene, sensor, light, name, effects):
     points = behind(scene, sensor)
     inside = np.s_[:6, :6]
     assert (points[inside][..., 1:] > 0).all()
-    picture = render.image(scene, sensor, light, render.Quality(4, 16, 16), name, effects) - scene.camera.black_level
+    picture = render.image(scene, sensor, light, render.Quality(4, 16, 16), name, effects) - scene.noise.dark_level
     assert picture[inside] == pytest.approx(closed_form(scene, sensor, light, points)[inside], rel=1e-4)
 
 

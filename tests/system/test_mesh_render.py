@@ -13,7 +13,7 @@ pytestmark = pytest.mark.render
 def level(scene, sensor, light, point):
     """Grey level above darkness of the pixel that looks at a point."""
     x, y = np.rint(project(np.array([point]), np.array(sensor, float), scene.camera)[0]).astype(int)
-    return render.image(scene, sensor, light)[y, x] - scene.camera.black_level
+    return render.image(scene, sensor, light)[y, x] - scene.noise.dark_level
 
 
 def test_one_looks_through_the_plates_hole():

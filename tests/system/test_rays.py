@@ -39,7 +39,7 @@ def theirs(scene, setting, active, quality):
     size = scene.camera.width * k, scene.camera.height * k
     made = description(mitsuba, scene, setting.sensor, setting.light, active, size, crop, quality.random_samples)
     fine = np.array(mitsuba.render(mitsuba.load_dict(made), seed=quality.seed), float)[:, :, 0]
-    picture = np.full((scene.camera.height, scene.camera.width), scene.camera.black_level)
+    picture = np.full((scene.camera.height, scene.camera.width), scene.noise.dark_level)
     picture[rows, columns] += blur_and_bin(fine, scene.camera.blur_px, k)
     return picture
 

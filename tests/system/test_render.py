@@ -34,7 +34,7 @@ def behind(scene, pose, pixel):
 @pytest.mark.parametrize(("sensor", "light"), [((30, 135), (15, 315)), ((45, 225), (60, 45)), ((60, 315), (45, 195))])
 def test_face_intensity_is_cosine_over_squared_distance(task1, sensor, light):
     """Five pixels of the top face, each against the point of the face behind its centre, to 1e-4."""
-    picture = render.image(task1, sensor, light) - task1.camera.black_level
+    picture = render.image(task1, sensor, light) - task1.noise.dark_level
     pose = np.array(sensor, float)
     centre = np.rint(project(np.array([[6.25, 3.75, 2.5]]), pose, task1.camera)[0]).astype(int)
     for pixel in centre + np.array([[0, 0], [6, 0], [-6, 0], [0, 6], [0, -6]]):
@@ -46,16 +46,16 @@ def test_face_intensity_is_cosine_over_squared_distance(task1, sensor, light):
 
 def test_darkness_is_the_black_level_and_a_face_behind_is_dark(task1):
     picture = render.image(task1, (30, 90), (150, 90))
-    assert picture[0, 0] == task1.camera.black_level
+    assert picture[0, 0] == task1.noise.dark_level
     top = np.rint(project(np.array([[6.0, 4.0, 2.5]]), np.array([30.0, 90.0]), task1.camera)[0]).astype(int)
-    assert picture[top[1], top[0]] == task1.camera.black_level
+    assert picture[top[1], top[0]] == task1.noise.dark_level
 
 
 @pytest.mark.parametrize("sensor", [(0, 0), (0, 37)])
 def test_camera_at_the_pole_against_the_exact_polygon(task1, sensor):
     """Only the top face is seen; corrected for its shading, the image is the exact blurred polygon within 1 %."""
     scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
-    picture = render.image(scene, sensor, (0, 0)) - scene.camera.black_level
+    picture = render.image(scene, sensor, (0, 0)) - scene.noise.dark_level
     corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
     exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), picture.shape, 0.6, 180.0)
     assert np.abs(picture - exact).max() < 0.01 * 180
@@ -65,7 +65,7 @@ def test_camera_at_the_pole_against_the_exact_polygon(task1, sensor):
 def test_edges_lie_where_the_exact_image_has_them(task1, sensor):
     """Noise-free distance in the render against that in the exact polygon image, light overhead and far: < 0.002 px."""
     scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
-    rendered = render.image(scene, sensor, (0, 0)) - scene.camera.black_level
+    rendered = render.image(scene, sensor, (0, 0)) - scene.noise.dark_level
     corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
     exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), rendered.shape, 0.6, 180.0)
     ours, oracle = (measure.distance(image, scene, sensor) for image in (rendered, exact))

@@ -100,7 +100,7 @@ def test_noise_that_needs_darkness_names_it(tmp_path):
     text = (scenes.load.__globals__["BUNDLED"] / "low_light.toml").read_text()
     path = tmp_path / "bad.toml"
     path.write_text(text.replace("dark_level = 20.0", "dark_level = 3.0"))
-    with pytest.raises(InvalidInput, match=r"noise.dark_level must be camera.black_level \(20\) where"):
+    with pytest.raises(InvalidInput, match=r"noise.dark_level must be noise.dark_level \(20\) where"):
         scenes.load(path)
 
 

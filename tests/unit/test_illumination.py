@@ -3,10 +3,10 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from planner.imaging.illumination import bands, electric_field, level
 
 import planner
 import scenes
-from planner.imaging.illumination import bands, electric_field, level
 from planner.imaging.reflectance import beckmann, fresnel, perpendicular_share, reflected
 from scenes import Material
 from tests.unit.test_reflectance import textbook_fresnel, unit

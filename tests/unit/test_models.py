@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from planner.imaging.contrast import contrast, side_levels
 
 import planner
 import scenes
+from planner.features.locator import correlation, kappa2
 from planner.features.projected_edges import projected_edges
 from planner.features.propagation import corner_covariance
-from planner.imaging.contrast import contrast, side_levels
 from planner.imaging.projection import edge_points, project
-from planner.models.locator import correlation, kappa2
 from scenes import InvalidInput
 
 

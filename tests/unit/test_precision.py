@@ -3,10 +3,10 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from planner.models.models import paper
 
 import planner
 from planner.features.propagation import corner_covariance
-from planner.models.models import paper
 
 mp.mp.dps = 50
 

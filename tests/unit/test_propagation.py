@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from planner.models.models import paper
 
 import planner
 from measure.features.calipers import Caliper

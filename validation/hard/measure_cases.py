@@ -8,7 +8,8 @@ from functools import lru_cache, partial
 import numpy as np
 
 import measure
-from measure.features.layout import Optics, polygon_layout
+from measure.features.layout import polygon_layout
+from measure.features.optics import Optics
 from measure.features.shape import find_shape
 from planner.imaging.projection import project
 from scenes import InvalidInput, Scene

@@ -66,7 +66,7 @@ def _level(name: str, scene: Scene, light) -> Case:
     x, y = np.rint(project(middle[None], np.array([0.0, 0.0]), scene.camera)[0]).astype(int)
 
     def ours() -> Answer:
-        image = render.image(scene, (0, 0), light, _QUICK) - scene.camera.black_level
+        image = render.image(scene, (0, 0), light, _QUICK) - scene.noise.dark_level
         return Answer(float(image[y - 1 : y + 2, x - 1 : x + 2].mean()))
 
     return Case("render", name, "grey level", ours, lambda: Reference(float(exact), "closed form", None, _LEVEL))

@@ -16,12 +16,12 @@ MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longe
 MIN_USABLE = 2.0  # px of an edge that must be left after trimming
 
 
-def edge_blur(blur_px: float) -> float:
+def edge_blur(blur_px):
     """Standard deviation s_e of the edge profile: lens blur and pixel aperture, px."""
-    return float(np.hypot(blur_px, np.sqrt(PIXEL_VARIANCE)))
+    return np.hypot(blur_px, np.sqrt(PIXEL_VARIANCE))
 
 
-def kappa2(scale: float, blur_px: float) -> float:
+def kappa2(scale: float, blur_px):
     """Variance of one edge point's position in units of (s_n / C)^2 px^2: kappa^2 of eq. 7.
 
     The second derivative's noise has variance 3 s_n^2 / (16 pi s^6); its slope at the crossing is
@@ -42,9 +42,9 @@ def correlation(distance: np.ndarray, scale: float) -> np.ndarray:
 
 def reach(scale: float, blur_px: float) -> float:
     """How near to another edge a locator's result is still undisturbed, px."""
-    return CLEARANCE * float(np.hypot(scale, edge_blur(blur_px)))
+    return float(CLEARANCE * np.hypot(scale, edge_blur(blur_px)))
 
 
-def information_bound(contrast: np.ndarray, noise_variance: float, blur_px: float) -> np.ndarray:
+def information_bound(contrast: np.ndarray, noise_variance, blur_px) -> np.ndarray:
     """Fisher information on the edge's position per px of its length, px^-3 (C^2 / (2 sqrt(pi) s_e s_n^2))."""
     return contrast**2 / (2 * np.sqrt(np.pi) * edge_blur(blur_px) * noise_variance)

@@ -1,0 +1,87 @@
+"""What the estimators have to know of camera and sensor, and of the locators' settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.imaging.lens import lens_jacobian, recorded, undistorted
+from planner.imaging.sensor import headroom
+from planner.imaging.sensor import recorded as expected
+from scenes import Camera, Noise, Scene
+
+
+@dataclass(frozen=True)
+class Optics:
+    """The image's size, blur and noise, the lens, and the locators' settings.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        (height, width), px.
+    blur_px : float
+        Standard deviation of the lens' blur, px; the pixels' own box comes on top.
+    noise_variance : float
+        Variance of a grey level (in darkness, where it depends on the light).
+    scale_px, window_px : float
+        Smoothing scale and half search window of the point locators, px.
+    noise : Noise, optional
+        How the noise depends on the light; everywhere ``noise_variance`` when not given.
+    camera : Camera, optional
+        Whose lens bends straight edges; straight edges are recorded straight when not given.
+    """
+
+    shape: tuple[int, int]
+    blur_px: float = 0.6
+    noise_variance: float = 1.0
+    scale_px: float = 1.0
+    window_px: float = 3.0
+    noise: Noise | None = None
+    camera: Camera | None = None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Optics:
+        """The scene's camera, noise and locator settings."""
+        camera, locator, noise = scene.camera, scene.locator, scene.noise
+        uneven = noise if noise.gain > 0 or noise.bits is not None else None
+        bent = camera if camera.lens.bends else None
+        shape = camera.height, camera.width
+        return cls(shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent)
+
+    @property
+    def sagitta(self) -> float:
+        """How far a straight edge across the image may be bent, px; about."""
+        if self.camera is None:
+            return 0.0
+        height, width = self.shape
+        border = np.array([[0, 0], [width / 2, 0], [width, 0], [width, height / 2], [width, height]], float)
+        return float(np.nan_to_num(np.abs(self.ideal(border) - border), nan=max(self.shape)).max())
+
+    def noise_at(self, levels: np.ndarray) -> np.ndarray | None:
+        """Variance of the noise at grey levels; None where it is ``noise_variance`` for all of them."""
+        if self.noise is None:
+            return None
+        if self.noise.gain == 0 and levels.max() <= headroom(self.noise) + self.noise.dark_level:
+            return None
+        return expected(self.noise, levels).noise_variance
+
+    def recorded(self, ideal: np.ndarray) -> np.ndarray:
+        """Where ideal image points (..., 2) are recorded, px."""
+        return ideal if self.camera is None else recorded(ideal, self.camera)
+
+    def ideal(self, seen: np.ndarray) -> np.ndarray:
+        """Ideal coordinates of recorded image points (..., 2), px."""
+        return seen if self.camera is None else undistorted(seen, self.camera)
+
+    def gradient(self, ideal: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Gradient by the recorded coordinates of ``normals . ideal coordinates`` at ideal points (..., 2).
+
+        Its direction is the recorded normal of a line with that ideal normal; its size the ideal px across the line for
+        a recorded px.
+        """
+        if self.camera is None:
+            return np.broadcast_to(normals, ideal.shape)
+        (a, b), (c, d) = np.moveaxis(lens_jacobian(ideal, self.camera), (-2, -1), (0, 1))
+        nx, ny = np.moveaxis(np.broadcast_to(normals, ideal.shape), -1, 0)
+        return np.stack([d * nx - c * ny, a * ny - b * nx], -1) / (a * d - b * c)[..., None]

@@ -1,0 +1,66 @@
+"""Many pictures of one scene at once: arrays of poses that broadcast against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from planner.imaging.projection import light_position, sensor_position
+from scenes import Picture, Scene
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """Pictures of a scene from arrays of poses; what is computed of them is computed once.
+
+    Attributes
+    ----------
+    scene : Scene
+    sensors : ndarray, shape (..., 2)
+        Polar angle and azimuth, degrees.
+    lights : tuple of ndarray, shape (..., 2)
+        For each of the scene's lights; broadcast against the sensors.
+    """
+
+    scene: Scene
+    sensors: np.ndarray
+    lights: tuple[np.ndarray, ...] = ()
+    _known: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, scene: Scene | Picture, sensors: Any = None, lights: Any = None) -> Pictures:
+        """From a picture, or from a scene, sensors (..., 2) and the poses of its light (..., 2) or of each light."""
+        if isinstance(scene, Picture):
+            lights = tuple(np.array(list(pose)) for pose in scene.lights)
+            return cls(scene.scene, np.array(list(scene.sensor)), lights)
+        each = () if lights is None else lights if isinstance(lights, tuple) and len(scene.lights) > 1 else (lights,)
+        return cls(scene, np.asarray(sensors, float), tuple(np.asarray(poses, float) for poses in each))
+
+    def with_scene(self, scene: Scene) -> Pictures:
+        """The same poses in another scene."""
+        return Pictures(scene, self.sensors, self.lights)
+
+    @property
+    def sensor_at(self) -> np.ndarray:
+        """Where the sensors stand, cm, shape (..., 3)."""
+        return self.once("sensor_at", lambda: sensor_position(self.scene.camera, self.sensors))
+
+    @property
+    def lights_at(self) -> tuple[np.ndarray, ...]:
+        """Where each light stands, cm, shape (..., 3)."""
+        return self.once("lights_at", self._lights_at)
+
+    def _lights_at(self) -> tuple[np.ndarray, ...]:
+        lit = zip(self.scene.lights, self.lights, strict=True)
+        return tuple(light_position(self.scene.camera, light, poses) for light, poses in lit)
+
+    def once(self, key: Any, make: Callable[[], T]) -> T:
+        """What ``make`` gives, made at the first call with this key."""
+        if key not in self._known:
+            self._known[key] = make()
+        return self._known[key]

@@ -1,0 +1,66 @@
+"""What the sensor makes of light: the expected grey level and the variance of its noise (EMVA 1288)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from scenes import Noise
+
+_MARGIN = 6.0  # standard deviations below the end of the scale within which it is felt
+
+
+class Levels(NamedTuple):
+    """Expected grey level, darkness included, and variance (not sigma) of its noise over repeated pictures."""
+
+    level: np.ndarray
+    noise_variance: np.ndarray
+
+
+def shot_noise(noise: Noise, signal: np.ndarray) -> np.ndarray:
+    """Variance that the light's own noise adds at grey levels above darkness: gain x signal."""
+    return noise.gain * np.maximum(signal, 0.0)
+
+
+def recorded(noise: Noise, level: np.ndarray) -> Levels:
+    """What the sensor records of a noise-free image (grey levels, darkness included).
+
+    EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12 for the rounding. Near the end of the scale a normal
+    distribution is cut off at 2^bits - 1, which lowers mean and variance. The cut at 0 is left out, for the level of
+    darkness keeps the noise away from it; the fixed pattern does not vary.
+    """
+    level = np.asarray(level, float)
+    variance = noise.variance + shot_noise(noise, level - noise.dark_level)
+    full = full_scale(noise)
+    near = level > full - _MARGIN * np.sqrt(variance)
+    if not near.any():
+        return Levels(level, variance)
+    sigma = np.sqrt(variance[near])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        below = np.where(sigma > 0, (full - level[near]) / sigma, np.copysign(np.inf, full - level[near]))
+    density = np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi)
+    capped = np.clip(below, -1e9, 1e9)
+    missing = capped * ndtr(below) + density  # mean of (full - x) / sigma where x is below, 0 elsewhere
+    square = (1 + capped**2) * ndtr(below) + capped * density
+    level, variance = level.copy(), np.array(np.broadcast_to(variance, level.shape))
+    level[near], variance[near] = full - sigma * missing, sigma**2 * np.maximum(square - missing**2, 0.0)
+    return Levels(level, variance)
+
+
+def full_scale(noise: Noise) -> float:
+    """The highest grey level; infinite without digits."""
+    return np.inf if noise.bits is None else 2.0**noise.bits - 1
+
+
+def headroom(noise: Noise) -> float:
+    """Signal (grey levels above darkness) up to which nothing is cut off at the end of the scale.
+
+    Signal + 6 sqrt(variance + gain signal) = full scale - darkness, solved for the signal; it may be negative.
+    """
+    room = full_scale(noise) - noise.dark_level
+    if not np.isfinite(room):
+        return np.inf
+    half = _MARGIN**2 * noise.gain / 2
+    return float(room + half - np.sqrt(half * (half + 2 * room) + _MARGIN**2 * noise.variance))

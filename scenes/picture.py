@@ -1,0 +1,94 @@
+"""One exposure: a scene, where its sensor stands, and where its lights stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from scenes.errors import InvalidInput
+from scenes.pose import Pose
+from scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A scene seen by its sensor under its lights, checked once: what planner, renderer and measurement take.
+
+    Attributes
+    ----------
+    scene : Scene
+    sensor : Pose
+    lights : tuple of Pose
+        One for each of the scene's lights; none where it is not known where they stand.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> Picture.of(scenes.load("task1"), (30, 135), (15, 315)).lights
+    (Pose(polar_deg=15.0, azimuth_deg=315.0),)
+    """
+
+    scene: Scene
+    sensor: Pose
+    lights: tuple[Pose, ...] = ()
+
+    @classmethod
+    def of(cls, scene: Scene | Picture, sensor: Any = None, lights: Any = None) -> Picture:
+        """A checked picture, from a picture or from a scene and poses.
+
+        Parameters
+        ----------
+        scene : Scene or Picture
+            A picture is returned as it is.
+        sensor : Pose or pair of float
+            Polar angle and azimuth, degrees.
+        lights : Pose, pair of float, or one for each light, optional
+            None where it is not known where the lights stand.
+
+        Raises
+        ------
+        InvalidInput
+            If a pose is no pose or lies in or on the object, or there are not as many as the scene has lights.
+        """
+        if isinstance(scene, Picture):
+            return scene
+        poses = () if lights is None else tuple(scene.check_pose("light", pose) for pose in several(lights))
+        if lights is not None and len(poses) != len(scene.lights):
+            raise InvalidInput(f"light must be {len(scene.lights)} pose(s), one for each light, got {len(poses)}")
+        return cls(scene, scene.check_pose("sensor", sensor), poses)
+
+    @property
+    def light(self) -> Pose | None:
+        """The first light's pose; None where it is not known."""
+        return self.lights[0] if self.lights else None
+
+    def unlit(self) -> Picture:
+        """The same picture, its lights not known."""
+        return Picture(self.scene, self.sensor)
+
+    def with_scene(self, scene: Scene) -> Picture:
+        """The same poses in another scene."""
+        return Picture(scene, self.sensor, self.lights)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.scene, self.sensor, self.lights))
+
+
+def several(lights: Any) -> tuple[Any, ...]:
+    """A pose, a pair of numbers, or a list of either, as a tuple."""
+    if isinstance(lights, Pose):
+        return (lights,)
+    try:
+        parts = tuple(lights)
+    except TypeError:
+        return (lights,)
+    nested = all(isinstance(part, Pose) or (isinstance(part, Iterable) and not isinstance(part, str)) for part in parts)
+    return parts if parts and nested and not isinstance(lights, np.ndarray) else (lights,)
