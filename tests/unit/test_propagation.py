@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from planner.models.models import paper
 
 import planner
 from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.lines import fit_lines, regression
+from measure.features.optics import Optics
 from measure.measurement import separation
 from planner.features.propagation import corner_covariance
 from tests.scalar import weighted_points
@@ -142,7 +142,16 @@ def test_corner_covariance_against_central_differences(first, second):
 def test_corner_response_against_central_differences(first, second):
     """Level and slope of two of three lines found in the image; the third has no part in the corner."""
     calipers = tuple(
-        Caliper("", np.array(origin), np.array([np.cos(a), np.sin(a)]), 50.0, np.empty(0), "ok")
+        Caliper(
+            "",
+            np.array(origin),
+            np.array([np.cos(a), np.sin(a)]),
+            50.0,
+            np.empty(0),
+            "ok",
+            Optics((100, 100)),
+            np.zeros(2),
+        )
         for a, origin in ((first, (40.0, 30.0)), (0.7, (10.0, 10.0)), (second, (90.0, 70.0)))
     )
 

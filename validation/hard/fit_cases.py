@@ -10,6 +10,7 @@ from measure.features.calipers import Caliper
 from measure.features.conic import fit_ellipse
 from measure.features.corners import corner_response, intersect
 from measure.features.lines import fit_lines, regression, trapezoid
+from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
 from planner.features.propagation import corner_covariance
@@ -200,7 +201,7 @@ _LEVEL, _SLOPE = 0.01, 1e-6  # variance of a line's offset at its caliper's orig
 def _response(normals: np.ndarray, points: np.ndarray) -> Answer:
     """The corner's variance from those of the lines in their calipers."""
     calipers = tuple(
-        Caliper("", point, np.array([b, -a]), 60.0, np.empty(0), "ok")
+        Caliper("", point, np.array([b, -a]), 60.0, np.empty(0), "ok", Optics((200, 200)), np.zeros(2))
         for (a, b), point in zip(normals, points, strict=True)
     )
     response = corner_response(calipers, (0, 1))
