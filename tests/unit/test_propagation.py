@@ -1,8 +1,5 @@
 """Error propagation: against Monte Carlo, against central differences, and against the formulas as printed."""
 
-from types import SimpleNamespace
-from typing import NamedTuple
-
 import numpy as np
 import pytest
 
@@ -11,8 +8,11 @@ from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.lines import fit_lines, regression
 from measure.features.optics import Optics
+from measure.features.points import EdgePoints
 from measure.measurement import separation
 from planner.features.propagation import corner_covariance
+from planner.imaging.pictures import Pictures
+from planner.models.paper import paper
 from tests.scalar import weighted_points
 
 SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)
@@ -20,24 +20,17 @@ DRAWS = 20_000
 WITHIN = 4 * np.sqrt(2 / (DRAWS - 1))  # 4 standard errors of a variance: 4 %
 
 
-class Drawn(NamedTuple):
-    """Lines through many draws of an edge's points: centroids and normals (DRAWS, 2), the true one's normal, and W."""
-
-    centroid: np.ndarray
-    normal: np.ndarray
-    across: np.ndarray
-    total: float
-
-    def displacement(self, place: np.ndarray) -> np.ndarray:
-        """Where each line crosses the true line's normal at a place on that, px."""
-        return np.einsum("ni,ni->n", self.centroid - place, self.normal) / (self.normal @ self.across)
-
-
 @pytest.fixture(scope="module")
-def drawn(task1):
-    """20 000 draws of the paper's 100 points of each required edge, by edge.
+def fitted(task1):
+    """Offsets and slopes of lines through 20 000 draws of the paper's 100 points of each required edge.
 
     A weighted total-least-squares line of its own: the long axis of the points' weighted moments.
+
+    Returns
+    -------
+    dict
+        By edge: the place of the first end, direction and length of the edge's image; centroids and normals of the
+        lines (DRAWS, 2); and the sum of the weights.
     """
     rng, found = np.random.default_rng(7), {}
     for name in task1.task.edges:
@@ -45,69 +38,86 @@ def drawn(task1):
         noisy = points + rng.standard_normal((DRAWS, *points.shape)) / np.sqrt(weights)[:, None]
         centroid = weights @ noisy / weights.sum()
         away = noisy - centroid[:, None]
-        normal = np.linalg.eigh(np.einsum("i,nij,nik->njk", weights, away, away))[1][:, :, 0]
-        x, y = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
-        found[name] = Drawn(centroid, normal, np.array([-y, x]), weights.sum())
+        axes = np.linalg.eigh(np.einsum("i,nij,nik->njk", weights, away, away))[1]
+        along = points[-1] - points[0]
+        length = np.linalg.norm(along)
+        found[name] = points[0], along / length, length, centroid, axes[:, :, 0], weights.sum()
     return found
+
+
+def displacement(edge, place):
+    """Where each line crosses the true line's normal at a place along it (px from the first end), px."""
+    start, direction, _, centroid, normal, _ = edge
+    across = np.array([-direction[1], direction[0]])
+    away = centroid - (start + place * direction)
+    return np.einsum("ni,ni->n", away, normal) / (normal @ across)
 
 
 @pytest.fixture(scope="module")
 def predicted(task1):
-    return planner.predict(task1, SENSOR, LIGHT, "paper")
+    return paper(Pictures.of(task1, SENSOR, LIGHT))
 
 
-def at_corners(task1, drawn, predicted):
-    """(lines, corner, variance that the paper's model says the line's offset has there) of each required edge.
-
-    A corner moves along an edge's normal n by just that edge's offset, so that variance is n C n (eq. 5).
-    """
-    for feature, corner, covariance in zip(task1.task.corners, predicted.corners, predicted.covariances, strict=True):
-        for name in feature.edges:
-            edge = drawn[name]
-            yield edge, corner, float(edge.across @ covariance @ edge.across)
-
-
-def test_the_papers_line_variance_against_monte_carlo(task1, drawn, predicted):
-    """Eq. 3 at the corner; 1.3 x the truth and 0 are refused by the same sample, and so is the printed formula.
-
-    In V(gamma) the last term is 1/W; the printed I/W is off by a factor I = 100.
-    """
-    for edge, corner, variance in at_corners(task1, drawn, predicted):
-        empirical = edge.displacement(corner).var(ddof=1)
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0, 1.7])
+def test_the_papers_line_variance_against_monte_carlo(task1, fitted, predicted, fraction):
+    """Eq. 3 at both ends, the middle and beyond; 1.3 x the truth and 0 are refused by the same sample."""
+    for e, name in enumerate(predicted.measurand.view.names):
+        place = fraction * fitted[name][2]
+        ones = np.ones(len(task1.task.edges))
+        variance = predicted.line_variance(ones, place * ones)[e]
+        empirical = displacement(fitted[name], place).var(ddof=1)
         assert empirical == pytest.approx(variance, rel=WITHIN)
         assert empirical != pytest.approx(1.3 * variance, rel=WITHIN)
         assert empirical != pytest.approx(0, abs=WITHIN * variance)
-        printed = variance + (100 - 1) / edge.total
-        assert printed > 10 * variance
-        assert empirical != pytest.approx(printed, rel=WITHIN)
 
 
-def test_the_papers_distance_variance_against_monte_carlo(task1, drawn, predicted):
-    """Eq. 3, 5 and 6 in a row: corners where the drawn lines cross, and their distance."""
+def test_the_papers_tilt_against_monte_carlo(task1, fitted, predicted):
+    """The line's angle, rad^2: A = 0 and B = 1."""
+    ones = np.ones(len(task1.task.edges))
+    for e, name in enumerate(predicted.measurand.view.names):
+        _, direction, _, _, normal, _ = fitted[name]
+        sine = normal @ direction * np.sign(normal @ [-direction[1], direction[0]])
+        variance = predicted.line_variance(0 * ones, ones)[e]
+        assert np.arcsin(sine).var(ddof=1) == pytest.approx(variance, rel=WITHIN)
+
+
+def test_the_printed_gamma_variance_fails_the_same_test(task1, fitted, predicted):
+    """In V(gamma) the last term is 1/W; the printed I/W is off by a factor I = 100, and the sample refuses it."""
+    ones = np.ones(len(task1.task.edges))
+    for e, name in enumerate(predicted.measurand.view.names):
+        middle, total = fitted[name][2] / 2, fitted[name][-1]
+        repaired = predicted.line_variance(ones, middle * ones)[e]
+        printed = repaired + (100 - 1) / total
+        assert printed > 10 * repaired
+        assert displacement(fitted[name], middle).var(ddof=1) != pytest.approx(printed, rel=WITHIN)
+
+
+def test_the_papers_distance_variance_against_monte_carlo(task1, fitted):
+    """Eq. 3, 5 and 6 in a row: corners where the drawn lines cross, and their distance; 1.3 x is refused."""
     ends = []
     for feature in task1.task.corners:
-        lines = [drawn[name] for name in feature.edges]
-        normals = np.stack([line.normal for line in lines], 1)
-        ends.append(
-            np.linalg.solve(normals, np.einsum("nei,eni->ne", normals, [line.centroid for line in lines])[..., None])
-        )
-    values = np.linalg.norm(ends[1] - ends[0], axis=(1, 2))
-    assert values.mean() == pytest.approx(predicted.value_px, abs=4 * np.sqrt(predicted.variance_px2 / DRAWS))
-    assert values.var(ddof=1) == pytest.approx(predicted.variance_px2, rel=WITHIN)
-    assert values.var(ddof=1) != pytest.approx(1.3 * predicted.variance_px2, rel=WITHIN)
+        centroids, normals = (np.stack([fitted[name][k] for name in feature.edges], 1) for k in (3, 4))
+        ends.append(np.linalg.solve(normals, (normals * centroids).sum(-1)[..., None])[..., 0])
+    values, said = np.linalg.norm(ends[1] - ends[0], axis=1), planner.predict(task1, SENSOR, LIGHT, "paper")
+    assert values.mean() == pytest.approx(said.value_px, abs=4 * np.sqrt(said.variance_px2 / DRAWS))
+    assert values.var(ddof=1) == pytest.approx(said.variance_px2, rel=WITHIN)
+    assert values.var(ddof=1) != pytest.approx(1.3 * said.variance_px2, rel=WITHIN)
 
 
-def test_lines_of_correlated_points_against_monte_carlo(rng):
+def test_the_variance_of_correlated_points_against_monte_carlo(rng):
     """Mean and slope of lines through 20 000 draws of smoothed noise; that of independent points is refused."""
     along, scale, sigma = np.linspace(3, 27, 25), 1.5, 1e-3
     together = np.exp(-((along[:, None] - along) ** 2) / (4 * scale**2))
-    offset = sigma * rng.standard_normal((DRAWS, 25)) @ np.linalg.cholesky(together + 1e-12 * np.eye(25)).T
-    lines = fit_lines(SimpleNamespace(along=np.broadcast_to(along, offset.shape), offset=offset, valid=offset < np.inf))
-    response = sigma * regression(along)
-    known, independent = response @ together @ response.T, response @ response.T
-    for i, values in enumerate((lines.mean_offset, np.tan(lines.tilt))):
-        assert values.var(ddof=1) == pytest.approx(known[i, i], rel=WITHIN)
-        assert values.var(ddof=1) != pytest.approx(independent[i, i], rel=WITHIN)
+    root = np.linalg.cholesky(together + 1e-12 * np.eye(25))
+    offset = sigma * rng.standard_normal((DRAWS, 25)) @ root.T
+    whole = np.ones(offset.shape, bool)
+    lines = fit_lines(EdgePoints(np.broadcast_to(along, offset.shape), offset, whole, whole[:, 0], whole[:, 0]))
+    response = regression(along)
+    ours = sigma**2 * response @ together @ response.T
+    for values, known in ((lines.mean_offset, ours[0, 0]), (np.tan(lines.tilt), ours[1, 1])):
+        assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)
+    independent = sigma**2 * response @ response.T
+    assert lines.mean_offset.var(ddof=1) != pytest.approx(independent[0, 0], rel=WITHIN)
 
 
 def crossing(parameters):
@@ -141,17 +151,9 @@ def test_corner_covariance_against_central_differences(first, second):
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_corner_response_against_central_differences(first, second):
     """Level and slope of two of three lines found in the image; the third has no part in the corner."""
+    rest = 50.0, np.empty(0), "ok", Optics((100, 100)), np.zeros(2)
     calipers = tuple(
-        Caliper(
-            "",
-            np.array(origin),
-            np.array([np.cos(a), np.sin(a)]),
-            50.0,
-            np.empty(0),
-            "ok",
-            Optics((100, 100)),
-            np.zeros(2),
-        )
+        Caliper("", np.array(origin), np.array([np.cos(a), np.sin(a)]), *rest)
         for a, origin in ((first, (40.0, 30.0)), (0.7, (10.0, 10.0)), (second, (90.0, 70.0)))
     )
 
