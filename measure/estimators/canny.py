@@ -89,6 +89,11 @@ class CannyLocator:
         sure = self._sure(start, trend) & (weights.sum(1) > (1 - _LOST) * np.diff(self._limits))
         return EdgePoints(along, offset, valid, mean, first * second < 0, trend, weights, sure)
 
+    def edge_pixels(self, image: np.ndarray) -> np.ndarray:
+        """Row and column of the pixels that the edge points of one image are refined from, int, shape (k, 2)."""
+        _, pixel = self._kept(self.thinning(image[None]))
+        return self.near[pixel] + [self.thinning.rows.start, self.thinning.columns.start]
+
     @cached_property
     def pixels(self) -> np.ndarray:
         """Flat indices of the pixels that can change the result."""

@@ -86,9 +86,11 @@ def test_lengths_from_image_coordinates_fail_for_a_tiny_object(monkeypatch):
     assert run(case).verdict == "right"
     pictures._of_picture.cache_clear()  # what was projected before
     outline = import_module("planner.features.projected_edges")
-    plain = outline.from_axis
+    plain, known = outline.from_axis, import_module("planner.imaging.pictures")._of_picture
     monkeypatch.setattr(outline, "from_axis", lambda *args: (plain(*args) + 127.5) - 127.5)
+    known.cache_clear()  # edges are projected once a picture
     assert run(case).verdict == "WRONG"
+    known.cache_clear()
 
 
 def test_the_last_digit_counts():
