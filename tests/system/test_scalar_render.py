@@ -76,7 +76,8 @@ def test_lines_lie_where_the_exact_images_have_them():
 @pytest.mark.parametrize("index", [0, 1])
 def test_glossy_faces_and_distances_are_exact(index):
     """Faces within 1e-4 of the brightest, the distance within 0.001 px; a roughness 2 % off is seen."""
-    scene, quality, truth = loaded("glossy_metal"), Quality(samples=16), exact("glossy_metal", index)
+    scene, truth = loaded("glossy_metal"), exact("glossy_metal", index)
+    quality = Quality(samples=16, edge_samples=256)  # 64 rays leave 0.0013 px of the distance to chance
     setting = scene.settings[index]
     picture, rougher = scalar(scene, setting, quality), scalar(changed(scene, roughness=0.306), setting, quality)
     flat = maximum_filter(truth, 9) - minimum_filter(truth, 9) < 0.05 * truth.max()
