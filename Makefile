@@ -15,14 +15,14 @@ test: lint
 bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
 
-# 10,000 spoilt scene files, mesh files and images: no traceback, no hang, at most 1 GiB (4 minutes).
+# 10,000 corrupted scene files, mesh files and images: no traceback, no hang, at most 1 GiB (4 minutes).
 fuzz: $(VENV)/.test-installed
 	$(BIN)/python -m tests.hard.fuzz --count 10000
 
 bench-planner: $(VENV)/.installed
 	$(BIN)/python -m tests.benchmarks.search
 
-# Accuracies and budgets asked for and reached, beside knobs set by hand (40 minutes).
+# Accuracies and budgets asked for and reached, beside parameters set by hand (40 minutes).
 bench-cost: $(VENV)/.installed
 	$(BIN)/python -m tests.proofs.cost task1
 
