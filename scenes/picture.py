@@ -77,6 +77,10 @@ class Picture:
     def __hash__(self) -> int:
         return self._hash
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the hash: of a text it is another number in every process."""
+        return {key: value for key, value in self.__dict__.items() if key != "_hash"}
+
     @cached_property
     def _hash(self) -> int:
         return hash((self.scene, self.sensor, self.lights))

@@ -107,7 +107,7 @@ class Scene(Model):
             pose = Pose.of(pose)
         except InvalidInput as error:
             raise InvalidInput(f"{key or role}: {error}") from None
-        if self.solid.height_above(self.position(role, pose)) <= 1e-6 * np.ptp(self.solid.vertices):
+        if self.solid.height_above(self.position(role, pose)) <= 1e-6 * self.solid.extent:
             radius = (self.camera if role == "sensor" else self.light).distance
             raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
         if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,11 +25,16 @@ class Obstacle(Model):
     corner: tuple[float, float, float]
     size: tuple[Positive, Positive, Positive]
 
-    @cached_property
+    @property
     def solid(self) -> Solid:
         """Its geometry, where it stands."""
-        here = block(self.size)
-        return Solid(here.vertex_names, here.vertices + np.array(self.corner), here.faces, here.edges)
+        return _standing(self.corner, self.size)
+
+
+@lru_cache(maxsize=64)  # of the numbers, not in the record: a changed copy would keep the old geometry
+def _standing(corner: tuple[float, float, float], size: tuple[float, float, float]) -> Solid:
+    here = block(size)
+    return Solid(here.vertex_names, here.vertices + np.array(corner), here.faces, here.edges)
 
 
 class Jitter(Model):

@@ -255,7 +255,7 @@ def behind(
     found = np.where(face >= 0, signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off), 0.0)
     if scene.floor is not None and scene.floor.reflectance > 0:
         place, ahead = _on_floor(scene.floor, points, vectors, t)
-        place = place + _LIFT * np.ptp(scene.solid.vertices) * (0 if outward is None else outward * (1, 1, 0))
+        place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found = np.where(ahead, on_floor, found)
     return np.where(wanted, found, 0.0)
@@ -264,7 +264,7 @@ def behind(
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:
     """Signal of the floor at places (..., n, 3) upon it, in the bodies' shadows dark; 0 where not wanted."""
     scene, bodies = pictures.scene, pictures.scene.bodies
-    lift = 1e-7 * np.ptp(bodies.vertices) * _UP
+    lift = 1e-7 * bodies.extent * _UP
 
     def free(points, _, light):
         blocker, t = first_face(bodies, light, points + lift - light, ())

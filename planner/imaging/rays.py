@@ -47,7 +47,7 @@ def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.nd
     points, position = np.broadcast_arrays(points, position)
     normals = solid.normals[faces]
     towards = np.einsum("...i,...i->...", normals, position) > solid.offsets[faces]
-    start = points + 1e-7 * np.ptp(solid.vertices) * normals
+    start = points + 1e-7 * solid.extent * normals
     blocker, t = first_face(solid, position, start - position, ())
     return towards & ((blocker < 0) | (t >= 1))
 

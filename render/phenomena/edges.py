@@ -154,7 +154,7 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
             aside = np.cross(solid.normals[face], along)
             centre = solid.vertices[list(solid.faces[face])].mean(0)
             steps.append(aside * np.sign(aside @ (centre - ends[0])))
-    return _INWARD * np.ptp(solid.vertices) * np.array(steps).reshape(-1, 2, 3)
+    return _INWARD * solid.extent * np.array(steps).reshape(-1, 2, 3)
 
 
 def background(pictures: Pictures, points: np.ndarray) -> np.ndarray:

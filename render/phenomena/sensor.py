@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.imaging.sensor import shot_noise
 from planner.models import DEFAULT_MODEL, variance_model
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
 from render.phenomena.edges import sides
@@ -35,7 +36,7 @@ class ShotNoise(Effect):
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
-        return _relative(scene.noise.gain * _brightest(pictures), scene.noise.variance)
+        return _relative(float(shot_noise(scene.noise, _brightest(pictures))), scene.noise.variance)
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "noise", gain=0.0)
@@ -121,8 +122,7 @@ class Saturation(Effect):
         return EVERYTHING if self._top(pictures) >= 2**scene.noise.bits - 1 else NOTHING
 
     def _top(self, pictures: Pictures) -> float:
-        scene = pictures.scene
-        level = scene.noise.dark_level + _brightest(pictures)
-        noise = scene.noise
-        sigma = np.sqrt(noise.variance + noise.gain * level + (noise.prnu * level) ** 2 + noise.dsnu**2)
-        return level + self._MARGIN * float(sigma)
+        noise, brightest = pictures.scene.noise, _brightest(pictures)
+        pattern = (noise.prnu * brightest) ** 2 + noise.dsnu**2
+        sigma = np.sqrt(noise.variance + shot_noise(noise, brightest) + pattern)
+        return noise.dark_level + brightest + self._MARGIN * float(sigma)

@@ -105,8 +105,8 @@ def _albedo(scene: Scene) -> float:
 
 
 def _gain(scene: Scene) -> float:
-    """Irradiance near the object is at most this times that at the origin."""
-    reach = float(np.linalg.norm(scene.solid.vertices, axis=1).max())
+    """Irradiance near the object is at most this times that at the reference point."""
+    reach = float(np.linalg.norm(scene.solid.vertices - np.array(scene.camera.look_at), axis=1).max())
     return (scene.light.distance / (scene.light.distance - reach)) ** 2
 
 

@@ -87,7 +87,7 @@ def renamed(plain: Solid, names: dict[str, tuple[float, float, float]]) -> Solid
     vertex_names = list(plain.vertex_names)
     for name, position in names.items():
         away = np.linalg.norm(plain.vertices - np.array(position), axis=1)
-        if away.min() > 1e-3 * np.ptp(plain.vertices):
+        if away.min() > 1e-3 * np.ptp(plain.vertices, axis=0).max():
             raise InvalidInput(f"object.names.{name} must be the position of a vertex, got {list(position)}")
         vertex_names[int(away.argmin())] = name
     if len(set(vertex_names)) < len(vertex_names):

@@ -104,10 +104,15 @@ class Solid:
         return np.einsum("fi,fi->f", self.normals, anchors)
 
     @cached_property
+    def extent(self) -> float:
+        """Largest extent along an axis, cm, wherever it stands."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
     def outer(self) -> np.ndarray:
         """Which faces lie on the convex hull, so that no vertex stands over them; bool, shape (F,)."""
         over = self.vertices @ self.normals.T - self.offsets
-        return over.max(0) <= _FLAT * np.ptp(self.vertices)
+        return over.max(0) <= _FLAT * self.extent
 
     @cached_property
     def is_convex(self) -> bool:
