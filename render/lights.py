@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planner.imaging.appearance import polarisation_axis
-from planner.imaging.projection import frame
+from planner.imaging.projection import frame, light_position
 from render.bsdf import Lamp
 from scenes import Light, Picture, Pose, Scene
 
@@ -25,7 +25,7 @@ def lamps(picture: Picture, active: frozenset[str]) -> tuple[Lamp, ...]:
     """Where polarised lights stand, their directions of polarisation, and the angles (radians) that they span."""
     scene, found = picture.scene, []
     for i, (light, pose) in enumerate(zip(scene.lights, picture.lights, strict=True)):
-        at = scene.position("light", pose)
+        at = light_position(scene.camera, light, np.array(list(pose)))
         axis = polarisation_axis(scene, i, at) if "polarisation" in active else None
         if axis is not None:
             found.append(Lamp(tuple(at.tolist()), tuple(axis.tolist()), 2 * _radius(light, active) / light.distance))
@@ -42,7 +42,7 @@ def _emitter(mitsuba: Any, scene: Scene, light: Light, pose: Pose, active: froze
 
     Such a surface sends albedo / pi of its irradiance, which is intensity / distance^2.
     """
-    position = scene.position("light", pose).tolist()
+    position = light_position(scene.camera, light, np.array(list(pose))).tolist()
     intensity, radius = math.pi * scene.camera.exposure * light.distance**2, _radius(light, active)
     if radius == 0:
         value = {"type": "spectrum", "value": intensity}

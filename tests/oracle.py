@@ -57,7 +57,7 @@ def pinhole(points, pose, camera):
 
 def axes(pose):
     """Unit vectors of a pose in degrees: from the origin to it, to the right in its image, and down."""
-    polar, azimuth = np.radians(pose)
+    polar, azimuth = np.radians(list(pose))
     sine, cosine = np.sin(azimuth), np.cos(azimuth)
     out = np.array([np.sin(polar) * cosine, np.sin(polar) * sine, np.cos(polar)])
     down = np.array([np.cos(polar) * cosine, np.cos(polar) * sine, -np.sin(polar)])
