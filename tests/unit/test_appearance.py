@@ -95,7 +95,7 @@ def near_a_border(rest, point, normals):
 
 @pytest.mark.parametrize("floor", [True, False])
 def test_side_signals_of_a_crowded_scene(task1, rng, floor):
-    """40 random pairs of poses, six edges, six points: lit, in shadow, and what is seen behind. To 1e-5 of the level."""
+    """40 random pairs of poses, six edges, six points: lit, in shadow, what is seen behind; to 1e-5 of the level."""
     scene = crowded(task1) if floor else crowded(task1, floor=None)
     normals = scene.solid.normals
     kinds, skipped = {"lit": 0, "shadow": 0, "behind": 0, "hidden": 0}, 0
@@ -138,8 +138,10 @@ def test_eq_1_has_no_fall_off(task1):
     pictures = Pictures.of(scene, sensor, light)
     points, lamp = edge_points(scene.solid, EDGES, FRACTIONS), 100 * axes(light)[0]
     sides = side_signals(pictures, EDGES, points)
-    facing = np.array([[scene.solid.normals[f] @ (pictures.sensor_at - points[e, 0]) > 0 for f in scene.solid.edge(n).faces]
-                       for e, n in enumerate(EDGES)])  # fmt: skip
+    away = pictures.sensor_at - points[:, 0]
+    facing = np.array([
+        [scene.solid.normals[f] @ away[e] > 0 for f in scene.solid.edge(n).faces] for e, n in enumerate(EDGES)
+    ])  # fmt: skip
     both = facing.all(1) & (sides > 0).all((1, 2))
     assert both.sum() >= 1
     away = np.linalg.norm(lamp - points, axis=-1)
