@@ -55,7 +55,7 @@ def test_calibrated_knows_the_photons(drawn):
 
 
 def test_darkness_alone_would_be_refuted(drawn):
-    """Negative control: with the noise of darkness alone, as it once was, less than a fifth of the truth is predicted."""
+    """Negative control: with the noise of darkness alone, as once, less than a fifth of the truth is predicted."""
     empirical, _, _, _, dark = drawn
     assert (empirical / dark > 5).all()
 
