@@ -9,7 +9,7 @@ from tests.hard import fuzz
 from validation import picture_file
 
 
-def test_400_spoilt_inputs(tmp_path, capfd):
+def test_400_corrupted_inputs(tmp_path, capfd):
     before = fuzz.peak_memory()
     found = fuzz.run(400, seed=20261121, folder=tmp_path)
     capfd.readouterr()  # what the image libraries say of corrupted files

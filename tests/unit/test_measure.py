@@ -214,7 +214,7 @@ def test_stack_and_single_image_agree(task1):
     assert stack.value_px == pytest.approx([float(single.value_px)] * 2, abs=1e-9)
 
 
-def test_footprint_holds_every_pixel_that_matters(task1, rng):
+def test_region_of_interest_holds_every_pixel_that_matters(task1, rng):
     """Changing all other pixels changes nothing, for every estimator."""
     image, _ = picture(task1, SENSOR)
     image = image + rng.standard_normal(image.shape)
