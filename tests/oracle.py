@@ -4,6 +4,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from planner.imaging.projection import direction, facing, frame, project
+from planner.imaging.irradiance import bands
 from planner.imaging.reflectance import reflected
 from validation.hard.polygon import _scan_lines, _spans, polygon_image
 
@@ -61,7 +62,7 @@ def block_image(scene, sensor, light):
             to_light, to_sensor = lamp - point, eye - point
             distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
             to_sensor /= np.linalg.norm(to_sensor, axis=-1, keepdims=True)
-            level = reflected(scene.material, np.broadcast_to(normal, point.shape), to_light / distance, to_sensor)
+            level = reflected(scene.material, bands(scene, scene.light), np.broadcast_to(normal, point.shape), to_light / distance, to_sensor)
             return camera.exposure * level * (scene.light.distance / distance[..., 0]) ** 2
 
         return shade
@@ -73,4 +74,4 @@ def block_image(scene, sensor, light):
         )
         if seen
     ]
-    return noise.dark_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)
+    return scene.noise.dark_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)
