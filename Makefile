@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test fuzz lint bench-measure bench-planner reference proof clean
+.PHONY: validate test fuzz lint bench-measure bench-planner bench-cost reference proof agreement clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -39,6 +39,10 @@ reference: $(VENV)/.installed
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed
 	$(BIN)/python -m tests.proofs kill --times 20
+
+# Is every variance that is said the one that 1000 pictures show, in every scene and by every estimator? (10 minutes)
+agreement: $(VENV)/.test-installed
+	$(BIN)/python -m tests.proofs.agreement
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -77,7 +77,7 @@ class Calibration:
     paper_kappa2: float
 
 
-def calibrate(scene: Scene, images: int = 200, seed: int = 1, progress=lambda *_: None) -> Calibration:
+def calibrate(scene: Scene, images: int, seed: int, progress=lambda *_: None) -> Calibration:
     """Measure every locator at the scene's blur and smoothing scale.
 
     Parameters

@@ -70,7 +70,7 @@ def propagate(
     layout = layout_of(picture)
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
-    ends = response @ tool.respond(clean).lines
+    ends = response @ tool.respond(clean)
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends
     if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is

@@ -5,29 +5,13 @@ import math
 
 def variance_evaluate(scene, sensor, light, *, points=100, kappa2=8.697):
     """Variance of the distance in the image, px^2, of a diffuse convex solid; infinite where it cannot be measured."""
-    solid, camera, material = scene.solid, scene.camera, scene.material
-    eye, lamp = place(sensor, camera.distance), place(light, scene.light.distance)
-    white = camera.exposure * (1 - material.specular_fraction) * material.diffuse_reflectance
-    normals, offsets = solid.normals.tolist(), solid.offsets.tolist()
+    solid, camera = scene.solid, scene.camera
     corners, covariances = [], []
     for corner in scene.task.corners:
         where = project(solid.vertex(corner.vertex).tolist(), sensor, camera)
         lines = []
         for name in corner.edges:
-            edge = solid.edge(name)
-            start, stop = (solid.vertices[end].tolist() for end in edge.ends)
-            places, weights = [], []
-            for i in range(points):
-                p = [a + (b - a) * i / (points - 1) for a, b in zip(start, stop, strict=True)]
-                sides = []
-                for face in edge.faces:
-                    n = normals[face]
-                    away = [a - b for a, b in zip(lamp, p, strict=True)]
-                    seen = dot(n, eye) > offsets[face]
-                    sides.append(white * max(dot(n, away), 0.0) / math.sqrt(dot(away, away)) if seen else 0.0)
-                contrast = abs(sides[0] - sides[1])
-                weights.append(contrast**2 / (kappa2 * scene.noise.sigma**2))
-                places.append(project(p, sensor, camera))
+            places, weights = weighted_points(scene, solid.edge(name), sensor, light, points=points, kappa2=kappa2)
             if sum(weights) == 0:
                 return math.inf
             lines.append(line(places, weights, where))
@@ -46,6 +30,27 @@ def variance_evaluate(scene, sensor, light, *, points=100, kappa2=8.697):
     return ((r1 - r2) ** 2 * rr + (c1 - c2) ** 2 * cc + 2 * (r1 - r2) * (c1 - c2) * rc) / (
         (r1 - r2) ** 2 + (c1 - c2) ** 2
     )
+
+
+def weighted_points(scene, edge, sensor, light, *, points=100, kappa2=8.697):
+    """The paper's edge points, equally spaced in space: images, px, and weights 1 / variance, px^-2 (eq. 7-10)."""
+    solid, camera, material = scene.solid, scene.camera, scene.material
+    eye, lamp = place(sensor, camera.distance), place(light, scene.light.distance)
+    white = camera.exposure * (1 - material.specular_fraction) * material.diffuse_reflectance
+    faces = [(solid.normals[face].tolist(), float(solid.offsets[face])) for face in edge.faces]
+    start, stop = (solid.vertices[end].tolist() for end in edge.ends)
+    places, weights = [], []
+    for i in range(points):
+        p = [a + (b - a) * i / (points - 1) for a, b in zip(start, stop, strict=True)]
+        sides = []
+        for n, offset in faces:
+            away = [a - b for a, b in zip(lamp, p, strict=True)]
+            seen = dot(n, eye) > offset
+            sides.append(white * max(dot(n, away), 0.0) / math.sqrt(dot(away, away)) if seen else 0.0)
+        contrast = abs(sides[0] - sides[1])
+        weights.append(contrast**2 / (kappa2 * scene.noise.sigma**2))
+        places.append(project(p, sensor, camera))
+    return places, weights
 
 
 def line(places, weights, at):

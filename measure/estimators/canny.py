@@ -1,223 +1,207 @@
-"""The classic pipeline: gradient threshold and Canny's thinning, each edge pixel refined by a parabola."""
+"""The classic pipeline: gradient threshold and Canny's thinning, then each edge pixel refined.
+
+The refined point is where the gradient across the edge is largest: it does not depend on which of the pixels beside the
+edge noise lets Canny keep, and neither does its error, which therefore is linear in the noise as a whole.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import sparse
+from scipy.special import ndtr
 
+from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
+from measure.estimators.profile import TRUNCATE, profile_kernel, top, top_kernel
+from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper
-from measure.features.lines import unit_covariance
+from measure.features.lines import cells, trend_along
 from measure.features.optics import Optics
-from measure.features.points import EdgePoints
-from planner.features.locator import edge_blur, kappa2
+from measure.features.points import EdgePoints, UnitNoise
+from planner.features.locator import edge_blur
 
-_FIXED_POINT = 64  # Canny takes gradients as 16-bit integers: 1/64 grey level a pixel
-_LARGEST = 32767
-_SINGLE = 2.0**16  # grey levels that single precision resolves to 1/256; darkness is brought below
-_TRUNCATE = 4
+_BESIDE = 0.7  # of the gradient at its top is left at a pixel half a diagonal away, at least
+_LOST = 0.1  # of an edge's points; up to there the variance is off by 2 % at most
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CannyLocator:
     """Edge pixels near one expected edge.
 
     Attributes
     ----------
     caliper : Caliper
-    shape : tuple of int
-        Of the image.
-    scale, blur : float
-        Smoothing scale and the lens' blur, px.
+    optics : Optics
     threshold : float
-        Smallest gradient of an edge pixel, grey levels a pixel (no hysteresis: one threshold, as in the paper).
-    rows, columns : slice
-        Part of the image that matters.
-    near : ndarray of bool
-        Pixels of that part that belong to the edge: within the search window, away from the corners.
-    smooth, derive : ndarray
-        Sampled Gaussian and its derivative.
-    gradient_to_contrast : float
-        Contrast of a straight blurred edge whose gradient is 1 at its middle.
+        Smallest gradient of an edge point, grey levels a pixel.
+    thinning : Thinning
+        What chooses the edge pixels, in a window of the image.
+    near : ndarray of int, shape (m, 2)
+        Row and column in that window of the pixels within the search window and away from the corners, in order along
+        the edge.
+    along, offset, gain : ndarray, shape (m,)
+        Where they are in the edge's caliper, ideal px, and the ideal px across it for a recorded px.
+    kernel : ndarray, shape (k * k, 8)
+        What k x k pixels tell of the gradient across the edge (`profile_kernel`).
     """
 
     caliper: Caliper
-    shape: tuple[int, int]
-    scale: float
-    blur: float
+    optics: Optics
     threshold: float
-    rows: slice
-    columns: slice
+    thinning: Thinning
     near: np.ndarray
-    smooth: np.ndarray
-    derive: np.ndarray
-    gradient_to_contrast: float
+    along: np.ndarray
+    offset: np.ndarray
+    gain: np.ndarray
+    kernel: np.ndarray
 
     @classmethod
-    def of(cls, optics: Optics, caliper: Caliper, threshold: float) -> CannyLocator:
+    def of(cls, optics: Optics, caliper: Caliper, threshold: float, thinning: Thinning) -> CannyLocator:
         """Prepare the locator of one edge."""
-        scale, window = optics.scale_px, optics.window_px
-        x = np.arange(-int(np.ceil(_TRUNCATE * scale)), int(np.ceil(_TRUNCATE * scale)) + 1)
-        gauss = np.exp(-(x**2) / (2 * scale**2))
-        gauss /= gauss.sum()
-        derive = x * gauss / (x**2 * gauss).sum()  # exactly 1 on a ramp of 1 grey level a pixel
-        margin = window + _TRUNCATE * scale + 2
-        ends = caliper.at(caliper.positions[[0, -1]], np.zeros(2))
-        low = np.maximum(np.floor(ends.min(0) - margin), 0).astype(int)
-        high = np.minimum(np.ceil(ends.max(0) + margin) + 1, optics.shape[::-1]).astype(int)
-        rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
-        y, x = np.mgrid[rows, columns]
-        along, offset = caliper.coordinates(np.stack([x, y], -1))
-        near = (
-            (np.abs(offset) <= window) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
-        )
-        total = np.hypot(scale, edge_blur(optics.blur_px))
-        return cls(
-            caliper,
-            optics.shape,
-            scale,
-            optics.blur_px,
-            threshold,
-            rows,
-            columns,
-            near,
-            gauss,
-            derive,
-            float(np.sqrt(2 * np.pi) * total),
-        )
+        y, x = np.divmod(near_pixels(optics, caliper), optics.shape[1])
+        ideal = optics.ideal(np.stack([x, y], -1).astype(float))
+        along, offset = caliper.coordinates(ideal)
+        gain = np.linalg.norm(optics.gradient(ideal, caliper.normal), axis=-1)
+        order = np.argsort(along, kind="stable")
+        near = np.stack([y - thinning.rows.start, x - thinning.columns.start], -1)[order]
+        kernel = profile_kernel(optics.scale_px, caliper.normal)
+        return cls(caliper, optics, threshold, thinning, near, along[order], offset[order], gain[order], kernel)
 
-    def locate(self, images: np.ndarray, chosen: np.ndarray | None = None) -> EdgePoints:
-        """Edge points in a stack of images, shape (n, height, width).
-
-        ``chosen`` are the edge pixels to refine, bool like `near`; Canny's own choice in each image when not given.
-        """
-        gradients = [self.gradient(image) for image in images]
-        pixels = [np.nonzero(self.edge_pixels(*gradient) if chosen is None else chosen) for gradient in gradients]
-        counts = np.array([len(y) for y, _ in pixels])
-        which = np.repeat(np.arange(len(images)), counts)
-        y, x = (np.concatenate(part) for part in zip(*pixels, strict=True))
-        gx, gy = (np.stack(part) for part in zip(*gradients, strict=True))
-        slot = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        along, offset, strength = (np.zeros((len(images), max(counts.max(), 1))) for _ in range(3))
+    def locate(self, images: np.ndarray | Thinned) -> EdgePoints:
+        """Edge points in a stack of images, shape (n, height, width), or in its thinned window."""
+        seen = self.thinning(images) if isinstance(images, np.ndarray) else images
+        which, pixel = self._kept(seen)
+        shift, gradient, _, good = top(self._profiles(seen, which, pixel))
+        good &= np.abs(gradient) >= self.threshold
+        counts = np.bincount(which, minlength=len(seen.parts))
+        slot = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        along, offset, contrast = (np.zeros((len(counts), max(counts.max(), 1))) for _ in range(3))
         valid = np.zeros(along.shape, bool)
-        points, peak, good = _parabola(gx, gy, which, y, x)
-        along[which, slot], offset[which, slot] = self.caliper.coordinates(
-            points + [self.columns.start, self.rows.start]
-        )
-        strength[which, slot], valid[which, slot] = peak, good
-        contrast = self.gradient_to_contrast * (strength * valid).sum(1) / np.maximum(valid.sum(1), 1)
-        rise = np.zeros(along.shape)
-        rise[which, slot] = np.sign(gx[which, y, x] * self.caliper.normal[0] + gy[which, y, x] * self.caliper.normal[1])
+        along[which, slot], offset[which, slot] = self.along[pixel], self.offset[pixel] + shift * self.gain[pixel]
+        contrast[which, slot], valid[which, slot] = self._gradient_to_contrast * gradient, good
+        weights = cells(along, valid, self._limits)
         late = along > self.caliper.positions.mean()
-        first, second = ((rise * valid * half).sum(1) for half in (~late, late))
-        return EdgePoints(along, offset, valid, contrast, first * second < 0)
+        first, second = ((contrast * valid * half).sum(1) for half in (~late, late))
+        mean, trend, start = trend_along(along, np.abs(contrast), weights)
+        sure = self._sure(start, trend) & (weights.sum(1) > (1 - _LOST) * np.diff(self._limits))
+        return EdgePoints(along, offset, valid, mean, first * second < 0, trend, weights, sure)
 
     @property
     def pixels(self) -> np.ndarray:
-        """Flat indices of the pixels that can change the result: the kernel, and what thinning and parabola look at."""
-        radius = len(self.smooth) // 2 + 2
-        around = cv2.dilate(np.pad(self.near, radius).astype(np.uint8), np.ones((2 * radius + 1,) * 2, np.uint8))
-        used = np.zeros(self.shape, bool)
-        used[self.rows, self.columns] = around[radius:-radius, radius:-radius]
+        """Flat indices of the pixels that can change the result."""
+        used = np.zeros(self.optics.shape, bool)
+        view = used[self.thinning.rows, self.thinning.columns]
+        reach = max(self._radius, self.thinning.reach)
+        steps = np.arange(-reach, reach + 1)
+        for step in steps:
+            view[self.near[:, :1] + step, self.near[:, 1:] + steps] = True
         return np.flatnonzero(used)
 
-    def unit_covariance(self) -> np.ndarray:
-        """Covariance of (mean offset, slope) for unit noise and unit contrast, (2, 2): the closed form of eq. 7."""
-        return kappa2(self.scale, self.blur) * unit_covariance(self.caliper.positions, self.scale)
+    def unit_noise(self) -> UnitNoise:
+        """Response to noise on a straight edge of unit contrast at the expected place."""
+        points, response = self.linear_response(self._straight_edge())
+        keep = points.valid[0, : response.shape[0]]
+        used = np.flatnonzero(keep)
+        return UnitNoise(points.along[0, used], points.weights[0, used], self._step * response[used][:, self.pixels])
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
-        """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width).
+        """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
+        seen = self.thinning(clean[None])
+        which, pixel = self._kept(seen)
+        shift, _, curvature, _ = top(self._profiles(seen, which, pixel))
+        steps = np.arange(-self._radius, self._radius + 1)
+        middle = (self.near[pixel] + [self.thinning.rows.start, self.thinning.columns.start]) @ [clean.shape[1], 1]
+        columns = middle[:, None] + (steps[:, None] * clean.shape[1] + steps).ravel()
+        starts = np.arange(pixel.size + 1) * steps.size**2
+        values = -top_kernel(self.kernel, shift) * (self.gain[pixel] / curvature)[:, None]
+        return self.locate(seen), sparse.csr_array((values.ravel(), columns.ravel(), starts), (pixel.size, clean.size))
 
-        Linear in the noise once the edge pixels are chosen; the choice itself is not, and is held fixed.
+    def _kept(self, seen: Thinned) -> tuple[np.ndarray, np.ndarray]:
+        """Image and number (into `near`) of each edge pixel, in order."""
+        flat = self.near @ [seen.kept.shape[2], 1]
+        return np.nonzero(np.take(seen.kept.reshape(len(seen.kept), -1), flat, 1))
+
+    def _profiles(self, seen: Thinned, which: np.ndarray, pixel: np.ndarray) -> np.ndarray:
+        """The kernel's results at edge pixels, shape (k, 8)."""
+        size = 2 * self._radius + 1
+        y, x = self.near[pixel].T - self._radius
+        around = sliding_window_view(seen.parts, (size, size), (1, 2))[which, y, x]
+        return (around.reshape(which.size, size * size) @ self.kernel.astype(np.float32)).astype(float)
+
+    def _sure(self, start: np.ndarray, trend: np.ndarray) -> np.ndarray:
+        """Whether noise leaves hardly any point of the edge's dimmer half below the threshold, bool (n,).
+
+        Told from the contrast at the edge's start and its change per px: of one image of many, or the noise-free one.
         """
-        gx, gy = self.gradient(clean)
-        y, x = np.nonzero(self.edge_pixels(gx, gy))
-        _, d_low, d_mid, d_high, gx0, gy0, m0 = _peak(gx[None], gy[None], np.zeros_like(x), y, x)
-        toward = (gx0 * self.caliper.normal[0] + gy0 * self.caliper.normal[1]) / m0
-        shape = gx.shape
-        d_magnitude = sparse.csr_array((x.size, gx.size))
-        for step, derivative in ((-1, d_low), (0, d_mid), (1, d_high)):
-            picked = _bilinear_matrix(x + step * gx0 / m0, y + step * gy0 / m0, shape)
-            d_magnitude = d_magnitude + sparse.diags_array(derivative * toward) @ picked
-        magnitude = np.maximum(np.hypot(gx, gy), np.finfo(float).tiny).ravel()
-        response = d_magnitude @ (
-            sparse.diags_array(gx.ravel() / magnitude) @ self._filter_matrix(shape, self.derive, self.smooth)
-            + sparse.diags_array(gy.ravel() / magnitude) @ self._filter_matrix(shape, self.smooth, self.derive)
-        )
-        local = sparse.coo_array(response)
-        row, column = np.divmod(local.col, shape[1])
-        flat = (row + self.rows.start) * clean.shape[1] + column + self.columns.start
-        return self.locate(clean[None]), sparse.csr_array((local.data, (local.row, flat)), (x.size, clean.size))
+        first, last = self.caliper.positions[[0, -1]]
+        lower = start + trend * np.where(trend > 0, first, last)
+        half = np.linspace(lower, start + trend * (first + last) / 2, 5) / self._gradient_to_contrast
+        noise = np.sqrt(self.optics.noise_variance) * np.linalg.norm(self.kernel[:, 0])
+        return ndtr((self.threshold - half) / max(noise, 1e-9 * self.threshold)).mean(0) < _LOST
 
-    def gradient(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gaussian derivatives along x and y of the part that matters, grey levels a pixel."""
-        part = image[self.rows, self.columns]
-        base = _SINGLE * np.rint(part.min() / _SINGLE)  # 0 for 8 and 16 bit images
-        part = np.ascontiguousarray(part - base, dtype=np.float32)
-        border = cv2.BORDER_REPLICATE
-        return (
-            cv2.sepFilter2D(part, cv2.CV_32F, self.derive, self.smooth, borderType=border),
-            cv2.sepFilter2D(part, cv2.CV_32F, self.smooth, self.derive, borderType=border),
-        )
+    @property
+    def _radius(self) -> int:
+        return int(np.sqrt(len(self.kernel))) // 2
 
-    def edge_pixels(self, gx: np.ndarray, gy: np.ndarray) -> np.ndarray:
-        """Pixels near the edge that Canny keeps: gradient above the threshold and largest along its direction."""
-        steepest = max(float(np.abs(gx).max()), float(np.abs(gy).max()), 1.0)
-        unit = min(_FIXED_POINT, _LARGEST / steepest)  # coarser in a picture so bright that the integers would saturate
-        fixed = [np.rint(g * unit).astype(np.int16) for g in (gx, gy)]
-        limit = self.threshold * unit
-        return (cv2.Canny(fixed[0], fixed[1], limit, limit, L2gradient=True) > 0) & self.near
+    @property
+    def _limits(self) -> tuple[float, float]:
+        return float(self.caliper.positions[0]) - 0.5, float(self.caliper.positions[-1]) + 0.5
 
-    def _filter_matrix(self, shape: tuple[int, int], along_x: np.ndarray, along_y: np.ndarray) -> sparse.csr_array:
-        """The separable filter as a matrix on the flattened part of the image (inside its border)."""
-        radius = len(along_x) // 2
-        matrices = [
-            sparse.diags_array(list(kernel), offsets=list(range(-radius, radius + 1)), shape=(size, size))
-            for kernel, size in ((along_y, shape[0]), (along_x, shape[1]))
-        ]
-        return sparse.csr_array(sparse.kron(*matrices))
+    @property
+    def _gradient_to_contrast(self) -> float:
+        """Contrast of a straight blurred edge whose gradient is 1 at its middle."""
+        blur = edge_blur(self.caliper.blur(self.caliper.positions.mean()))
+        return float(np.sqrt(2 * np.pi) * np.hypot(self.optics.scale_px, blur))
+
+    @property
+    def _step(self) -> float:
+        """A contrast that passes the threshold everywhere."""
+        return 4 * self.threshold * self._gradient_to_contrast
+
+    def _straight_edge(self) -> np.ndarray:
+        """Noise-free image of an endless edge at the expected place, as far as it is looked at."""
+        pixels = self.pixels
+        y, x = np.divmod(pixels, self.optics.shape[1])
+        _, across = self.caliper.coordinates(self.optics.ideal(np.stack([x, y], -1)[:, None] + NODES))
+        image = np.zeros(self.optics.shape)
+        image.flat[pixels] = self._step * half_plane(across / max(self.optics.blur_px, 0.3)) @ NODE_WEIGHTS
+        return image
 
 
-def _parabola(gx, gy, which, y, x):
-    """Refined points (k, 2) as (x, y), gradient there, and whether the pixel is a proper peak."""
-    shift, *_, gx0, gy0, m0 = _peak(gx, gy, which, y, x)
-    points = np.stack([x + shift * gx0 / m0, y + shift * gy0 / m0], -1)
-    return points, m0, np.abs(shift) <= 1
+def thinnings(optics: Optics, calipers: list[Caliper], threshold: float) -> list[Thinning]:
+    """What chooses each edge's pixels: one for all, unless the edges' own windows together are the smaller job."""
+    if not calipers:
+        return []
+    margin = int(np.ceil(TRUNCATE * optics.scale_px)) + 2
+    near = [near_pixels(optics, caliper) for caliper in calipers]
+    whole, *each = (_window(pixels, optics.shape, margin) for pixels in (np.concatenate(near), *near))
+    if _area(whole) <= sum(map(_area, each)):
+        return [Thinning.of(whole, optics.scale_px, _BESIDE * threshold)] * len(calipers)
+    return [Thinning.of(window, optics.scale_px, _BESIDE * threshold) for window in each]
 
 
-def _peak(gx, gy, which, y, x):
-    """Shift of the gradient's maximum along itself, px, its derivatives by the three magnitudes, and the gradient."""
-    gx0, gy0 = gx[which, y, x].astype(float), gy[which, y, x].astype(float)
-    m0 = np.hypot(gx0, gy0)
-    magnitude = np.hypot(gx, gy)
-    low = _bilinear(magnitude, which, x - gx0 / m0, y - gy0 / m0)
-    high = _bilinear(magnitude, which, x + gx0 / m0, y + gy0 / m0)
-    bend = np.minimum(low - 2 * m0 + high, -1e-9 * np.maximum(m0, 1e-30))  # flat: no peak, and no overflow
-    shift = (low - high) / (2 * bend)
-    return shift, (0.5 - shift) / bend, 2 * shift / bend, (-0.5 - shift) / bend, gx0, gy0, m0
+def near_pixels(optics: Optics, caliper: Caliper) -> np.ndarray:
+    """Flat indices of the pixels within the search window of an edge, away from its corners."""
+    ends = optics.recorded(caliper.at(caliper.positions[[0, -1]], np.zeros(2)))
+    margin = optics.window_px + 1 + optics.sagitta
+    low = np.maximum(np.floor(ends.min(0) - margin), 0).astype(int)
+    high = np.minimum(np.ceil(ends.max(0) + margin) + 1, optics.shape[::-1]).astype(int)
+    y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
+    along, offset = caliper.coordinates(optics.ideal(np.stack([x, y], -1).astype(float)))
+    within = (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
+    near = within & (np.abs(offset) <= optics.window_px)
+    return y[near] * optics.shape[1] + x[near]
 
 
-def _corners_of(x, y):
-    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = x - x0, y - y0
-    return [
-        (y0, x0, (1 - fy) * (1 - fx)),
-        (y0, x0 + 1, (1 - fy) * fx),
-        (y0 + 1, x0, fy * (1 - fx)),
-        (y0 + 1, x0 + 1, fy * fx),
-    ]
+def _window(pixels: np.ndarray, shape: tuple[int, int], margin: int) -> tuple[slice, slice]:
+    """Rows and columns that hold pixels (flat indices) and ``margin`` more on each side."""
+    return tuple(
+        slice(max(int(place.min()) - margin, 0), min(int(place.max()) + margin + 1, size))
+        for place, size in zip(np.divmod(pixels, shape[1]), shape, strict=True)
+    )
 
 
-def _bilinear(stack, which, x, y):
-    height, width = stack.shape[1:]
-    return sum(w * stack[which, np.minimum(j, height - 1), np.minimum(i, width - 1)] for j, i, w in _corners_of(x, y))
-
-
-def _bilinear_matrix(x, y, shape):
-    rows = np.arange(x.size)
-    parts = [(w, (rows, j * shape[1] + i)) for j, i, w in _corners_of(x, y)]
-    data = np.concatenate([w for w, _ in parts])
-    index = tuple(np.concatenate([p[1][k] for p in parts]) for k in (0, 1))
-    return sparse.csr_array((data, index), (x.size, shape[0] * shape[1]))
+def _area(window: tuple[slice, slice]) -> int:
+    return (window[0].stop - window[0].start) * (window[1].stop - window[1].start)

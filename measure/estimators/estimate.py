@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from measure.features.calipers import Caliper
+from measure.features.optics import Optics
 
 
 class Estimate(NamedTuple):
@@ -33,21 +33,6 @@ class Estimate(NamedTuple):
     state: np.ndarray
 
 
-@dataclass(frozen=True)
-class Response:
-    """First-order errors on one image: derivative of (level, slope) of each edge by the pixels.
-
-    Attributes
-    ----------
-    estimate : Estimate
-        Of that image, n = 1.
-    lines : ndarray, shape (2 E, height * width)
-    """
-
-    estimate: Estimate
-    lines: np.ndarray
-
-
 class Estimator(Protocol):
     """An estimator prepared for one layout."""
 
@@ -58,32 +43,24 @@ class Estimator(Protocol):
     def estimate(self, images: np.ndarray) -> Estimate:
         """Lines in a stack of images, shape (n, height, width)."""
 
-    def covariance(self, estimate: Estimate) -> np.ndarray:
-        """Covariance of (level, slope) of all edges for unit noise variance, shape (n, 2 E, 2 E)."""
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
+        """Covariance of (level, slope) of all edges found in the images, shape (n, 2 E, 2 E)."""
 
-    def respond(self, clean: np.ndarray) -> Response:
-        """Derivative of the lines by the pixels at a noise-free image."""
+    def respond(self, clean: np.ndarray) -> np.ndarray:
+        """Derivative of (level, slope) of each edge by the pixels at a noise-free image, (2 E, height * width)."""
 
 
-def scaled(unit: np.ndarray, contrast: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Covariance of (level, slope) for unit noise from that of (offset times contrast at the middle, slope of it).
+def noisy(rows: np.ndarray, optics: Optics, images: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Covariance of linear functions ``rows`` (k, P) of some pixels of images, (k, k) or (n, k, k).
 
-    A linear estimator yields p0 + p1 t = C(t) (a + b t) to first order, t the distance from the middle of the edge;
-    errors of a and b follow from those of p by dividing by the contrast, those of the level by moving to the start.
-
-    Parameters
-    ----------
-    unit : ndarray, shape (2 E, 2 E)
-        Covariance of (p0, p1) of all edges for unit noise variance.
-    contrast : ndarray, shape (n, E)
-        Contrast at the middle of each edge.
-    middle : ndarray, shape (E,)
-        Place of the middle along the edge, px.
+    Where the noise depends on the light each pixel's variance is taken at the level that it shows: what its own noise
+    does to that averages out over the pixels.
     """
-    edges = middle.size
-    to_start = np.zeros((2 * edges, 2 * edges))
-    for e in range(edges):
-        to_start[2 * e : 2 * e + 2, 2 * e : 2 * e + 2] = [[1, -middle[e]], [0, 1]]
-    moved = to_start @ unit @ to_start.T
-    inverse = 1 / np.repeat(np.where(contrast == 0, np.nan, contrast), 2, axis=1)
-    return moved * inverse[:, :, None] * inverse[:, None, :]
+    used = images.reshape(len(images), -1)[:, pixels] if optics.noise is not None else np.zeros((1, 1))
+    variance = optics.noise_at(used)
+    if variance is None:
+        return optics.noise_variance * (rows @ rows.T)
+    k, (first, second) = len(rows), np.triu_indices(len(rows))
+    whole = np.empty((len(images), k, k))
+    whole[:, first, second] = whole[:, second, first] = variance @ (rows[first] * rows[second]).T
+    return whole

@@ -12,9 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from measure.features.calipers import Caliper
-from measure.features.lines import regression, trapezoid
+from measure.features.lines import trapezoid, trend_along
 from measure.features.optics import Optics
-from measure.features.points import EdgePoints
+from measure.features.points import EdgePoints, UnitNoise
 from planner.features.locator import edge_blur
 
 STEP = 0.5  # px between the places across the edge
@@ -35,34 +35,42 @@ class GradientLocator:
         Flat indices of the pixels that matter.
     kernel : csr_array, shape (m * T, len(pixels))
         Second derivative across the edge at each position and place.
-    slope_to_contrast : float
+    slope_to_contrast : ndarray, shape (m,)
         Contrast of a straight blurred edge whose second derivative has slope 1 at the crossing.
+    gain : ndarray, shape (m,)
+        Ideal px across the edge for a recorded px.
     """
 
     positions: np.ndarray
     offsets: np.ndarray
     pixels: np.ndarray
     kernel: sparse.csr_array
-    slope_to_contrast: float
+    slope_to_contrast: np.ndarray
+    gain: np.ndarray
 
     @classmethod
     def of(cls, optics: Optics, caliper: Caliper) -> GradientLocator:
         """Prepare the locator of a straight edge."""
-        places = caliper.at(caliper.positions, np.zeros(1))
-        return cls.along_curve(optics, caliper.positions, places, np.broadcast_to(caliper.normal, places.shape))
+        places, normals, gain = caliper.curve()
+        return cls.along_curve(optics, caliper.positions, places, normals, gain, caliper.blur(caliper.positions))
 
     @classmethod
     def along_curve(
-        cls, optics: Optics, positions: np.ndarray, places: np.ndarray, normals: np.ndarray
-    ) -> GradientLocator:
-        """Prepare the locator of a curve given by places (m, 2) on it and unit normals (m, 2) there."""
+        cls, optics: Optics, positions: np.ndarray, places: np.ndarray, normals: np.ndarray,
+        gain: np.ndarray | float = 1.0, blur: np.ndarray | float | None = None,
+    ) -> GradientLocator:  # fmt: skip
+        """Prepare the locator of a recorded curve given by places (m, 2) on it and unit normals (m, 2) there.
+
+        ``gain`` (m,) and ``blur`` (m,) are 1 and the optics' where not given.
+        """
         half = int(np.ceil(optics.window_px / STEP))
         offsets = STEP * np.arange(-half, half + 1)
         across = (places[:, None] + offsets[:, None] * normals[:, None]).reshape(-1, 2)
         kernel = second_derivative(across, np.repeat(normals, offsets.size, 0), optics.scale_px, optics.shape)
         pixels = np.unique(kernel.indices)
-        total = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
-        return cls(positions, offsets, pixels, kernel[:, pixels], float(np.sqrt(2 * np.pi) * total**3))
+        total = np.hypot(optics.scale_px, edge_blur(optics.blur_px if blur is None else blur)) * np.ones(len(places))
+        to_contrast = np.sqrt(2 * np.pi) * total**3
+        return cls(positions, offsets, pixels, kernel[:, pixels], to_contrast, gain * np.ones(len(places)))
 
     def locate(self, images: np.ndarray) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width)."""
@@ -74,21 +82,15 @@ class GradientLocator:
         valid = found & (np.abs(offset - start) < 1)
         offset = np.where(valid, self.offsets[0] + STEP * offset, 0.0)
         slope = np.where(valid, -slope / STEP, 0.0)
-        contrast = self.slope_to_contrast * slope.sum(0) / np.maximum(valid.sum(0), 1)
         along = np.broadcast_to(self.positions, (len(images), self.positions.size))
-        return EdgePoints(along, offset.T, valid.T, contrast, turned)
+        contrast, trend, _ = trend_along(along, self.slope_to_contrast * slope.T, 1.0 * valid.T)
+        return EdgePoints(along, offset.T * self.gain, valid.T, contrast, turned, trend, trapezoid(self.positions))
 
-    def unit_covariance(self) -> np.ndarray:
-        """Covariance of (mean offset, slope) for unit noise and unit contrast, (2, 2).
-
-        The offsets are the second derivative's noise at the crossing over its slope; neighbours share pixels.
-        """
-        response = regression(self.positions, trapezoid(self.positions)) @ self.unit_noise()
-        return response @ response.T
-
-    def unit_noise(self) -> sparse.csr_array:
-        """Derivative of the offsets by the pixels on an edge of unit contrast, shape (m, len(pixels))."""
-        return self.slope_to_contrast * self.kernel[self.offsets.size // 2 :: self.offsets.size]
+    def unit_noise(self) -> UnitNoise:
+        """Response to noise on a straight edge of unit contrast: the second derivative's over its slope."""
+        middle = self.kernel[self.offsets.size // 2 :: self.offsets.size]
+        response = sparse.diags_array(self.slope_to_contrast * self.gain) @ middle
+        return UnitNoise(self.positions, trapezoid(self.positions), response)
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
@@ -100,7 +102,7 @@ class GradientLocator:
         weights = _cubic_weights(root - crossing)
         rows = np.arange(crossing.shape[0])[:, None]
         columns = rows * self.offsets.size + crossing[:, :1] + np.arange(-1, 3)
-        values = -STEP * weights[:, 0] / slope[:, :1] * polarity[0]
+        values = -STEP * weights[:, 0] / slope[:, :1] * polarity[0] * self.gain[:, None]
         pick = sparse.csr_array(
             (values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0])
         )

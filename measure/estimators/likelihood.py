@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure import status
-from measure.estimators.estimate import Estimate, Response, scaled
+from measure.estimators.estimate import Estimate, noisy
 from measure.features.calipers import Caliper
+from measure.features.optics import Optics
 
 MIN_CONTRAST_SIGMAS = 4.0  # contrast over its own standard error below which there is no edge to be seen
 
@@ -55,19 +56,18 @@ class LikelihoodEstimator:
         Linear functions of the image: for each edge (p0, p1), then for each edge its contrast at both ends.
     unit : ndarray, shape (4 E, 4 E)
         Their covariance for unit noise variance.
-    noise : float
-        Standard deviation of a grey level.
+    optics : Optics
     """
 
     calipers: tuple[Caliper, ...]
     pixels: np.ndarray
     rows: np.ndarray
     unit: np.ndarray
-    noise: float
+    optics: Optics
 
     @classmethod
     def of(
-        cls, calipers: tuple[Caliper, ...], pixels: np.ndarray, columns: Columns, noise: float
+        cls, calipers: tuple[Caliper, ...], pixels: np.ndarray, columns: Columns, optics: Optics
     ) -> LikelihoodEstimator:
         """Solve the normal equations once, by an orthogonal decomposition of the scaled columns."""
         design = np.concatenate([columns.offsets, columns.levels, columns.blurs], 1)
@@ -79,7 +79,23 @@ class LikelihoodEstimator:
         first = columns.offsets.shape[1]
         levels = inverse[first : first + columns.levels.shape[1]]
         rows = np.concatenate([inverse[:first], columns.start @ levels, columns.stop @ levels])
-        return cls(calipers, pixels, rows, rows @ rows.T, noise)
+        return cls(calipers, pixels, rows, rows @ rows.T, optics)
+
+    @classmethod
+    def joined(cls, calipers: tuple[Caliper, ...], parts: list[LikelihoodEstimator | None]) -> LikelihoodEstimator:
+        """Estimators of one edge each as one: they share pixels near the corners, and so their errors are correlated.
+
+        Rows of an edge without an estimator are 0, which shows no contrast.
+        """
+        known = [part for part in parts if part]
+        pixels = np.unique(np.concatenate([np.empty(0, int), *(part.pixels for part in known)]))
+        edges, rows = len(parts), np.zeros((4 * len(parts), len(pixels)))
+        for e, part in enumerate(parts):
+            if part:
+                rows[np.ix_([2 * e, 2 * e + 1, 2 * edges + e, 3 * edges + e], np.searchsorted(pixels, part.pixels))] = (
+                    part.rows
+                )
+        return cls(calipers, pixels, rows, rows @ rows.T, calipers[0].optics)
 
     @property
     def middles(self) -> np.ndarray:
@@ -94,41 +110,43 @@ class LikelihoodEstimator:
         edges, n = len(self.calipers), len(found)
         p = found[:, : 2 * edges].reshape(n, edges, 2)
         start, stop = found[:, 2 * edges : 3 * edges], found[:, 3 * edges :]
-        offset, tilt = self._solve(p, start, stop)
-        error = self.noise * np.sqrt(np.diag(self.unit)[2 * edges : 3 * edges] + np.diag(self.unit)[3 * edges :]) / 2
+        contrast = np.stack([start, (stop - start) / np.array([caliper.length for caliper in self.calipers])], -1)
+        level, slope = np.moveaxis((self._to_lines(contrast) @ p[..., None])[..., 0], -1, 0)
+        size = np.sqrt(np.diag(self.unit)[2 * edges : 3 * edges] + np.diag(self.unit)[3 * edges :]) / 2
+        error = np.sqrt(self.optics.noise_variance) * size
         seen = np.minimum(np.abs(start), np.abs(stop)) > MIN_CONTRAST_SIGMAS * error
         steady = start * stop > 0
-        contrast = np.stack([start, (stop - start) / np.array([caliper.length for caliper in self.calipers])], -1)
         count = np.full((n, edges), len(self.pixels))
         state = np.where(seen, np.where(steady, status.OK, status.SIGN_CHANGE), status.LOW_CONTRAST)
-        return Estimate(offset - self.middles * tilt, tilt, contrast, count, np.zeros_like(count), state)
+        return Estimate(level, slope, contrast, count, np.zeros_like(count), state)
 
-    def _solve(self, p: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Offset at the middle and tilt from p0 + p1 t = C(t) (a + b t), least squares along the edge, (n, E)."""
+    def _to_lines(self, contrast: np.ndarray) -> np.ndarray:
+        """From (p0, p1) to (level, slope) of each edge, shape (n, E, 2, 2), at contrasts (n, E, 2).
+
+        p0 + p1 t = C(t) (a + b t), t the distance from the edge's middle and C linear in it, by least squares along the
+        edge; a is the offset at the middle, b the slope.
+        """
         length = np.array([caliper.length for caliper in self.calipers])
-        c0, c1 = (start + stop) / 2, (stop - start) / length
-        lever = length**2 / 12
-        determinant = c0**2 - c1**2 * lever
+        c1, lever = contrast[..., 1], length**2 / 12
+        c0 = contrast[..., 0] + c1 * self.middles
         with np.errstate(divide="ignore", invalid="ignore"):
-            offset = (c0 * p[..., 0] - c1 * lever * p[..., 1]) / determinant
-            tilt = (c0 * p[..., 1] - c1 * p[..., 0]) / determinant
-        return offset, tilt
+            slope = np.stack([-c1, c0], -1) / (c0**2 - c1**2 * lever)[..., None]
+            offset = np.stack([c0, -c1 * lever], -1) / (c0**2 - c1**2 * lever)[..., None]
+        return np.stack([offset - self.middles[:, None] * slope, slope], -2)
 
-    def covariance(self, estimate: Estimate) -> np.ndarray:
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
         edges = len(self.calipers)
-        contrast = estimate.contrast[..., 0] + estimate.contrast[..., 1] * self.middles
-        return scaled(self.unit[: 2 * edges, : 2 * edges], contrast, self.middles)
+        found = noisy(self.rows[: 2 * edges], self.optics, images, self.pixels)
+        found = found.reshape(*found.shape[:-2], edges, 2, edges, 2)
+        to_lines = self._to_lines(estimate.contrast)
+        each = "eifj" if found.ndim == 4 else "neifj"
+        whole = np.einsum(f"neai,{each},nfbj->neafb", to_lines, found, to_lines, optimize=True)
+        return whole.reshape(len(to_lines), 2 * edges, 2 * edges)
 
-    def respond(self, clean: np.ndarray) -> Response:
+    def respond(self, clean: np.ndarray) -> np.ndarray:
         """The rows themselves, divided by the clean image's contrast; the offsets found there are second order."""
-        estimate = self.estimate(clean[None])
         edges = len(self.calipers)
+        to_lines = self._to_lines(self.estimate(clean[None]).contrast)[0]
         lines = np.zeros((2 * edges, clean.size))
-        for e in range(edges):
-            c0 = estimate.contrast[0, e, 0] + estimate.contrast[0, e, 1] * self.middles[e]
-            c1, lever = estimate.contrast[0, e, 1], self.calipers[e].length ** 2 / 12
-            p0, p1 = self.rows[2 * e], self.rows[2 * e + 1]
-            determinant = c0**2 - c1**2 * lever
-            offset, tilt = (c0 * p0 - c1 * lever * p1) / determinant, (c0 * p1 - c1 * p0) / determinant
-            lines[2 * e, self.pixels], lines[2 * e + 1, self.pixels] = offset - self.middles[e] * tilt, tilt
-        return Response(estimate, lines)
+        lines[:, self.pixels] = (to_lines @ self.rows[: 2 * edges].reshape(edges, 2, -1)).reshape(2 * edges, -1)
+        return lines

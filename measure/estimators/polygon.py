@@ -8,7 +8,7 @@ import numpy as np
 
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, wedge, wedge_slope
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
-from measure.estimators.strip import NEARER, SLIVER
+from measure.estimators.strip import LEAST_BLUR, NEARER, SLIVER
 from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import BACKGROUND, Layout
 from scenes import InvalidInput
@@ -35,20 +35,16 @@ def polygon_estimator(layout: Layout, calipers: tuple[Caliper, ...], clear: floa
     if ring is None:
         return None
     inner, sign = ring
-    y, x, nearest = _pixels(layout, inner, clear)
-    points = np.stack([x, y], 1).astype(float)
-    sigma = max(layout.optics.blur_px, 0.3)
-    covered, slopes, levers = _coverage(layout, calipers, sign, points, nearest, sigma)
-    wider, *_ = _coverage(layout, calipers, sign, points, nearest, 1.02 * sigma)
+    y, x, points, nearest = _pixels(layout, inner, clear)
+    covered, slopes, levers = _coverage(layout, calipers, sign, points, nearest)
+    wider, *_ = _coverage(layout, calipers, sign, points, nearest, 1.02)
     outer = np.where(sign > 0, layout.sides[:, 1], layout.sides[:, 0])
     levels, start, stop = _levels(layout, inner, points, covered, outer, nearest)
     edges = len(calipers)
     offsets = np.stack([slopes, levers], -1).transpose(1, 2, 0).reshape(2 * edges, -1).T
-    blurs = ((wider - covered) / (0.02 * sigma))[:, None] * np.ones((1, 1))
+    blurs = ((wider - covered) / 0.02)[:, None]
     columns = Columns(levels, start, stop, offsets, blurs)
-    return LikelihoodEstimator.of(
-        calipers, y * layout.optics.shape[1] + x, columns, np.sqrt(layout.optics.noise_variance)
-    )
+    return LikelihoodEstimator.of(calipers, y * layout.optics.shape[1] + x, columns, layout.optics)
 
 
 def edge_derivatives(layout: Layout, calipers: tuple[Caliper, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -62,9 +58,8 @@ def edge_derivatives(layout: Layout, calipers: tuple[Caliper, ...]) -> tuple[np.
     ring = inner_face(layout)
     if ring is None:
         raise InvalidInput("edges must be a closed convex ring around one face, got another arrangement")
-    y, x, nearest = _pixels(replace(layout, others=np.empty((0, 2, 2))), ring[0], 0.0)
-    points = np.stack([x, y], 1).astype(float)
-    return _coverage(layout, calipers, ring[1], points, nearest, max(layout.optics.blur_px, 0.3))[1:]
+    _, _, points, nearest = _pixels(replace(layout, others=np.empty((0, 2, 2))), ring[0], 0.0)
+    return _coverage(layout, calipers, ring[1], points, nearest)[1:]
 
 
 def inner_face(layout: Layout) -> tuple[int, np.ndarray] | None:
@@ -86,13 +81,14 @@ def inner_face(layout: Layout) -> tuple[int, np.ndarray] | None:
     return (inner, sign) if (sign * away.sum(-1) > -1.0).all() else None
 
 
-def _pixels(layout: Layout, inner: int, clear: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns of the pixels to use, and which edge each is nearest to."""
+def _pixels(layout: Layout, inner: int, clear: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns of the pixels to use, their ideal coordinates, and which edge each is nearest to."""
     height, width = layout.optics.shape
-    low = np.maximum(np.floor(layout.ends.min((0, 1)) - REACH), 0).astype(int)
-    high = np.minimum(np.ceil(layout.ends.max((0, 1)) + REACH + 1), [width, height]).astype(int)
+    ends = layout.optics.recorded(layout.ends)
+    low = np.maximum(np.floor(ends.min((0, 1)) - REACH), 0).astype(int)
+    high = np.minimum(np.ceil(ends.max((0, 1)) + REACH + 1), [width, height]).astype(int)
     y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
-    points = np.stack([x, y], 1).astype(float)
+    points = layout.optics.ideal(np.stack([x, y], 1).astype(float))
     distances = np.stack([distance_to_segment(points, *ends) for ends in layout.ends], 1)
     nearest = distances.argmin(1)
     labels = layout.labels()[y, x]
@@ -102,27 +98,44 @@ def _pixels(layout: Layout, inner: int, clear: float) -> tuple[np.ndarray, np.nd
         away = distance_to_segment(points[keep], *segment)
         touching = np.linalg.norm(segment[:, None] - layout.ends.reshape(-1, 2), axis=-1).min() < 1
         keep[keep] = (away > clear) | ((not touching) & (away > NEARER * distances.min(1)[keep]))
-    return y[keep], x[keep], nearest[keep]
+    return y[keep], x[keep], points[keep], nearest[keep]
 
 
-def _coverage(layout, calipers, sign, points, nearest, sigma):
-    """Part of each pixel within the face (P,), its derivative by each edge's offset (P, E), and by its tilt (P, E)."""
+def _coverage(layout, calipers, sign, points, nearest, wider=1.0):
+    """Part of each pixel within the face (P,), its derivative by each edge's offset (P, E), and by its tilt (P, E).
+
+    ``wider`` multiplies the blur.
+    """
     partner = _partners(layout, points, nearest)
     covered = np.zeros(len(points))
     slopes, levers = np.zeros((len(points), len(calipers))), np.zeros((len(points), len(calipers)))
     for i in range(len(calipers)):
         for j in np.unique(partner[nearest == i]):
             here = (nearest == i) & (partner == j)
-            rho = float(sign[i] * sign[j] * calipers[i].normal @ calipers[j].normal)
-            places = points[here][:, None] + NODES
-            (s_i, t_i), (s_j, t_j) = (calipers[k].coordinates(places) for k in (i, j))
-            h, k = sign[i] * t_i / sigma, sign[j] * t_j / sigma
+            (h, s_i, size_i, way_i), (k, s_j, size_j, way_j) = (
+                _inside(layout, calipers[e], sign[e], points[here], wider) for e in (i, j)
+            )
+            rho = float((way_i * way_j).sum(-1).mean())
             covered[here] = (wedge(h, k, rho) * NODE_WEIGHTS).sum(1)
-            for e, s, slope in ((i, s_i, wedge_slope(h, k, rho)), (j, s_j, wedge_slope(k, h, rho))):
-                part = -sign[e] / sigma * slope * NODE_WEIGHTS
+            for e, s, size, slope in (
+                (i, s_i, size_i, wedge_slope(h, k, rho)),
+                (j, s_j, size_j, wedge_slope(k, h, rho)),
+            ):
+                part = -sign[e] / size * slope * NODE_WEIGHTS
                 slopes[here, e] = part.sum(1)
                 levers[here, e] = (part * (s - calipers[e].length / 2)).sum(1)
     return covered, slopes, levers
+
+
+def _inside(layout: Layout, caliper: Caliper, sign: float, points: np.ndarray, wider: float):
+    """How far the nodes of pixels lie inside an edge in standard deviations of its blur, places along it, both (P, n),
+    that deviation in ideal px (P, 1), and the unit direction inwards as recorded (P, 2)."""
+    along, across = caliper.coordinates(points)
+    inwards, onwards = (layout.optics.gradient(points, axis) for axis in (caliper.normal, caliper.direction))
+    gain = np.linalg.norm(inwards, axis=-1)
+    size = (wider * np.maximum(caliper.blur(along), LEAST_BLUR) * gain)[:, None]
+    nodes = across[:, None] + inwards @ NODES.T
+    return sign * nodes / size, along[:, None] + onwards @ NODES.T, size, sign * inwards / gain[:, None]
 
 
 def _partners(layout: Layout, points: np.ndarray, nearest: np.ndarray) -> np.ndarray:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from scipy import sparse
 
 from measure import status
-from measure.estimators.canny import CannyLocator
-from measure.estimators.estimate import Estimate, Estimator, Response, scaled
+from measure.estimators.canny import CannyLocator, thinnings
+from measure.estimators.estimate import Estimate, Estimator, noisy
 from measure.estimators.gradient import GradientLocator
 from measure.estimators.likelihood import LikelihoodEstimator
 from measure.estimators.polygon import polygon_estimator
+from measure.estimators.profile import TRUNCATE
 from measure.estimators.strip import strip_estimator
+from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
-from measure.features.layout import Layout
-from measure.features.lines import fit_lines, regression, trapezoid
+from measure.features.layout import Layout, Optics
+from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
 from scenes import InvalidInput
 
@@ -24,6 +28,7 @@ ESTIMATORS = ("canny", "gradient", "strip", "polygon")
 CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
+_DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
@@ -61,15 +66,22 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
             f if p or not _measurable(f) else replace(f, status=status.SHORT)
             for f, p in zip(calipers, parts, strict=True)
         )
-        return SeparateEstimator(calipers, tuple(parts))
-    calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + 4 * optics.scale_px + 1)
+        return LikelihoodEstimator.joined(calipers, parts)
+    kernel = (TRUNCATE if name == "canny" else 4) * optics.scale_px
+    calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1)
     if name == "gradient":
         calipers = tuple(_thinned(caliper, optics.scale_px) for caliper in calipers)
-    make = GradientLocator.of if name == "gradient" else lambda o, f: CannyLocator.of(o, f, threshold)
-    parts = tuple(
-        PointEstimator(f, make(optics, f), optics.noise_variance) if _measurable(f) else None for f in calipers
-    )
-    return SeparateEstimator(calipers, parts)
+        return SeparateEstimator(calipers, _by_points(optics, calipers, partial(GradientLocator.of, optics)))
+    looks = iter(thinnings(optics, [caliper for caliper in calipers if _measurable(caliper)], threshold))
+    parts = _by_points(optics, calipers, lambda caliper: CannyLocator.of(optics, caliper, threshold, next(looks)))
+    different = {part.locator.thinning for part in parts if part}
+    return SeparateEstimator(calipers, parts, different.pop() if len(different) == 1 else None)
+
+
+def _by_points(
+    optics: Optics, calipers: tuple[Caliper, ...], locator: Callable[[Caliper], GradientLocator | CannyLocator]
+) -> tuple[PointEstimator | None, ...]:
+    return tuple(PointEstimator(f, locator(f)) if _measurable(f) else None for f in calipers)
 
 
 def _thinned(caliper: Caliper, scale: float) -> Caliper:
@@ -94,52 +106,72 @@ class PointEstimator:
 
     caliper: Caliper
     locator: GradientLocator | CannyLocator
-    noise_variance: float
 
     @property
-    def weights(self) -> np.ndarray | float:
-        """Of the edge points: few evenly spaced ones stand for the whole edge; Canny's pixels are what they are."""
-        return trapezoid(self.caliper.positions) if isinstance(self.locator, GradientLocator) else 1.0
-
-    @property
-    def edge_calipers(self) -> tuple[Caliper, ...]:
+    def calipers(self) -> tuple[Caliper, ...]:
         return (self.caliper,)
 
     @property
     def pixels(self) -> np.ndarray:
         return self.locator.pixels
 
-    def estimate(self, images: np.ndarray) -> Estimate:
+    def estimate(self, images: np.ndarray | Thinned, noise_variance: np.ndarray | float) -> Estimate:
+        """As `Estimator.estimate`; ``noise_variance`` (n,) is the mean along the edge, grey levels^2."""
         points = self.locator.locate(images)
-        lines = fit_lines(points, self.weights)
+        lines = fit_lines(points, points.weights)
         slope = np.tan(lines.tilt)
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
-        clear = points.contrast > MIN_CONTRAST * np.sqrt(self.noise_variance)
-        edge = enough & clear & (lines.scatter < _MAX_SCATTER)
+        clear = points.contrast > MIN_CONTRAST * np.sqrt(noise_variance)
+        edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
         state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
         columns = (
             lines.mean_offset - slope * lines.mean_along,
             slope,
-            np.stack([points.contrast, np.zeros_like(points.contrast)], -1),
+            np.stack([points.contrast - points.trend * lines.mean_along, points.trend], -1),
             lines.count,
             np.maximum(self.caliper.positions.size - lines.count, 0),
             state,
         )
         return Estimate(*(column[:, None] for column in columns))
 
-    def covariance(self, estimate: Estimate) -> np.ndarray:
-        return scaled(self.locator.unit_covariance(), estimate.contrast[..., 0], self.caliper.positions.mean()[None])
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
+        """That of a straight edge whose points' errors go with 1 / contrast, a parabola through three places."""
+        contrast = estimate.contrast[..., :1] + estimate.contrast[..., 1:] * self._places
+        middle = contrast[:, 0, 1:2]
+        inverse = 1 / np.where(middle > 0, np.maximum(contrast[:, 0], _DIMMEST * middle), np.nan)
+        moments = noisy(self._responses, self.caliper.optics, images, self.pixels)
+        shape = (len(inverse) if moments.ndim == 3 else 1, 2, 3, 2, 3)
+        moments = np.broadcast_to(moments.reshape(shape), (len(inverse), *shape[1:]))
+        return np.einsum("nj,nk,najbk->nab", inverse, inverse, moments)
 
-    def respond(self, clean: np.ndarray) -> Response:
+    @property
+    def _places(self) -> np.ndarray:
+        """Start, middle and end of the part of the edge that is measured, px."""
+        return np.linspace(*self.caliper.positions[[0, -1]], 3)
+
+    @cached_property
+    def _responses(self) -> np.ndarray:
+        """Derivative of (level, slope) by `pixels` where 1 / contrast is 1 at one of `_places`, 0 at others, (6, P)."""
+        noise = self.locator.unit_noise()
+        lines = _level_and_slope(noise.along, noise.weights)
+        shapes = np.linalg.inv(np.vander(self._places, 3)).T @ np.vander(noise.along, 3).T
+        return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
+
+    def respond(self, clean: np.ndarray) -> np.ndarray:
         points, response = self.locator.linear_response(clean)
         count = response.shape[0]
         keep = points.valid[0, :count]
         if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
-            return Response(self.estimate(clean[None]), np.full((2, clean.size), np.nan))
-        along, weights = points.along[0, :count][keep], np.broadcast_to(self.weights, keep.shape)[keep]
-        mean, slope = (sparse.csr_array(response)[np.flatnonzero(keep)].T @ regression(along, weights).T).T
-        middle = weights @ along / weights.sum()
-        return Response(self.estimate(clean[None]), np.stack([mean - middle * slope, slope]))
+            return np.full((2, clean.size), np.nan)
+        weights = np.broadcast_to(points.weights, points.along.shape)[0, :count][keep]
+        lines = _level_and_slope(points.along[0, :count][keep], weights)
+        return lines @ sparse.csr_array(response)[np.flatnonzero(keep)]
+
+
+def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Linear map from offsets at places (m,) to (offset at the start of the edge, slope), (2, m)."""
+    mean, slope = regression(along, weights)
+    return np.stack([mean - (weights @ along) / weights.sum() * slope, slope])
 
 
 @dataclass(frozen=True)
@@ -148,6 +180,8 @@ class SeparateEstimator:
 
     calipers: tuple[Caliper, ...]
     parts: tuple[PointEstimator | LikelihoodEstimator | None, ...]
+    thinning: Thinning | None = None
+    """Canny's choice of pixels where it is made once for all parts."""
 
     @property
     def pixels(self) -> np.ndarray:
@@ -158,18 +192,28 @@ class SeparateEstimator:
         nothing = np.full((n, 1), np.nan)
         none = np.zeros((n, 1), int)
         missing = Estimate(nothing, nothing, np.zeros((n, 1, 2)), none, none, np.full((n, 1), status.LOW_CONTRAST))
-        parts = [part.estimate(images) if part else missing for part in self.parts]
+        seen = self.thinning(images) if self.thinning else images
+        parts = [missing if part is None else self._estimate(part, seen, images) for part in self.parts]
         return Estimate(*(np.concatenate(column, 1) for column in zip(*parts, strict=True)))
 
-    def covariance(self, estimate: Estimate) -> np.ndarray:
+    def _estimate(self, part, seen: np.ndarray | Thinned, images: np.ndarray) -> Estimate:
+        if not isinstance(part, PointEstimator):
+            return part.estimate(images)
+        optics = part.caliper.optics
+        variance = optics.noise_variance
+        if optics.noise is not None and optics.noise.gain > 0:
+            variance = optics.noise_at(images.reshape(len(images), -1)[:, part.pixels]).mean(1)
+        return part.estimate(seen, variance)
+
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
         edges = len(self.parts)
         whole = np.zeros((len(estimate.level), 2 * edges, 2 * edges))
         for e, part in enumerate(self.parts):
             if part:
                 here = slice(2 * e, 2 * e + 2)
-                whole[:, here, here] = part.covariance(Estimate(*(column[:, e : e + 1] for column in estimate)))
+                own = Estimate(*(column[:, e : e + 1] for column in estimate))
+                whole[:, here, here] = part.covariance(own, images)
         return whole
 
-    def respond(self, clean: np.ndarray) -> Response:
-        responses = [part.respond(clean).lines if part else np.zeros((2, clean.size)) for part in self.parts]
-        return Response(self.estimate(clean[None]), np.concatenate(responses))
+    def respond(self, clean: np.ndarray) -> np.ndarray:
+        return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])

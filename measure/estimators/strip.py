@@ -11,6 +11,7 @@ from measure.features.layout import Layout
 
 NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
 SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the blur
+LEAST_BLUR = 0.3  # px: a sharper edge is not resolved by the pixels
 HALF_WIDTH = 16.0  # px to each side; wider hardly helps, since the levels are then known well enough
 
 
@@ -30,15 +31,17 @@ def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) 
         How far every other edge must be from a pixel that is used, px.
     """
     layout = layout.without_slivers(SLIVER)
-    pixels, along, across = _strip(layout, caliper, index, clear)
+    pixels, ideal, along, across = _strip(layout, caliper, index, clear)
     if len(pixels) < 40:
         return None
     middle = caliper.length / 2
-    sigma = max(layout.optics.blur_px, 0.3)
-    nodes = across[:, None] + NODES @ caliper.normal
+    slopes = [layout.optics.gradient(ideal, axis) for axis in (caliper.normal, caliper.direction)]
+    sigma = np.maximum(caliper.blur(along), LEAST_BLUR) * np.linalg.norm(slopes[0], axis=-1)
+    sigma = sigma[:, None]
+    nodes = across[:, None] + slopes[0] @ NODES.T
     inside = (half_plane(nodes / sigma) * NODE_WEIGHTS).sum(1)
-    thin = density(nodes / sigma) * NODE_WEIGHTS
-    lever = along[:, None] + NODES @ caliper.direction - middle
+    thin = density(nodes / sigma) * NODE_WEIGHTS / sigma
+    lever = along[:, None] + slopes[1] @ NODES.T - middle
     basis = np.stack([np.ones_like(along), (along - middle) / caliper.length, across / HALF_WIDTH], 1)
     places = caliper.at(along, across)
     plus, minus = (layout.shade(face, places)[:, None] for face in layout.sides[index])
@@ -50,20 +53,20 @@ def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) 
         levels=np.concatenate([basis * plus * inside[:, None], basis * minus * (1 - inside)[:, None]], 1),
         start=contrast[:1],
         stop=contrast[1:],
-        offsets=-np.stack([thin.sum(1), (thin * lever).sum(1)], 1) / sigma,
-        blurs=-(thin * nodes).sum(1)[:, None] / sigma**2,
+        offsets=-np.stack([thin.sum(1), (thin * lever).sum(1)], 1),
+        blurs=-(thin * nodes / sigma).sum(1)[:, None],
     )
-    return LikelihoodEstimator.of((caliper,), pixels, columns, np.sqrt(layout.optics.noise_variance))
+    return LikelihoodEstimator.of((caliper,), pixels, columns, layout.optics)
 
 
-def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels of the strip (flat indices) and their coordinates (along, across) in the caliper."""
+def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[np.ndarray, ...]:
+    """Pixels of the strip (flat indices), their ideal coordinates, and those in the caliper (along, across)."""
     height, width = layout.optics.shape
-    used = caliper.at(caliper.positions[[0, -1]], np.zeros(2))
+    used = layout.optics.recorded(caliper.at(caliper.positions[[0, -1]], np.zeros(2)))
     low = np.maximum(np.floor(used.min(0) - HALF_WIDTH - 1), 0).astype(int)
     high = np.minimum(np.ceil(used.max(0) + HALF_WIDTH + 2), [width, height]).astype(int)
     y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
-    points = np.stack([x, y], 1).astype(float)
+    points = layout.optics.ideal(np.stack([x, y], 1).astype(float))
     along, across = caliper.coordinates(points)
     keep = (
         (np.abs(across) <= HALF_WIDTH) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
@@ -78,4 +81,4 @@ def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[
     labels = layout.labels()[y, x]
     expected = np.where(across > 0, *layout.sides[index])
     keep &= (labels == expected) | (np.abs(across) < 1)
-    return (y * width + x)[keep], along[keep], across[keep]
+    return (y * width + x)[keep], points[keep], along[keep], across[keep]

@@ -8,6 +8,7 @@ import numpy as np
 
 from measure import status
 from measure.features.layout import Layout
+from measure.features.optics import Optics
 from planner.features.locator import MIN_USABLE
 
 MIN_POSITIONS = 3
@@ -31,6 +32,9 @@ class Caliper:
         the image are left out.
     status : str
         ``ok``, ``clutter``, ``short`` or ``not_visible``, as far as geometry alone tells.
+    optics : Optics
+    defocus : ndarray, shape (2,)
+        Signed radius of the circle of confusion at both ends, px.
     """
 
     name: str
@@ -39,17 +43,34 @@ class Caliper:
     length: float
     positions: np.ndarray
     status: str
+    optics: Optics
+    defocus: np.ndarray
 
     @property
     def normal(self) -> np.ndarray:
         return np.array([-self.direction[1], self.direction[0]])
 
+    def blur(self, along: np.ndarray) -> np.ndarray | float:
+        """Standard deviation of the lens' blur at places along the edge, px."""
+        if not self.defocus.any():
+            return self.optics.blur_px
+        start, stop = self.defocus
+        return np.sqrt(self.optics.blur_px**2 + (start + (stop - start) * along / self.length) ** 2 / 4)
+
+    def curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The edge as it is recorded at the positions: places (m, 2), px, unit normals (m, 2), and ideal px across the
+        edge for a recorded px (m,)."""
+        places = self.at(self.positions, np.zeros(1))
+        gradient = self.optics.gradient(places, self.normal)
+        size = np.linalg.norm(gradient, axis=-1)
+        return self.optics.recorded(places), gradient / size[:, None], size
+
     def at(self, along: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        """Image coordinates (x, y), px, of places in this caliper."""
+        """Ideal image coordinates (x, y), px, of places in this caliper."""
         return self.origin + along[..., None] * self.direction + offset[..., None] * self.normal
 
     def coordinates(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(along, offset) of image points (..., 2), px."""
+        """(along, offset) of image points (..., 2) in ideal coordinates, px."""
         away = points - self.origin
         return away @ self.direction, away @ self.normal
 
@@ -72,7 +93,8 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
     start, stop = layout.ends[i]
     length = float(np.linalg.norm(stop - start))
     if not layout.visible[i] or not length > 0:
-        return Caliper(layout.names[i], np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0), status.NOT_VISIBLE)
+        nowhere = np.zeros(2), np.array([1.0, 0.0]), 0.0, np.empty(0)
+        return Caliper(layout.names[i], *nowhere, status.NOT_VISIBLE, layout.optics, np.zeros(2))
     along = (stop - start) / length
     shown = length * layout.shown[i]
     first = max(trim(along, layout.beside[i][0], clear), shown[0] + clear if shown[0] > 0 else 0.0)
@@ -82,7 +104,8 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
     positions = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
     places = start + positions[:, None] * along
     size = np.array(layout.optics.shape[::-1])
-    inside = ((places >= margin) & (places <= size - 1 - margin)).all(-1)
+    seen = layout.optics.recorded(places)
+    inside = ((seen >= margin) & (seen <= size - 1 - margin)).all(-1)
     if positions.size < MIN_POSITIONS:
         state = status.SHORT
     elif inside.sum() < MIN_POSITIONS:
@@ -90,7 +113,7 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
     else:
         crowded = any(distance_to_segment(places[inside], *other).min() < clear for other in layout.apart[i])
         state = status.CLUTTER if crowded else status.OK
-    return Caliper(layout.names[i], start, along, length, positions[inside], state)
+    return Caliper(layout.names[i], start, along, length, positions[inside], state, layout.optics, layout.defocus[i])
 
 
 def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:

@@ -123,7 +123,7 @@ def find_ellipse(
     points = places + (found.offset + inward)[..., None] * normals
     start = np.broadcast_to(expected, (len(stack), 5))
     parameters, good = _descend(points, found.valid.astype(float), start, circle)
-    unit = locator.unit_noise()
+    unit = locator.unit_noise().response
     covariances = []
     for row, valid, contrast in zip(parameters, found.valid, found.contrast, strict=True):
         response, known = _solve(_free(_distances(places, row)[1], circle), valid.astype(float))

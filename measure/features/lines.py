@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from measure.features.points import EdgePoints
-from planner.features.locator import correlation
+
+_GAP = 1.0  # px; a point stands for no more of an edge to either side
 
 
 class Lines(NamedTuple):
@@ -56,7 +57,29 @@ def trapezoid(along: np.ndarray) -> np.ndarray:
     return weights
 
 
-def unit_covariance(along: np.ndarray, scale: float) -> np.ndarray:
-    """Covariance of (mean offset, slope), (2, 2), for points of variance 1 px^2 that the smoothing correlates."""
-    response = regression(along)
-    return response @ correlation(along[:, None] - along, scale) @ response.T
+def trend_along(along: np.ndarray, value: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weighted mean of values (n, m) at places (n, m), px, their change per px, and their line's value at 0, all (n,).
+
+    0 where there are none.
+    """
+    total = np.maximum(weights.sum(1), np.finfo(float).tiny)
+    mean, middle = ((part * weights).sum(1) / total for part in (value, along))
+    s = (along - middle[:, None]) * weights
+    spread = (s * (along - middle[:, None])).sum(1)
+    slope = (s * value).sum(1) / np.where(spread > 0, spread, np.inf)
+    return mean, slope, mean - slope * middle
+
+
+def cells(along: np.ndarray, valid: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+    """Length of an edge, px, that each of the valid points at places (n, m) in ascending order stands for, (n, m).
+
+    Halfway to its neighbours, to the limits of the edge at its ends, and at most `_GAP` either way. With these weights
+    a sum over points is an integral along the edge, the same however densely the points lie.
+    """
+    before = np.maximum.accumulate(np.where(valid, along, -np.inf), 1)
+    after = np.minimum.accumulate(np.where(valid, along, np.inf)[:, ::-1], 1)[:, ::-1]
+    edge = np.full((len(along), 1), np.inf)
+    before, after = np.hstack([-edge, before[:, :-1]]), np.hstack([after[:, 1:], edge])
+    left = np.where(np.isfinite(before), (along - before) / 2, along - limits[0])
+    right = np.where(np.isfinite(after), (after - along) / 2, limits[1] - along)
+    return (np.clip(left, 0, _GAP) + np.clip(right, 0, _GAP)) * valid

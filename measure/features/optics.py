@@ -49,6 +49,15 @@ class Optics:
         shape = camera.height, camera.width
         return cls(shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent)
 
+    @property
+    def sagitta(self) -> float:
+        """How far a straight edge across the image may be bent, px; about."""
+        if self.camera is None:
+            return 0.0
+        height, width = self.shape
+        border = np.array([[0, 0], [width / 2, 0], [width, 0], [width, height / 2], [width, height]], float)
+        return float(np.nan_to_num(np.abs(self.ideal(border) - border), nan=max(self.shape)).max())
+
     def noise_at(self, levels: np.ndarray) -> np.ndarray | None:
         """Variance of the noise at grey levels; None where it is ``noise_variance`` for all of them."""
         if self.noise is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 
 class EdgePoints(NamedTuple):
@@ -20,6 +21,12 @@ class EdgePoints(NamedTuple):
         Mean contrast of the edge as the locator saw it, grey levels.
     reversed : ndarray of bool, shape (n,)
         Whether the contrast of the edge's second half has the other sign than that of its first.
+    trend : ndarray, shape (n,)
+        Change of the contrast per px of length, grey levels a px.
+    weights : ndarray, shape (m,) or (n, m)
+        How much of the edge each point stands for.
+    sure : ndarray of bool, shape (n,)
+        Whether the points are those that any picture of this edge would show, whatever its noise.
     """
 
     along: np.ndarray
@@ -27,3 +34,17 @@ class EdgePoints(NamedTuple):
     valid: np.ndarray
     contrast: np.ndarray
     reversed: np.ndarray
+    trend: np.ndarray | float = 0.0
+    weights: np.ndarray | float = 1.0
+    sure: np.ndarray | bool = True
+
+
+class UnitNoise(NamedTuple):
+    """How edge points at places ``along`` (m,), px, with ``weights`` (m,), answer to noise at unit contrast.
+
+    ``response`` (m, pixels) is the derivative of their offsets by the pixels, px per grey level.
+    """
+
+    along: np.ndarray
+    weights: np.ndarray
+    response: sparse.csr_array

@@ -82,13 +82,14 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
 def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passes: int) -> Shape:
     tool = prepared(layout, name, threshold)
     estimate = tool.estimate(images)
-    shape = _assemble(tool, layout, estimate)
+    lines = tool.covariance(estimate, images)
+    shape = _assemble(tool, layout, estimate, lines)
     calipers = tool.calipers
     if any(caliper.status not in status.MEASURED for caliper in calipers):
         return shape
     lengths = np.array([caliper.length for caliper in calipers])
     offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
-    limit = np.maximum(CAPTURE[name], 5 * _end_errors(tool, layout, estimate))
+    limit = np.maximum(CAPTURE[name], 5 * _end_errors(lines, lengths))
     far = ~(np.abs(offsets) <= limit).all((1, 2))
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
@@ -117,15 +118,13 @@ def _expectations(images, layout, offsets, far, lost, first):
         yield _shifted(layout, tuple(key.ravel().tolist())), which[(keys == key).all((1, 2))]
 
 
-def _end_errors(tool: Estimator, layout: Layout, estimate: Estimate) -> np.ndarray:
-    """Standard deviation of each line's offset at its two ends, px, (n, E, 2)."""
-    covariance = tool.covariance(estimate) * layout.optics.noise_variance
-    lengths = np.array([caliper.length for caliper in tool.calipers])
+def _end_errors(covariance: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Standard deviation of each line's offset at its two ends, px, (n, E, 2), from the lines' covariance."""
     a, b, ab = (np.einsum("nee->ne", covariance[:, i::2, j::2]) for i, j in ((0, 0), (1, 1), (0, 1)))
     return np.nan_to_num(np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1)))
 
 
-def _assemble(tool: Estimator, layout: Layout, estimate: Estimate) -> Shape:
+def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.ndarray) -> Shape:
     calipers = tool.calipers
     normals, points = line_equations(calipers, estimate.level, estimate.slope)
     crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]
@@ -136,7 +135,6 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate) -> Shape:
     joint = np.where(sines < _MIN_SINE, status.ILL_CONDITIONED, status.OK)
     state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
     measured = np.isin(state, status.MEASURED)
-    lines = tool.covariance(estimate) * layout.optics.noise_variance
     covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
     if measured.any():
         response = np.concatenate([corner_response(calipers, pair) for pair in layout.corners])

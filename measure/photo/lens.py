@@ -111,7 +111,7 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straighte
             raise InvalidInput(f"side {caliper.name} must stand out of the noise, got {found.valid.sum()} edge points")
         slope = float(np.tan(line.tilt[0]))
         lines.append((float(line.mean_offset[0] - slope * line.mean_along[0]), slope))
-        response = regression(along) @ locator.unit_noise() / max(float(found.contrast[0]), 1e-12)
+        response = regression(along) @ locator.unit_noise().response / max(float(found.contrast[0]), 1e-12)
         to_start = np.array([[1, -along.mean()], [0, 1]])
         blocks.append(to_start @ (optics.noise_variance * response @ response.T) @ to_start.T)
         used.append(int(found.valid.sum()))

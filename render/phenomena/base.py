@@ -59,6 +59,8 @@ class Effect(ABC):
     random : bool
         Whether single rays become random, so that all pixels need more of them; several such effects share the rays,
         and what the costliest costs is paid once.
+    has_formula : bool
+        Whether the planner predicts it, or could. What has none is known from a rendered picture only.
     switch : str
         How it is simulated.
     """
@@ -66,6 +68,7 @@ class Effect(ABC):
     name: ClassVar[str]
     cost: ClassVar[float] = 1.0
     random: ClassVar[bool] = False
+    has_formula: ClassVar[bool] = True
     switch: ClassVar[str]
 
     @abstractmethod

@@ -138,6 +138,7 @@ class LightSize(Effect):
     name = "light_size"
     cost = 9.0
     random = True
+    has_formula = False
     switch = "a sphere or a disc instead of a point"
 
     def absent(self, pictures: Pictures) -> str | None:

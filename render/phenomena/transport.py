@@ -62,6 +62,7 @@ class Interreflection(Effect):
     name = "interreflection"
     cost = 25.0
     random = True
+    has_formula = False
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, pictures: Pictures) -> str | None:

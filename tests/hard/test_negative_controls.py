@@ -5,7 +5,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from planner.features.propagation import LineFit
+from measure.features.lines import Lines
 from planner.imaging.reflectance import beckmann
 from validation.hard import Answer, Case, Reference, fit_cases, planner_cases, precise, run
 from validation.hard.case import EPSILON
@@ -15,34 +15,31 @@ FAR_LINES = (1e6, 1e9)
 
 
 def naive_fit(points, weights):
-    """`planner.propagation.fit_line` with its moments by subtracting squares."""
-    total, count = weights.sum(), len(points)
-    mean = weights @ points / total
-    x, y = points.T
-    xx, yy, xy = (
-        weights @ p / total - q for p, q in ((x * x, mean[0] ** 2), (y * y, mean[1] ** 2), (x * y, mean.prod()))
-    )
-    angle = np.arctan2(2 * xy, xx - yy) / 2
-    return LineFit(np.array([-np.sin(angle), np.cos(angle)]), mean, count / (count - 1) * (xx + yy), total, count)
+    """`measure.features.lines.fit_lines` with its moments by subtracting squares."""
+    weight = points.valid * np.broadcast_to(weights, points.along.shape)
+    x, y, total = points.along, points.offset, weight.sum(1)
+    mx, my = ((weight * p).sum(1) / total for p in (x, y))
+    xx, yy, xy = ((weight * p).sum(1) / total - q for p, q in ((x * x, mx * mx), (y * y, my * my), (x * y, mx * my)))
+    return Lines(mx, my, np.arctan2(2 * xy, xx - yy) / 2, points.valid.sum(1), np.zeros(len(x)))
 
 
 @pytest.mark.parametrize("offset", FAR_LINES)
 def test_subtracting_squares_fails(offset, monkeypatch):
-    points, weights = fit_cases._points(40, offset), np.ones(40)
+    points = fit_cases.edge_points(40, offset)
     case = Case(
-        "fit", "", "", lambda: fit_cases._line(points, weights, "tilt"),
-        lambda: fit_cases._line_reference(points, weights, "tilt"),
+        "fit", "", "", lambda: fit_cases.line(points, 1.0, "tilt"),
+        lambda: fit_cases.line_reference(points, 1.0, "tilt"),
     )  # fmt: skip
     assert run(case).verdict == "right"
-    monkeypatch.setattr(fit_cases, "fit_line", naive_fit)
+    monkeypatch.setattr(fit_cases, "fit_lines", naive_fit)
     assert run(case).verdict == "WRONG"
 
 
 @pytest.mark.parametrize("offset", FAR_LINES)
 def test_normal_equations_fail_for_a_far_line(offset):
     """Slope of y = p x + q from [x 1]^T [x 1]: the reference is the same least squares at 50 digits."""
-    points = fit_cases._points(40, offset)
-    x, y = points.T
+    points = fit_cases.edge_points(40, offset)
+    x, y = points.along[0], points.offset[0] + 0.5 * points.along[0]
 
     def exact(numbers):
         xs, ys = numbers[:40], numbers[40:]

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from render.reflectance import NUMPY, Index, brightness, polarised_across
 
 import render
 from planner.imaging.projection import direction, frame
 from render import variant
 from render.build import polariser_axes
-from render.reflectance import NUMPY, Index, brightness, polarised_across
 from scenes import Material, Pose
 
 pytestmark = pytest.mark.render

@@ -22,7 +22,19 @@ def ice(monkeypatch, capsys, *arguments):
 
 
 def test_json_and_pictures(monkeypatch, capsys, tmp_path):
-    arguments = ("plan", "task1", "--step", "6", "--json", "--out", str(tmp_path), "--tolerance", "noise=0.1")
+    arguments = (
+        "plan",
+        "task1",
+        "--step",
+        "6",
+        "--json",
+        "--out",
+        str(tmp_path),
+        "--tolerance",
+        "noise=0.1",
+        "--check",
+        "2",
+    )
     code, out, _ = ice(monkeypatch, capsys, *arguments)
     document = json.loads(out)
     assert code == 0
@@ -32,18 +44,25 @@ def test_json_and_pictures(monkeypatch, capsys, tmp_path):
     assert document["alternating"]["gap"] >= 0
     assert len(document["candidates"]) == 10
     assert document["robust"]["worst"] >= document["variance"]
+    first, second = document["checked"]
+    assert (first["sensor"], first["light"]) == (document["sensor"], document["light"])
+    assert first["calibrated"] == pytest.approx(document["variance_object"])
+    assert document["proposed"] in (first, second)
+    assert document["order_changed"] is (second["rank_after"] == 1)
+    assert document["check"]["seconds"] > 0
     assert len(document["pictures"]) == 5
     for path in document["pictures"]:
         assert (tmp_path / path).stat().st_size > 10_000
 
 
 def test_table_one_of_the_paper(monkeypatch, capsys):
-    arguments = ("--search", "alternating", "--model", "paper", "--objective", "image")
+    arguments = ("--search", "alternating", "--model", "paper", "--objective", "image", "--no-check")
     code, out, _ = ice(monkeypatch, capsys, "plan", "task1_part1", *arguments)
     assert code == 0
     assert "Alternating search" in out
     assert "(40.0, 40.4)" in out
     assert "Guarantee: none" in out
+    assert "rendered" not in out
 
 
 @pytest.mark.parametrize(
@@ -54,6 +73,7 @@ def test_table_one_of_the_paper(monkeypatch, capsys):
         (("--tolerance", "noise=x"), "--tolerance noise must be a number, got 'x'"),
         (("--sensor-polar", "10"), "--sensor-polar must be two numbers LOW,HIGH (degrees), got '10'"),
         (("--sensor", "200,0"), "--sensor: polar_deg must be between 0 and 180, got 200"),
+        (("--check", "0"), "--check must be at least 1, got 0"),
         (("--min-edge", "1e6"), "constraints must leave a pose for sensor and light, got none"),
     ],
 )

@@ -3,11 +3,11 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from planner.imaging.illumination import bands, electric_field, level
 
 import planner
 import scenes
-from planner.imaging.illumination import bands, electric_field, level
-from planner.imaging.reflectance import attenuation, beckmann, fresnel, perpendicular_share, reflected
+from planner.imaging.reflectance import beckmann, fresnel, perpendicular_share, reflected
 from scenes import Material
 from tests.unit.test_reflectance import textbook_fresnel, unit
 
@@ -46,16 +46,13 @@ def test_fresnel_to_1e_12(rng):
         assert agrees(ours[1], exact[1]), (cosine, n, k)
 
 
-def test_beckmann_and_attenuation_to_1e_12(rng):
+def test_beckmann_to_1e_12(rng):
     count = 800
     cosines, roughness = hard_cosines(rng, count), 10 ** rng.uniform(-2, 0, count)
     for cosine, m in zip(cosines, roughness, strict=True):
         c, s = mp.mpf(float(cosine)), mp.mpf(float(np.sqrt((1 - cosine) * (1 + cosine))))
         exact = mp.exp(-((s / (m * c)) ** 2)) / (mp.mpf(m) ** 2 * c**4)
         assert agrees(beckmann(float(cosine), float(s), m), exact, absolute=1e-300), (cosine, m)
-    for nh, nv, nl, vh in hard_cosines(rng, 4 * 300).reshape(-1, 4):
-        exact = min(mp.mpf(1), 2 * mp.mpf(nh) * min(mp.mpf(nv), mp.mpf(nl)) / mp.mpf(vh))
-        assert agrees(attenuation(nh, nv, nl, vh), exact)
 
 
 def test_share_of_polarised_light():

@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from planner.imaging.contrast import contrast, side_levels
 
 import planner
 import scenes
-from planner.features.projected_edges import projected_edges
-from planner.features.propagation import corner_covariance, distance_variance
-from planner.imaging.contrast import contrast, side_levels
-from planner.imaging.projection import edge_points, project
 from planner.features.locator import correlation, kappa2
+from planner.features.projected_edges import projected_edges
+from planner.features.propagation import corner_covariance
+from planner.imaging.projection import edge_points, project
 from scenes import InvalidInput
 
 
@@ -127,7 +127,9 @@ def test_calibrated_against_the_explicit_covariance_of_dense_points(task1, focal
     directions = view.ends[:, 1] - view.ends[:, 0]
     normals = np.column_stack([-directions[:, 1], directions[:, 0]]) / view.lengths[:, None]
     covariances = corner_covariance(normals.reshape(2, 2, 2), np.array(offsets).reshape(2, 2))
-    assert predicted.variance_px2 == pytest.approx(distance_variance(predicted.corners, covariances), rel=0.01)
+    across = predicted.corners[1] - predicted.corners[0]
+    expected = across @ covariances.sum(0) @ across / (across @ across)  # eq. 6, the ends independent
+    assert predicted.variance_px2 == pytest.approx(expected, rel=0.01)
 
 
 def test_bad_arguments(task1):

@@ -3,10 +3,10 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from planner.models.models import paper
 
 import planner
-from planner.features.propagation import corner_covariance, distance_variance, fit_line, offset_variance
-from planner.models.models import paper
+from planner.features.propagation import corner_covariance
 
 mp.mp.dps = 50
 
@@ -32,22 +32,8 @@ def numbers(values):
     return [[mp.mpf(float(x)) for x in row] for row in values]
 
 
-@pytest.mark.parametrize("length", [1e-6, 1.0, 1e2, 1e4])
-@pytest.mark.parametrize("spread_of_weights", [0, 12])
-def test_line_to_1e_12(rng, length, spread_of_weights):
-    """Edges of 1e-6 px, and weights that differ by 12 decades."""
-    for _ in range(5):
-        angle = rng.uniform(0, 2 * np.pi)
-        t = np.linspace(0, length, 40)
-        points = rng.uniform(-1, 1, 2) * length + t[:, None] * [np.cos(angle), np.sin(angle)]
-        weights = 10 ** rng.uniform(-spread_of_weights / 2, spread_of_weights / 2, 40)
-        ours = offset_variance(fit_line(points, weights), points[0])
-        exact = exact_line(numbers(points), [mp.mpf(float(w)) for w in weights], numbers(points)[0])[2]
-        assert abs(mp.mpf(float(ours)) / exact - 1) < 1e-12
-
-
 @pytest.mark.parametrize("sine", [1.0, 1e-2, 1e-6, 1e-9])
-def test_corner_and_distance(rng, sine):
+def test_corner_to_1e_12(rng, sine):
     """Nearly parallel edges: the normals' own rounding is magnified by 1 / sine, so they are taken as exact."""
     for _ in range(10):
         a = np.array([1.0, 0.0])
@@ -64,13 +50,6 @@ def test_corner_and_distance(rng, sine):
         for i in range(2):
             for j in range(2):
                 assert abs(ours[i, j] - exact[i, j]) <= 1e-12 * mp.sqrt(exact[i, i] * exact[j, j])
-        ends = rng.uniform(-50, 50, (2, 2))
-        u = [mp.mpf(float(x)) for x in ends[0]], [mp.mpf(float(x)) for x in ends[1]]
-        r, c = u[0][0] - u[1][0], u[0][1] - u[1][1]
-        expected = 2 * (r * r * exact[0, 0] + c * c * exact[1, 1] + 2 * r * c * exact[0, 1]) / (r * r + c * c)
-        # along the long axis of a very flat error ellipse the sum cancels; 1e-12 of its largest term
-        largest = 2 * max(exact[0, 0], exact[1, 1])
-        assert abs(distance_variance(ends, np.stack([ours, ours])) - expected) <= 1e-12 * largest
 
 
 def exact_model(scene, sensor, light):

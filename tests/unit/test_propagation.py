@@ -2,61 +2,106 @@
 
 import numpy as np
 import pytest
+from planner.models.models import paper
 
-from planner.features.propagation import (
-    corner_covariance,
-    distance_variance,
-    fit_line,
-    line_covariance,
-    offset_variance,
-)
+from measure.features.calipers import Caliper
+from measure.features.corners import corner_response, intersect, line_equations
+from measure.features.lines import fit_lines, unit_covariance
+from measure.features.points import EdgePoints
+from measure.measurement import separation
+from planner.features.propagation import corner_covariance
+from tests.scalar import weighted_points
 
-
-@pytest.fixture
-def noisy_line(rng):
-    """60 points of unequal noise on the line at 30 degrees through (40, 7), and their true moments."""
-    s = np.linspace(-30, 50, 60)
-    points = np.array([40.0, 7.0]) + s[:, None] * [np.cos(0.5), np.sin(0.5)]
-    return points, 0.05 * (1 + rng.random(60))
+SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)
+DRAWS = 20_000
+WITHIN = 4 * np.sqrt(2 / (DRAWS - 1))  # 4 standard errors of a variance: 4 %
 
 
-def simulated(points, sigma, rng, count=40000):
-    noisy = points + sigma[:, None] * rng.standard_normal((count, *points.shape))
-    fit = fit_line(noisy, np.broadcast_to(1 / sigma**2, noisy.shape[:-1]))
-    return np.concatenate([fit.normal, fit.gamma[:, None]], -1)
+@pytest.fixture(scope="module")
+def fitted(task1):
+    """Offsets and slopes of lines through 20 000 draws of the paper's 100 points of each required edge.
+
+    A weighted total-least-squares line of its own: the long axis of the points' weighted moments.
+
+    Returns
+    -------
+    dict
+        By edge: the place of the first end, direction and length of the edge's image; centroids and normals of the
+        lines (DRAWS, 2); and the sum of the weights.
+    """
+    rng, found = np.random.default_rng(7), {}
+    for name in task1.task.edges:
+        points, weights = (np.array(part) for part in weighted_points(task1, task1.solid.edge(name), SENSOR, LIGHT))
+        noisy = points + rng.standard_normal((DRAWS, *points.shape)) / np.sqrt(weights)[:, None]
+        centroid = weights @ noisy / weights.sum()
+        away = noisy - centroid[:, None]
+        axes = np.linalg.eigh(np.einsum("i,nij,nik->njk", weights, away, away))[1]
+        along = points[-1] - points[0]
+        length = np.linalg.norm(along)
+        found[name] = points[0], along / length, length, centroid, axes[:, :, 0], weights.sum()
+    return found
 
 
-def test_line_covariance_against_monte_carlo(noisy_line, rng):
-    points, sigma = noisy_line
-    predicted = line_covariance(fit_line(points, 1 / sigma**2))
-    empirical = np.cov(simulated(points, sigma, rng).T)
-    # relative standard error of a variance from 40000 samples is 0.7 %
-    assert np.diag(empirical) == pytest.approx(np.diag(predicted), rel=0.03)
-    assert empirical == pytest.approx(
-        predicted, rel=0.05, abs=0.03 * np.sqrt(np.outer(np.diag(predicted), np.diag(predicted))).min()
-    )
+def displacement(edge, place):
+    """Where each line crosses the true line's normal at a place along it (px from the first end), px."""
+    start, direction, _, centroid, normal, _ = edge
+    across = np.array([-direction[1], direction[0]])
+    away = centroid - (start + place * direction)
+    return np.einsum("ni,ni->n", away, normal) / (normal @ across)
 
 
-def test_printed_gamma_variance_fails_the_same_test(noisy_line, rng):
-    """Negative control: the printed I/W in V(gamma) is refuted by the same sample, as are 1.3 x the truth and 0."""
-    points, sigma = noisy_line
-    fit = fit_line(points, 1 / sigma**2)
-    repaired = line_covariance(fit)[2, 2]
-    printed = repaired + (fit.count - 1) / fit.total_weight
-    empirical = simulated(points, sigma, rng)[:, 2].var(ddof=1)
-    assert empirical == pytest.approx(repaired, rel=0.03)
-    assert empirical != pytest.approx(printed, rel=0.03)
-    assert empirical != pytest.approx(1.3 * repaired, rel=0.03)
-    assert empirical != pytest.approx(0, abs=0.03 * repaired)
+@pytest.fixture(scope="module")
+def predicted(task1):
+    return paper(task1, np.array(SENSOR), np.array(LIGHT))
 
 
-def test_offset_variance_is_the_printed_quadratic_form(noisy_line):
-    points, sigma = noisy_line
-    fit = fit_line(points, 1 / sigma**2)
-    for s in (-80.0, 0.0, 33.0):
-        point = fit.centroid + s * np.array([fit.normal[1], -fit.normal[0]])
-        v = np.append(point, 1.0)
-        assert offset_variance(fit, point) == pytest.approx(v @ line_covariance(fit) @ v, rel=1e-9)
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0, 1.7])
+def test_the_papers_line_variance_against_monte_carlo(task1, fitted, predicted, fraction):
+    """Eq. 3 at both ends, the middle and beyond; 1.3 x the truth and 0 are refused by the same sample."""
+    for e, name in enumerate(predicted.measurand.view.names):
+        place = fraction * fitted[name][2]
+        ones = np.ones(len(task1.task.edges))
+        variance = predicted.line_variance(ones, place * ones)[e]
+        empirical = displacement(fitted[name], place).var(ddof=1)
+        assert empirical == pytest.approx(variance, rel=WITHIN)
+        assert empirical != pytest.approx(1.3 * variance, rel=WITHIN)
+        assert empirical != pytest.approx(0, abs=WITHIN * variance)
+
+
+def test_the_papers_tilt_against_monte_carlo(task1, fitted, predicted):
+    """The line's angle, rad^2: A = 0 and B = 1."""
+    ones = np.ones(len(task1.task.edges))
+    for e, name in enumerate(predicted.measurand.view.names):
+        _, direction, _, _, normal, _ = fitted[name]
+        sine = normal @ direction * np.sign(normal @ [-direction[1], direction[0]])
+        variance = predicted.line_variance(0 * ones, ones)[e]
+        assert np.arcsin(sine).var(ddof=1) == pytest.approx(variance, rel=WITHIN)
+
+
+def test_the_printed_gamma_variance_fails_the_same_test(task1, fitted, predicted):
+    """In V(gamma) the last term is 1/W; the printed I/W is off by a factor I = 100, and the sample refuses it."""
+    ones = np.ones(len(task1.task.edges))
+    for e, name in enumerate(predicted.measurand.view.names):
+        middle, total = fitted[name][2] / 2, fitted[name][-1]
+        repaired = predicted.line_variance(ones, middle * ones)[e]
+        printed = repaired + (100 - 1) / total
+        assert printed > 10 * repaired
+        assert displacement(fitted[name], middle).var(ddof=1) != pytest.approx(printed, rel=WITHIN)
+
+
+def test_the_variance_of_correlated_points_against_monte_carlo(rng):
+    """Mean and slope of lines through 20 000 draws of smoothed noise; that of independent points is refused."""
+    along, scale, sigma = np.linspace(3, 27, 25), 1.5, 1e-3
+    together = np.exp(-((along[:, None] - along) ** 2) / (4 * scale**2))
+    root = np.linalg.cholesky(together + 1e-12 * np.eye(25))
+    offset = sigma * rng.standard_normal((DRAWS, 25)) @ root.T
+    whole = np.ones(offset.shape, bool)
+    lines = fit_lines(EdgePoints(np.broadcast_to(along, offset.shape), offset, whole, whole[:, 0], whole[:, 0]))
+    ours = sigma**2 * unit_covariance(along, scale)
+    for values, known in ((lines.mean_offset, ours[0, 0]), (np.tan(lines.tilt), ours[1, 1])):
+        assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)
+    independent = sigma**2 * unit_covariance(along, 1e-6)
+    assert lines.mean_offset.var(ddof=1) != pytest.approx(independent[0, 0], rel=WITHIN)
 
 
 def crossing(parameters):
@@ -74,7 +119,10 @@ def central_difference(function, x, step=1e-6):
     return np.stack(columns, -1)
 
 
-@pytest.mark.parametrize(("first", "second"), [(0.1, 1.4), (0.3, 0.9), (2.0, -0.4), (0.0, np.pi / 2)])
+PAIRS = [(0.1, 1.4), (0.3, 0.9), (2.0, -0.4), (0.0, np.pi / 2)]
+
+
+@pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_corner_covariance_against_central_differences(first, second):
     normals = np.array([[np.sin(first), np.cos(first)], [np.sin(second), np.cos(second)]])
     lines = np.column_stack([normals, [-3.0, 5.0]])
@@ -84,22 +132,30 @@ def test_corner_covariance_against_central_differences(first, second):
     assert corner_covariance(normals, variances) == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_distance_variance_against_central_differences():
+@pytest.mark.parametrize(("first", "second"), PAIRS)
+def test_corner_response_against_central_differences(first, second):
+    """Level and slope of two of three lines found in the image; the third has no part in the corner."""
+    calipers = tuple(
+        Caliper("", np.array(origin), np.array([np.cos(a), np.sin(a)]), 50.0, np.empty(0), "ok")
+        for a, origin in ((first, (40.0, 30.0)), (0.7, (10.0, 10.0)), (second, (90.0, 70.0)))
+    )
+
+    def corner(lines):
+        normals, points = line_equations(calipers, lines[None, ::2], lines[None, 1::2])
+        return intersect(normals[:, [0, 2]], points[:, [0, 2]])[0][0]
+
+    ours = corner_response(calipers, (0, 2))
+    assert ours == pytest.approx(central_difference(corner, np.zeros(6)), rel=1e-6, abs=1e-8)
+    assert (ours[:, 2:4] == 0).all()
+
+
+def test_distance_gradient_against_central_differences():
     ends = np.array([[3.0, 4.0], [90.0, -20.0]])
-    gradient = central_difference(lambda p: np.linalg.norm(p[:2] - p[2:]), ends.ravel())
-    covariances = np.array([[[0.2, 0.05], [0.05, 0.1]], [[0.4, -0.1], [-0.1, 0.3]]])
-    joint = np.zeros((4, 4))
-    joint[:2, :2], joint[2:, 2:] = covariances
-    assert distance_variance(ends, covariances) == pytest.approx(gradient @ joint @ gradient, rel=1e-6)
-
-
-def test_far_line_keeps_its_digits(noisy_line):
-    """Moving everything 1e8 px away changes no variance of the line's position; raw moments would lose 16 digits."""
-    points, sigma = noisy_line
-    near, far = fit_line(points, 1 / sigma**2), fit_line(points + 1e8, 1 / sigma**2)
-    assert far.tilt_variance == pytest.approx(near.tilt_variance, rel=1e-6)
+    (value,), (gradient,) = separation(ends[None])
+    assert value == pytest.approx(np.hypot(87, 24))
+    expected = central_difference(lambda p: np.linalg.norm(p[:2] - p[2:]), ends.ravel())
+    assert gradient == pytest.approx(expected, rel=1e-6)
 
 
 def test_what_cannot_be_measured_is_infinite():
     assert np.isinf(corner_covariance(np.array([[0.0, 1.0], [0.0, 1.0]]), np.ones(2)).diagonal()).all()
-    assert distance_variance(np.zeros((2, 2)), np.stack([np.eye(2)] * 2)) == np.inf

@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from planner.imaging.reflectance import attenuation, beckmann, fresnel, reflected
+from planner.imaging.reflectance import beckmann, fresnel, reflected
 from scenes import Material
 
 mp.mp.dps = 50
@@ -64,11 +64,6 @@ def test_beckmann_conserves_area():
     assert np.trapezoid(integrand, angle) == pytest.approx(np.pi, rel=1e-4)
 
 
-def test_attenuation_is_one_face_on():
-    assert attenuation(1.0, 1.0, 1.0, 1.0) == 1.0
-    assert attenuation(0.7, 0.1, 0.9, 0.8) == pytest.approx(2 * 0.7 * 0.1 / 0.8)
-
-
 def unit(*v):
     return np.array(v) / np.linalg.norm(v)
 
@@ -81,19 +76,30 @@ def test_diffuse_is_cosine_and_zero_behind():
     assert reflected(material, up, light, -up) == 0
 
 
-def test_specular_against_the_printed_formula():
+@pytest.mark.parametrize(
+    ("towards_light", "towards_sensor", "smallest"),
+    [
+        ((0.5, 0.1, 1), (-0.3, 0.4, 1), "1"),
+        ((0.5, 0.1, 1), (-3, 0.4, 0.6), "view"),
+        ((4, 0.1, 0.5), (-0.3, 0.4, 1), "light"),
+    ],
+)
+def test_specular_against_the_printed_formula(towards_light, towards_sensor, smallest):
+    """Each of the three branches of the geometric attenuation G: nothing hidden, masking, shadowing."""
     material = Material(
         specular_fraction=0.4, diffuse_reflectance=0.7, refractive_index=1.8, extinction=2.0, roughness=0.3
     )
-    n, light, view = unit(0, 0, 1), unit(0.5, 0.1, 1), unit(-0.3, 0.4, 1)
+    n, light, view = unit(0, 0, 1), unit(*towards_light), unit(*towards_sensor)
     half = unit(*(light + view))
     nh, nv, nl, vh = n @ half, n @ view, n @ light, view @ half
     d = np.exp(-((np.tan(np.arccos(nh)) / 0.3) ** 2)) / (0.3**2 * nh**4)
-    g = min(1, 2 * nh * nv / vh, 2 * nh * nl / vh)
-    k = d * g / (np.pi * nl * nv)
+    branches = {"1": 1.0, "view": 2 * nh * nv / vh, "light": 2 * nh * nl / vh}
+    assert min(branches, key=branches.get) == smallest
+    k = d * branches[smallest] / (np.pi * nl * nv)
     parallel, perpendicular = textbook_fresnel(mp.acos(float(vh)), 1.8, 2.0)
-    expected = nl * (0.5 * (0.4 * k * parallel + 0.6 * 0.7) + 0.5 * (0.4 * k * perpendicular + 0.6 * 0.7))
-    assert reflected(material, n, light, view) == pytest.approx(expected, rel=1e-12)
+    specular, diffuse = 0.4 * k * float(parallel + perpendicular) / 2, 0.6 * 0.7
+    assert specular > 1e-6 * diffuse
+    assert reflected(material, n, light, view) == pytest.approx(nl * (specular + diffuse), rel=1e-12)
 
 
 def test_specular_stays_finite_at_grazing_view():

@@ -31,6 +31,7 @@ from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
 from validation.batch.work import CHUNK, Found, Picture, Rendering, Task
+from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
 _PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
@@ -45,7 +46,7 @@ More = Callable[[RunFile], Sequence[int] | None]
 def run(
     scene: Scene | Campaign,
     renders: int = 1000,
-    seed: int = 1,
+    seed: int = DEFAULT_SEED,
     out: str | Path | None = None,
     workers: int | None = None,
     fresh: bool = False,

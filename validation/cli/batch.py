@@ -16,38 +16,45 @@ from render import Tolerance
 from scenes import InvalidInput
 from validation.batch import campaign
 from validation.batch.job import run
+from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.cli.common import AUTO, Effects, Json, LeaveOutPx, LeaveOutVariance, app, progress, stoppable
-from validation.cost.goal import check_accuracy, reach, seconds
+from validation.cli.common import AUTO, Effects, Json, LeaveOutPx, LeaveOutVariance, Seed, app, progress, stoppable
+from validation.cost.goal import Reached, check_accuracy, reach, seconds
+from validation.defaults import DEFAULT_SEED
 from validation.report import export
 from validation.report.table import console, report
+
+Target = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")]
+Renders = Annotated[int, typer.Option(help="Noisy images a setting.")]
+Out = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there.")
+]
+Workers = Annotated[int | None, typer.Option(help="Processes; default: one a core.")]
+Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")]
+Accuracy = Annotated[
+    float | None,
+    typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
+]
+Budget = Annotated[str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")]
+LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
 
 @app.command("validate")
 def validate_command(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")],
-    renders: Annotated[int, typer.Option(help="Noisy images a setting.")] = 1000,
-    seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1995,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there."),
-    ] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None,
-    dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
-    ] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")] = False,
-    accuracy: Annotated[
-        float | None,
-        typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
-    ] = None,
-    budget: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")
-    ] = None,
+    scene: Target,
+    renders: Renders = 1000,
+    seed: Seed = DEFAULT_SEED,
+    out: Out = None,
+    workers: Workers = None,
+    dask: Dask = None,
+    fresh: Fresh = False,
+    accuracy: Accuracy = None,
+    budget: Budget = None,
     effects: Effects = "auto",
     bias_px: LeaveOutPx = AUTO.bias_px,
     variance: LeaveOutVariance = AUTO.variance,
-    log_json: Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")] = False,
+    log_json: LogJson = False,
     as_json: Json = False,
 ) -> None:
     """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
@@ -55,34 +62,34 @@ def validate_command(
     Writes run.sqlite, table.csv, result.json and pictures to DIR. Exit status 1 if the measurements contradict the
     predictions.
     """
-    started = time.perf_counter()
-    limit = _goal(accuracy, budget)
+    started, limit = time.perf_counter(), _goal(accuracy, budget)
     loaded = campaign.load(scene)
-    directory = out or Path("runs") / loaded.name
-    title = f"{loaded.name}: {len(loaded)} settings"
-    simulated = {"effects": effects, "tolerance": Tolerance(bias_px, variance)}
+    how = {
+        "seed": seed, "out": out or Path("runs") / loaded.name, "workers": workers, "fresh": fresh, "dask": dask,
+        "effects": effects, "tolerance": Tolerance(bias_px, variance),
+    }  # fmt: skip
     with stoppable(log_json):
-        with nullcontext() if log_json else progress(title) as shown:
+        with nullcontext() if log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
             if accuracy is None and limit is None:
-                found, goal = run(loaded, renders, seed, directory, workers, fresh, shown, dask=dask, **simulated), None
+                found, goal = run(loaded, renders, progress=shown, **how), None
             else:
-                found, goal = reach(
-                    loaded, accuracy, limit, seed=seed, out=directory, workers=workers, fresh=fresh, dask=dask,
-                    say=lambda line: print(line, file=sys.stderr), progress=shown, started=started,
-                    **simulated,
-                )  # fmt: skip
-        _write(loaded, found, directory)
-    if goal:
-        goal = replace(goal, seconds=time.perf_counter() - started)
+                how |= {"say": lambda line: print(line, file=sys.stderr), "progress": shown, "started": started}
+                found, goal = reach(loaded, accuracy, limit, **how)
+        _write(loaded, found, how["out"])
+    _show(found, goal and replace(goal, seconds=time.perf_counter() - started), how["out"], as_json)
+    raise typer.Exit(0 if found.verdict.agrees else 1)
+
+
+def _show(found: Validation, goal: Reached | None, directory: Path, as_json: bool) -> None:
+    """The whole result, as JSON or as tables."""
     if as_json:
         print(json.dumps(found.to_json() | ({"goal": goal.to_json()} if goal else {}), indent=1))
-    else:
-        shown_on = console()
-        shown_on.print(report(found))
-        if goal:
-            shown_on.print(goal.text, highlight=False)
-        shown_on.print(f"Run file, table.csv and pictures: {directory}", highlight=False)
-    raise typer.Exit(0 if found.verdict.agrees else 1)
+        return
+    shown_on = console()
+    shown_on.print(report(found))
+    if goal:
+        shown_on.print(goal.text, highlight=False)
+    shown_on.print(f"Run file, table.csv and pictures: {directory}", highlight=False)
 
 
 def _goal(accuracy: float | None, budget: str | None) -> float | None:
@@ -94,7 +101,7 @@ def _goal(accuracy: float | None, budget: str | None) -> float | None:
     return None if budget is None else seconds(budget)
 
 
-def _write(loaded: campaign.Campaign, found, directory: Path) -> None:
+def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> None:
     from validation.report import figures  # matplotlib takes half a second to load
 
     export.write_csv(found, directory / "table.csv")

@@ -12,7 +12,8 @@ from rich.table import Table
 import scenes
 from measure.calibration import Calibration, blur_for, calibrate
 from scenes import InvalidInput
-from validation.cli.common import Json, SceneName, app, progress, say
+from validation.cli.common import Json, SceneName, Seed, app, progress, say
+from validation.defaults import DEFAULT_SEED
 from validation.report.table import console
 
 
@@ -20,7 +21,7 @@ from validation.report.table import console
 def calibrate_command(
     scene: SceneName,
     images: Annotated[int, typer.Option(help="Noisy images for each angle and noise level.")] = 200,
-    seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1,
+    seed: Seed = DEFAULT_SEED,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.png", help="Picture.")] = None,
     as_json: Json = False,
 ) -> None:

@@ -35,6 +35,7 @@ LeaveOutPx = Annotated[
 LeaveOutVariance = Annotated[
     float, typer.Option("--leave-out-variance", help="... and its variance by at most this part.")
 ]
+Seed = Annotated[int, typer.Option(min=0, help="Root of all random numbers.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 

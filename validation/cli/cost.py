@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from validation.batch import campaign
-from validation.cli.common import Json, SceneName, app, progress
+from validation.cli.common import Json, SceneName, Seed, app, progress
 from validation.cost.sweep import sweep
 from validation.cost.table import tables, write_csv
+from validation.defaults import DEFAULT_SEED
 from validation.report.table import console
 
 
@@ -19,7 +20,7 @@ from validation.report.table import console
 def cost_command(
     scene: SceneName,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; default runs/SCENE-cost.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Root of all random numbers.")] = 1,
+    seed: Seed = DEFAULT_SEED,
     as_json: Json = False,
 ) -> None:
     """Measure what each parameter costs in time and gives in accuracy on this machine.

@@ -19,11 +19,8 @@ def hard_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Answers beside references where numbers lose their digits; exit status 1 if one is wrong.
-
-    Needs mpmath (pip install mpmath). A minute.
-    """
-    from validation import hard  # the references' library is not everyone's
+    """Answers beside references where numbers lose their digits; exit status 1 if one is wrong. A minute."""
+    from validation import hard  # all cases are made, and the references' library loads
     from validation.hard import table
 
     cases = hard.catalogue()

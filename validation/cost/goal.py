@@ -21,6 +21,7 @@ from validation.batch.work import Rendering, methods
 from validation.cost.interval import LEAST, wanted
 from validation.cost.model import Choice, CostModel, combined
 from validation.cost.trial import trial
+from validation.defaults import DEFAULT_SEED
 
 _FIRST = 0.25  # part of the images that are taken before the first look at the clock
 _FINE = 0.05  # of the accuracy: a render of this sigma adds half a per cent to the half-width
@@ -103,7 +104,7 @@ def reach(
     accuracy: float | None = None,
     budget: float | None = None,
     *,
-    seed: int = 1,
+    seed: int = DEFAULT_SEED,
     out: Path | None = None,
     workers: int | None = None,
     fresh: bool = False,

@@ -23,6 +23,7 @@ from validation.cost.sampling import images_parameter
 from validation.cost.scaling import scaling_parameter
 from validation.cost.size import size_parameter
 from validation.cost.trial import spread_cases, trial
+from validation.defaults import DEFAULT_SEED
 
 _STEPS = 10  # the trial and nine parameters
 _SETTINGS = 2  # of the parameters that render
@@ -48,7 +49,7 @@ class Sweep:
         }
 
 
-def sweep(campaign: Campaign, seed: int = 1, report: Callable[[str, int, int], None] | None = None) -> Sweep:
+def sweep(campaign: Campaign, seed: int = DEFAULT_SEED, report: Callable[[str, int, int], None] | None = None) -> Sweep:
     """Measure each parameter of a scene on this machine.
 
     Raises

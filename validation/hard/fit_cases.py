@@ -2,108 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
+from measure.features.calipers import Caliper
 from measure.features.conic import fit_ellipse
-from measure.features.corners import intersect
-from planner.features.propagation import corner_covariance, fit_line, line_covariance, offset_variance
+from measure.features.corners import corner_response, intersect
+from measure.features.lines import fit_lines, unit_covariance
+from measure.features.points import EdgePoints
+from measure.measurement import separation
+from planner.features.propagation import corner_covariance
 from validation.hard.case import Answer, Case, Reference
 
 
 def cases() -> list[Case]:
     """All cases of the fits."""
-    return _lines() + _corners() + _ellipses()
+    return _lines() + _covariances() + _corners() + _distances() + _ellipses()
 
 
-def _points(count: int, offset: float, length: float = 60.0, noise: float = 0.1) -> np.ndarray:
-    rng = np.random.default_rng(3)
-    t = np.linspace(0, length, count)
-    across = noise * rng.standard_normal(count)
-    return np.stack([offset + 0.8 * t - 0.6 * across, offset + 0.6 * t + 0.8 * across], -1)
+def edge_points(count: int, start: float, length: float = 60.0, noise: float = 0.1) -> EdgePoints:
+    """Points on a line of slope 0.02 in the caliper of an edge, from ``start`` px along it on."""
+    along = start + np.linspace(0, length, count)
+    offset = 0.3 + 0.02 * np.linspace(0, length, count) + noise * np.random.default_rng(3).standard_normal(count)
+    return _points(along, offset)
+
+
+def _points(along: np.ndarray, offset: np.ndarray) -> EdgePoints:
+    one = np.ones(1)
+    return EdgePoints(along[None], offset[None], np.ones((1, along.size), bool), one, np.zeros(1, bool))
 
 
 def _lines() -> list[Case]:
-    rng = np.random.default_rng(4)
-    wide = 10.0 ** rng.uniform(-6, 6, 40)
+    """The line through an edge's points, as every point estimator fits it."""
+    wide = 10.0 ** np.random.default_rng(4).uniform(-6, 6, 40)
+    nine = np.arange(9.0)
     settings = {
-        "2 points": (_points(2, 0.0), np.ones(2)),
-        "weights over 12 decades": (_points(40, 0.0), wide),
-        "line 1e6 px from the origin": (_points(40, 1e6), np.ones(40)),
-        "line 1e9 px from the origin": (_points(40, 1e9), np.ones(40)),
-        "points within 1e-6 px": (_points(40, 0.0, 1e-6, 1e-9), np.ones(40)),
-        "exactly vertical": (np.stack([np.full(9, 3.0), np.arange(9.0)], -1), np.ones(9)),
-        "exactly straight, 45 deg": (np.stack([np.arange(9.0), np.arange(9.0)], -1), np.ones(9)),
+        "2 points": (edge_points(2, 0.0), 1.0),
+        "weights over 12 decades": (edge_points(40, 0.0), wide),
+        "points 1e6 px along the edge": (edge_points(40, 1e6), 1.0),
+        "points 1e9 px along the edge": (edge_points(40, 1e9), 1.0),
+        "points within 1e-6 px": (edge_points(40, 0.0, 1e-6, 1e-9), 1.0),
+        "exactly straight, 45 deg": (_points(nine, nine), 1.0),
+        "at 89.999 deg across the edge": (_points(np.radians(1e-3) * nine, nine), 1.0),
     }
     found = []
     for name, (points, weights) in settings.items():
-        for measurand, place in (("V(line at the end) px2", "end"), ("V(angle) rad2", "tilt")):
-            ours, reference = partial(_line, points, weights, place), partial(_line_reference, points, weights, place)
+        for measurand, place in (("line at the end px", "end"), ("tilt rad", "tilt")):
+            ours, reference = partial(line, points, weights, place), partial(line_reference, points, weights, place)
             found.append(Case("fit", name, measurand, ours, reference))
-    same = np.full((5, 2), 7.0)
-    ours = partial(_line, same, np.ones(5), "tilt")
-    found.append(Case("fit", "all points equal", "V(angle) rad2", ours, lambda: Reference(None, "rule")))
+    nothing = {"all points equal": np.full(5, 7.0), "all points across the edge": nine}
+    for name, offset in nothing.items():
+        ours = partial(line, _points(np.full(offset.size, 3.0), offset), 1.0, "tilt")
+        found.append(Case("fit", name, "tilt rad", ours, lambda: Reference(None, "rule")))
     return found
 
 
-def _line(points: np.ndarray, weights: np.ndarray, place: str) -> Answer:
-    fit = fit_line(points, weights)
-    if not fit.spread > 0:
+def line(points: EdgePoints, weights: np.ndarray | float, place: str) -> Answer:
+    """Tilt of the line, or its offset beside the last point."""
+    fit = fit_lines(points, weights)
+    if not np.isfinite(fit.tilt[0]):
         return Answer(None, "ill_conditioned")
-    if place == "tilt":
-        return Answer(float(np.trace(line_covariance(fit)[:2, :2])))
-    return Answer(float(offset_variance(fit, points[-1])))
+    end = fit.mean_offset + np.tan(fit.tilt) * (points.along[:, -1] - fit.mean_along)
+    return Answer(float(fit.tilt[0] if place == "tilt" else end[0]))
 
 
-def _line_reference(points: np.ndarray, weights: np.ndarray, place: str) -> Reference:
+def line_reference(points: EdgePoints, weights: np.ndarray | float, place: str) -> Reference:
     """Principal axis by the plain formulas at 50 digits."""
     from validation.hard import precise
     from validation.hard.precise import mp, mpf
 
-    count = len(points)
+    count = points.along.size
 
     def value(numbers):
         xs, ys, ws = numbers[:count], numbers[count : 2 * count], numbers[2 * count :]
         total = sum(ws)
         mx, my = (sum(w * v for w, v in zip(ws, values, strict=True)) / total for values in (xs, ys))
-        bar = total * (count - 1) / count
         xx, yy, xy = (
-            sum(w * (a - ma) * (b - mb) for w, a, b in zip(ws, one, two, strict=True)) / bar
+            sum(w * (a - ma) * (b - mb) for w, a, b in zip(ws, one, two, strict=True))
             for one, ma, two, mb in ((xs, mx, xs, mx), (ys, my, ys, my), (xs, mx, ys, my))
         )
-        tilt = (xx + yy + count / total) / (bar * (xx + yy) ** 2)
-        angle = mp.atan2(2 * xy, xx - yy) / 2
-        along = (xs[-1] - mx) * mp.cos(angle) + (ys[-1] - my) * mp.sin(angle)
-        return tilt if place == "tilt" else (along**2 + 1 / total) * tilt + 1 / total
+        tilt = mp.atan2(2 * xy, xx - yy) / 2
+        return tilt if place == "tilt" else my + mp.tan(tilt) * (xs[-1] - mx)
 
-    numbers = [mpf(float(v)) for v in (*points[:, 0], *points[:, 1], *weights)]
+    weights = np.broadcast_to(weights, count)
+    numbers = [mpf(float(v)) for v in (*points.along[0], *points.offset[0], *weights)]
+    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+
+
+def _covariances() -> list[Case]:
+    """The line's variance from points that the smoothing correlates, as Canny's line is said to have."""
+    settings = {
+        "shortest edge: 3 points on 2 px": (np.linspace(0, 2, 3), 1.0),
+        "8 points, 1 px apart": (np.arange(8.0), 1.0),
+        "8 points 1e6 px along the edge": (1e6 + np.arange(8.0), 1.0),
+        "8 points within a fifth of the scale": (np.linspace(0, 2, 8), 10.0),
+        "8 points, 1e4 scales apart": (np.linspace(0, 7e4, 8), 1.0),
+    }
+    return [
+        Case("fit", name, "V(line at the end)", partial(_spread, *setting), partial(_spread_reference, *setting))
+        for name, setting in settings.items()
+    ]
+
+
+def _spread(along: np.ndarray, scale: float) -> Answer:
+    lever = np.array([1.0, along[-1] - along.mean()])
+    return Answer(float(lever @ unit_covariance(along, scale) @ lever))
+
+
+def _spread_reference(along: np.ndarray, scale: float) -> Reference:
+    from validation.hard import precise
+    from validation.hard.precise import mp, mpf
+
+    def value(numbers):
+        *places, smoothing = numbers
+        mean = sum(places) / len(places)
+        away = [place - mean for place in places]
+        square = sum(s * s for s in away)
+        pull = [1 / mpf(len(places)) + away[-1] * s / square for s in away]
+        return sum(
+            a * b * mp.exp(-((s - t) ** 2) / (4 * smoothing**2))
+            for a, s in zip(pull, away, strict=True)
+            for b, t in zip(pull, away, strict=True)
+        )
+
+    numbers = [mpf(float(v)) for v in (*along, scale)]
     return Reference.precise(value(numbers), precise.condition_of(value, numbers))
 
 
 def _corners() -> list[Case]:
+    """Where two lines cross: predicted, and found in the image."""
     found = []
     for degrees in (90.0, 0.01, 179.99, 1e-7):
         a = np.array([0.3, 0.3 + np.radians(degrees)])
         normals = np.stack([-np.sin(a), np.cos(a)], -1)
-        found.append(
-            Case("fit", f"edges meeting at {degrees:g} deg", "V(corner) px2", partial(_corner, normals),
-                 partial(_corner_reference, normals))
-        )  # fmt: skip
+        points = np.array([[80.0, 70.0], [80.0, 70.0]]) + 30 * np.stack([np.cos(a), np.sin(a)], -1)
+        predicted = partial(_corner, normals), partial(_corner_reference, normals)
+        found.append(Case("fit", f"edges meeting at {degrees:g} deg", "V(corner) px2", *predicted))
+        name = f"lines found that meet at {degrees:g} deg"
+        found.append(Case("fit", name, "x px", *_crossings(normals, points)))
+        response = partial(_response, normals, points), partial(_response_reference, normals, points)
+        found.append(Case("fit", name, "V(corner) px2", *response))
     parallel = np.array([[0.6, 0.8], [0.6, 0.8]])
-    found.append(
-        Case("fit", "parallel edges", "V(corner) px2", partial(_corner, parallel), lambda: Reference(None, "rule"))
-    )
-    far = np.array([[[1e6, 1e6], [1e6 + 30.0, 1e6 + 10.0]]])
-    cross = np.array([[[0.6, 0.8], [0.8, -0.6]]])
-    ours = partial(_answer, lambda: intersect(cross, far)[0][0, 0])
-    found.append(Case("fit", "corner 1e6 px from the origin", "x px", ours, partial(_crossing, cross[0], far[0])))
+    apart = np.array([[10.0, 20.0], [30.0, 70.0]])
+    nothing = Reference(None, "rule")
+    found += [
+        Case("fit", "parallel edges", "V(corner) px2", partial(_corner, parallel), lambda: nothing),
+        Case("fit", "parallel lines found", "x px", _crossings(parallel, apart)[0], lambda: nothing),
+        Case("fit", "parallel lines found", "V(corner) px2", partial(_response, parallel, apart), lambda: nothing),
+    ]
+    far = np.array([[1e6, 1e6], [1e6 + 30.0, 1e6 + 10.0]])
+    cross = np.array([[0.6, 0.8], [0.8, -0.6]])
+    found.append(Case("fit", "corner 1e6 px from the origin", "x px", *_crossings(cross, far)))
     return found
-
-
-def _answer(value: Callable[[], float]) -> Answer:
-    return Answer(float(value()))
 
 
 def _corner(normals: np.ndarray) -> Answer:
@@ -121,6 +172,16 @@ def _corner_reference(normals: np.ndarray) -> Reference:
     return Reference.precise(value(numbers), precise.condition_of(value, numbers))
 
 
+def _crossings(normals: np.ndarray, points: np.ndarray):
+    """Our crossing of two lines through points, and the reference."""
+
+    def ours() -> Answer:
+        x = float(intersect(normals[None], points[None])[0][0, 0])
+        return Answer(None, "ill_conditioned") if np.isnan(x) else Answer(x)
+
+    return ours, partial(_crossing, normals, points)
+
+
 def _crossing(normals: np.ndarray, points: np.ndarray) -> Reference:
     from validation.hard import precise
 
@@ -130,6 +191,73 @@ def _crossing(normals: np.ndarray, points: np.ndarray) -> Reference:
         return (c1 * b2 - c2 * b1) / (a1 * b2 - a2 * b1)
 
     numbers = [precise.mpf(float(x)) for x in (*normals.ravel(), *points.ravel())]
+    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+
+
+_LEVEL, _SLOPE = 0.01, 1e-6  # variance of a line's offset at its caliper's origin, px^2, and of its slope
+
+
+def _response(normals: np.ndarray, points: np.ndarray) -> Answer:
+    """The corner's variance from those of the lines in their calipers."""
+    calipers = tuple(
+        Caliper("", point, np.array([b, -a]), 60.0, np.empty(0), "ok")
+        for (a, b), point in zip(normals, points, strict=True)
+    )
+    response = corner_response(calipers, (0, 1))
+    variances = np.tile([_LEVEL, _SLOPE], 2)
+    return Answer.of(float((response**2 @ variances).sum()), "ill_conditioned")
+
+
+def _response_reference(normals: np.ndarray, points: np.ndarray) -> Reference:
+    from validation.hard import precise
+
+    def value(numbers):
+        (a1, b1), (a2, b2), p, q, (level, slope) = (numbers[i : i + 2] for i in range(0, 10, 2))
+        size = a1 * b2 - a2 * b1
+        c1, c2 = a1 * p[0] + b1 * p[1], a2 * q[0] + b2 * q[1]
+        x, y = (c1 * b2 - c2 * b1) / size, (a1 * c2 - a2 * c1) / size
+        along1, along2 = (x - p[0]) * b1 - (y - p[1]) * a1, (x - q[0]) * b2 - (y - q[1]) * a2
+        first, second = (a2**2 + b2**2) / size**2, (a1**2 + b1**2) / size**2
+        return first * (level + slope * along1**2) + second * (level + slope * along2**2)
+
+    numbers = [precise.mpf(float(x)) for x in (*normals.ravel(), *points.ravel(), _LEVEL, _SLOPE)]
+    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+
+
+_JOINT = np.diag([0.01, 0.02, 0.03, 0.04]) + 0.005  # covariance of the two ends' (x, y), px^2
+
+
+def _distances() -> list[Case]:
+    """The distance of two corners and its variance, as every measurement tells it."""
+    settings = {
+        "corners 1e-6 px apart": np.array([[80.0, 70.0], [80.0 + 6e-7, 70.0 - 8e-7]]),
+        "corners 1e6 px from the origin": np.array([[1e6, 1e6], [1e6 + 30.0, 1e6 - 40.0]]),
+        "corners on one row, 1e-12 px off it": np.array([[80.0, 1e-12], [10.0, 0.0]]),
+    }
+    return [
+        Case("fit", name, measurand, partial(_distance, ends, place), partial(_distance_reference, ends, place))
+        for name, ends in settings.items()
+        for measurand, place in (("distance px", 0), ("V(distance) px2", 1))
+    ]
+
+
+def _distance(ends: np.ndarray, place: int) -> Answer:
+    (value,), (gradient,) = separation(ends[None])
+    return Answer(float((value, gradient @ _JOINT @ gradient)[place]))
+
+
+def _distance_reference(ends: np.ndarray, place: int) -> Reference:
+    from validation.hard import precise
+
+    def value(numbers):
+        r, c = numbers[2] - numbers[0], numbers[3] - numbers[1]
+        size = precise.mp.sqrt(r * r + c * c)
+        pull = [-r / size, -c / size, r / size, c / size]
+        joint = [precise.mpf(float(v)) for v in _JOINT.ravel()]
+        variance = sum(pull[i] * joint[4 * i + j] * pull[j] for i in range(4) for j in range(4))
+        return (size, variance)[place]
+
+    numbers = [precise.mpf(float(v)) for v in ends.ravel()]
     return Reference.precise(value(numbers), precise.condition_of(value, numbers))
 
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from scenes import InvalidInput, Scene
+from mpmath import MPContext
 
-try:
-    from mpmath import MPContext
-except ImportError:
-    raise InvalidInput("mpmath must be installed for the references (pip install mpmath), got nothing") from None
+from scenes import Scene
 
 DIGITS = 50
 mp = MPContext()  # a context of its own: nobody else's precision changes

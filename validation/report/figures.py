@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-import cv2
 import matplotlib
 import numpy as np
 
@@ -13,6 +12,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 import render
+from measure.features.layout import layout_of
+from measure.features.shape import prepared
 from render.renderer import window
 from scenes import Pose, Scene
 from validation.batch.campaign import Campaign, Case
@@ -27,11 +28,12 @@ def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path)
     directory.mkdir(parents=True, exist_ok=True)
     paths = [_agreement(found, directory / "predicted_measured.png")]
     for stem, cases in _panels(campaign, store).items():
-        pictures = [_noisy(case, store, found.seed) for case in cases]
+        pictures = [(case, _noisy(case, store, found.seed)) for case in cases]
         sensor, lights = cases[0].setting.sensor, [case.setting.light for case in cases]
-        paths.append(_panel(pictures, sensor, lights, "images", (0, 255), directory / f"{stem}_images.png"))
-        edges = [255 - _edges(case.scene, picture) for case, picture in zip(cases, pictures, strict=True)]
-        paths.append(_panel(edges, sensor, lights, "edge images", (0, 255), directory / f"{stem}_edges.png"))
+        shown = [_covered(*pair) for pair in pictures]
+        paths.append(_panel(shown, sensor, lights, "images", (0, 255), directory / f"{stem}_images.png"))
+        edges = [_covered(case, ~edge_pixels(case.scene, sensor, picture)) for case, picture in pictures]
+        paths.append(_panel(edges, sensor, lights, "edge pixels of canny", (0, 1), directory / f"{stem}_edges.png"))
     return paths
 
 
@@ -52,20 +54,24 @@ def _numbers(parameters: dict) -> list[float]:
 
 
 def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
-    """One exposure of a setting, the part that the object covers."""
+    """One exposure of a setting."""
     rng = np.random.default_rng([seed, case.index])
-    picture = render.expose(store.image(case.index), case.scene.noise, rng, 1)[0]
+    return render.expose(store.image(case.index), case.scene.noise, rng, 1)[0]
+
+
+def _covered(case: Case, picture: np.ndarray) -> np.ndarray:
+    """The part of a picture that the object covers."""
     rows, columns = window(case.scene, case.setting.sensor)
     return picture[max(rows.start - 8, 0) : rows.stop + 8, max(columns.start - 8, 0) : columns.stop + 8]
 
 
-def _edges(scene: Scene, picture: np.ndarray) -> np.ndarray:
-    """Canny's edge pixels (255) at the paper's first threshold."""
-    smooth = cv2.GaussianBlur(picture, (0, 0), scene.locator.scale_px)
-    dx, dy = (cv2.Scharr(smooth, cv2.CV_64F, *axis) / 32 for axis in ((1, 0), (0, 1)))
-    fixed = [np.clip(np.rint(64 * g), -32767, 32767).astype(np.int16) for g in (dx, dy)]
-    limit = 64 * scene.locator.thresholds[0]
-    return cv2.Canny(*fixed, limit, limit, L2gradient=True)
+def edge_pixels(scene: Scene, sensor: Pose, picture: np.ndarray) -> np.ndarray:
+    """The pixels, bool, from which the estimator ``canny`` makes its edge points at the scene's first threshold."""
+    tool = prepared(layout_of(scene, sensor), "canny", scene.locator.thresholds[0])
+    found = np.zeros(picture.shape, bool)
+    for locator in (part.locator for part in tool.parts if part):
+        found[locator.rows, locator.columns] |= locator.edge_pixels(*locator.gradient(picture))
+    return found
 
 
 def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[float, float], path: Path) -> Path:

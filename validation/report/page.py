@@ -84,7 +84,7 @@ def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Sec
             sections.append(Section("Settings without a result", [_refused(found)]))
         sections.append(Section("What it cost", [], [_time(found, folder)]))
         sections.append(Section("The run", [_facts(found, store)]))
-        sections.append(Section("Images and edge images", [], [_images(path) for path in drawn[1:]]))
+        sections.append(Section("Images and edge pixels", [], [_images(path) for path in drawn[1:]]))
     return sections
 
 
@@ -215,7 +215,7 @@ def _time(found: Validation, folder: Path) -> Picture:
 
 def _images(path: Path) -> Picture:
     parts = path.stem.split("_")
-    kind = {"images": "Images", "edges": "Canny's edge images"}[parts[-1]]
+    kind = {"images": "Images", "edges": "Edge pixels of canny"}[parts[-1]]
     text = (
         f"{kind} from sensor ({parts[1]}, {parts[2]}), one a light{': ' if parts[3:-1] else ''}{' '.join(parts[3:-1])}"
     )

@@ -1,0 +1,144 @@
+"""A plan's best settings, rendered: what the pictures say of their order, and whether noisy pictures bear it out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import measure
+import planner
+import render
+import scenes
+from render import Quality
+from scenes import Pose
+from validation.plan_check import CheckedSetting, PlanCheck, _judged, check_plan
+from validation.statistics import p_value
+
+QUICK = Quality(samples=1, edge_samples=16, random_samples=4)
+IMAGES = 400
+
+
+@pytest.fixture(scope="module")
+def bracket():
+    """The bracket's plan with the light held: its surfaces light each other, which no formula knows."""
+    plan = planner.plan(scenes.load("bracket"), light=(30, 0), step_deg=20)
+    return plan, check_plan(plan, 5, QUICK)
+
+
+@pytest.mark.render
+def test_another_order_where_surfaces_light_each_other(bracket):
+    plan, found = bracket
+    assert (found.settings[0].sensor, found.settings[0].light) == plan.poses
+    assert len({row.sensor for row in found.settings}) == len(found.settings) == 5
+    assert [row.rank_before for row in found.settings] == [1, 2, 3, 4, 5]
+    assert found.order_changed
+    assert found.proposed.status == "ok"
+    assert found.proposed.rank_before != 1
+    assert found.without_formula == ("interreflection",)
+    assert found.seconds > 0
+
+
+def scattered(plan, row) -> np.ndarray:
+    """Distances measured in noisy pictures of a setting, in the object: cm by the scale of the two predictions."""
+    image = render.image(plan.scene, row.sensor, row.light, QUICK)
+    pictures = render.expose(image, plan.scene.noise, np.random.default_rng(5), IMAGES)
+    values = measure.distance(pictures, plan.scene, row.sensor).value_px
+    predicted = planner.predict(plan.scene, row.sensor, row.light)
+    return values[np.isfinite(values)] * np.sqrt(predicted.variance_object / predicted.variance_image)
+
+
+@pytest.mark.render
+def test_noisy_pictures_bear_the_new_order_out(bracket):
+    """Of the pair whose order turns most, 400 noisy pictures each: the F-test refuses the plan's order at 0.1 %."""
+    plan, found = bracket
+    rows = [row for row in found.settings if row.rank_after]
+    pairs = [(a, b) for a in rows for b in rows if a.rank_before < b.rank_before]
+    worse, better = max(pairs, key=lambda pair: pair[0].propagated / pair[1].propagated)
+    first, second = scattered(plan, worse), scattered(plan, better)
+    assert worse.calibrated < better.calibrated
+    assert stats.f.sf(first.var(ddof=1) / second.var(ddof=1), first.size - 1, second.size - 1) < 1e-3
+
+
+@pytest.mark.render
+def test_the_picture_is_right_where_the_formula_is_not(bracket):
+    """The proposed setting's 400 noisy pictures scatter as propagated says (0.1 %), and not as calibrated says."""
+    plan, found = bracket
+    scatter = scattered(plan, found.proposed).var(ddof=1)
+    assert p_value(scatter / found.proposed.propagated, IMAGES) > 1e-3
+    assert p_value(scatter / found.proposed.calibrated, IMAGES) < 1e-3
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("objective", ["object", "image"])
+def test_the_same_order_where_the_formulas_know_all(task1, objective):
+    """Task1's candidates are further apart than a render's 2 %: nothing changes, and prediction and picture agree."""
+    plan = planner.plan(task1, objective, light=(12, 32), step_deg=20)
+    found = check_plan(plan, 3, QUICK)
+    variances = [row.calibrated for row in found.settings]
+    assert (np.diff(variances) > 0.03 * np.array(variances[:-1])).all(), "choose another step: candidates too near"
+    assert found.order_changed is False
+    assert found.proposed == found.settings[0]
+    assert found.without_formula == ()
+    assert variances[0] == pytest.approx(plan.variance)
+    assert [row.ratio for row in found.settings] == pytest.approx([1, 1, 1], abs=0.03)
+
+
+def test_what_cannot_be_measured_is_said():
+    """The plate's task is a hole's centre, which no picture is measured for: nothing is rendered."""
+    found = check_plan(planner.plan(scenes.load("plate"), sensor=(30, 0), light=(0, 0)))
+    assert (found.settings, found.proposed, found.order_changed) == ((), None, None)
+    assert "task must be a distance between two corners" in found.reason
+
+
+def test_best_of_other_edges_is_measured_with_those(task1):
+    """With ``edges="best"`` a candidate is measured by its own required edges."""
+    plan = planner.plan(task1, edges="best", sensor=(30, 135), light=(15, 315))
+    other = next(task for task in planner.required_edges(task1) if task.edges != plan.scene.task.edges)
+    candidate = replace(plan.candidates[0], sensor=Pose(45, 135), edges=other.edges)
+    found = check_plan(replace(plan, candidates=(candidate,)), 2, QUICK)
+    assert found.settings[1].edges == other.edges
+    scene = task1.model_copy(update={"task": other})
+    assert found.settings[1].calibrated == planner.predict(scene, (45, 135), (15, 315)).variance_object
+
+
+def rows(*settings: tuple[float, float, str]) -> list[CheckedSetting]:
+    pose = Pose(30, 40)
+    return [
+        CheckedSetting(pose, pose, ("e1",), before, after, state, (), rank)
+        for rank, (before, after, state) in enumerate(settings, 1)
+    ]
+
+
+def ranks(found: PlanCheck) -> list[int | None]:
+    return [row.rank_after for row in found.settings]
+
+
+INF = float("inf")
+
+
+def test_ok_comes_before_clutter():
+    found = _judged(rows((1, 1, "clutter"), (2, 3, "ok"), (3, 2, "ok"), (4, INF, "low_contrast")), "", 1.0)
+    assert ranks(found) == [3, 2, 1, None]
+    assert found.proposed is found.settings[2]
+    assert found.order_changed
+
+
+def test_clutter_is_proposed_where_there_is_nothing_else():
+    found = _judged(rows((1, INF, "not_visible"), (2, 2, "clutter")), "", 1.0)
+    assert ranks(found) == [None, 1]
+    assert found.proposed is found.settings[1]
+    assert found.settings[0].ratio is None
+    assert found.order_changed
+
+
+def test_an_unmeasurable_last_one_changes_no_order():
+    found = _judged(rows((1, 1.1, "ok"), (2, 2.2, "ok"), (3, INF, "short")), "", 1.0)
+    assert ranks(found) == [1, 2, None]
+    assert found.order_changed is False
+
+
+def test_nothing_measurable_proposes_nothing():
+    found = _judged(rows((1, INF, "short"), (2, INF, "low_contrast")), "", 1.0)
+    assert (found.proposed, found.order_changed) == (None, None)
+    assert found.reason == "none of the 2 pictures can be measured (low_contrast, short)"

@@ -1,0 +1,47 @@
+"""What the program imports is what its installation brings: nothing of the tests, of their tools, or by accident."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+OURS = ("scenes", "planner", "render", "measure", "validation")
+OPTIONAL = {"distributed": "dask", "pyarrow": "pyarrow"}  # extras, imported only where they are asked for
+
+
+def imported(file: Path) -> set[str]:
+    """Top-level packages that a file imports anywhere."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def name(requirement: str) -> str:
+    return re.split(r"[\[<>=!~ ]", requirement)[0].lower()
+
+
+@pytest.mark.parametrize("package", OURS)
+def test_a_package_needs_no_extra(package):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    core = {name(requirement) for requirement in project["dependencies"]}
+    known = packages_distributions()
+    for file in (ROOT / package).rglob("*.py"):
+        for module in imported(file) - set(OURS) - set(OPTIONAL) - sys.stdlib_module_names:
+            assert core & {dist.lower() for dist in known.get(module, ())}, f"{file} imports {module}"
+
+
+def test_it_would_be_seen(tmp_path):
+    """Negative control: imports within functions count, and the test extra's packages are no core dependencies."""
+    (tmp_path / "a.py").write_text("def f():\n    from hypothesis import given\n    import tests.oracle\n")
+    assert imported(tmp_path / "a.py") == {"hypothesis", "tests"}
+    assert "hypothesis" not in {name(r) for r in ("numpy>=2.0,<3", "threadpoolctl>=3.5")}
+    assert name("ice-vision[dask]") == "ice-vision"

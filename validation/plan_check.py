@@ -1,0 +1,189 @@
+"""Do the best settings of a plan stay the best in a picture? Each is rendered, and the picture tells its variance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import measure
+import planner
+import render
+from measure import status
+from render import Quality, Tolerance
+from scenes import InvalidInput, Picture, Pose, Scene
+
+ESTIMATOR = "gradient"  # whose closed form the calibrated model is
+_SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
+
+
+@dataclass(frozen=True)
+class CheckedSetting:
+    """A setting of the plan beside what its noise-free picture says.
+
+    Attributes
+    ----------
+    sensor, light : Pose
+    edges : tuple of str
+        Required edges.
+    calibrated, propagated : float
+        Predicted variance (not sigma) without and with the picture, in the plan's unit (cm^2 or px^2); infinite where
+        it cannot be measured.
+    status : str
+        Of the measurement of the noise-free picture.
+    without_formula : tuple of str
+        Effects that were simulated there and that no formula of the planner knows.
+    rank_before : int
+        Place in the plan, from 1.
+    rank_after : int or None
+        Place by the picture: what is ``ok`` comes first; None where nothing can be measured.
+    """
+
+    sensor: Pose
+    light: Pose
+    edges: tuple[str, ...]
+    calibrated: float
+    propagated: float
+    status: str
+    without_formula: tuple[str, ...]
+    rank_before: int
+    rank_after: int | None = None
+
+    @property
+    def ratio(self) -> float | None:
+        """propagated / calibrated; None where one of them is infinite."""
+        known = np.isfinite([self.propagated, self.calibrated]).all()
+        return self.propagated / self.calibrated if known else None
+
+
+@dataclass(frozen=True)
+class PlanCheck:
+    """The best settings of a plan, in the plan's order, measured.
+
+    Attributes
+    ----------
+    settings : tuple of CheckedSetting
+        The plan itself first.
+    proposed : CheckedSetting or None
+        The best by the picture; None where nothing can be measured.
+    order_changed : bool or None
+        Whether the pictures put the settings into another order; None where nothing can be measured.
+    reason : str
+        Why nothing can be measured.
+    seconds : float
+        What rendering and measuring took.
+    """
+
+    settings: tuple[CheckedSetting, ...]
+    proposed: CheckedSetting | None
+    order_changed: bool | None
+    reason: str
+    seconds: float
+
+    @property
+    def without_formula(self) -> tuple[str, ...]:
+        """Effects of any of the settings that no formula of the planner knows."""
+        return tuple(dict.fromkeys(name for row in self.settings for name in row.without_formula))
+
+
+def check_plan(
+    found: planner.Plan,
+    count: int = 10,
+    quality: Quality = Quality(),
+    report: Callable[[str, int, int], None] = lambda *_: None,
+) -> PlanCheck:
+    """Render the best settings of a plan and predict their variances from the noise-free pictures.
+
+    As `ice validate` measures: by the estimator ``gradient``, which is not told where the light is.
+
+    Parameters
+    ----------
+    found : Plan
+    count : int
+        How many settings at most: the plan's own, then its candidates from other places.
+    quality : Quality
+        Rays a pixel.
+    report : callable, optional
+        Called with what is done, how many are done, and of how many.
+
+    Raises
+    ------
+    InvalidInput
+        If ``count`` is less than 1.
+    """
+    if count < 1:
+        raise InvalidInput(f"check must be at least 1, got {count}")
+    began, rows, reason = time.perf_counter(), [], ""
+    settings = _best(found)[:count]
+    try:
+        measure.region_of_interest(found.scene, found.sensor, estimators=(ESTIMATOR,))  # measurable, before it costs
+        for done, setting in enumerate(settings):
+            report("settings", done, len(settings))
+            rows.append(_checked(found, *setting, rank=done + 1, quality=quality))
+        report("settings", len(settings), len(settings))
+    except InvalidInput as error:
+        rows, reason = [], str(error)
+    return _judged(rows, reason, time.perf_counter() - began)
+
+
+def _best(found: planner.Plan) -> list[tuple[Pose, Pose, tuple[str, ...]]]:
+    """The plan, and its candidates from other places, the best first."""
+    here = found.sensor, found.light, found.scene.task.edges
+    others = [(c.sensor, c.light, c.edges) for c in found.candidates]
+    return [here, *(other for other in others if not _same(here, other))]
+
+
+def _same(first: tuple, second: tuple) -> bool:
+    """Whether sensors and lights stand nearly in the same place."""
+    return all(_angle(a, b) < _SAME for a, b in zip(first[:2], second[:2], strict=True))
+
+
+def _angle(first: Pose, second: Pose) -> float:
+    """Angle between two directions, degrees."""
+    (p, a), (q, b) = np.radians(list(first)), np.radians(list(second))
+    return float(np.degrees(np.arccos(np.clip(np.sin(p) * np.sin(q) * np.cos(a - b) + np.cos(p) * np.cos(q), -1, 1))))
+
+
+def _checked(
+    found: planner.Plan, sensor: Pose, light: Pose, edges: tuple[str, ...], rank: int, quality: Quality
+) -> CheckedSetting:
+    scene = _with_edges(found.scene, edges)
+    picture = render.image(scene, sensor, light, quality)
+    measured = measure.propagate(picture, scene, sensor, None, ESTIMATOR)
+    planned, calibrated = (planner.predict(scene, sensor, light, model) for model in (found.model, "calibrated"))
+    to_unit = planned.variance_object / planned.variance_image if found.objective == "object" else 1.0
+    chosen = render.choose(scene, "auto", Tolerance(), Picture.of(scene, sensor, light))
+    return CheckedSetting(
+        sensor=sensor,
+        light=light,
+        edges=edges,
+        calibrated=calibrated.variance_object if found.objective == "object" else calibrated.variance_image,
+        propagated=measured.variance_px2 * to_unit,
+        status=measured.status,
+        without_formula=tuple(d.effect.name for d in chosen.decisions if d.on and not d.effect.has_formula),
+        rank_before=rank,
+    )
+
+
+def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:
+    """The scene with the task that measures the same by other edges."""
+    if edges == scene.task.edges:
+        return scene
+    task = next(task for task in planner.required_edges(scene) if task.edges == edges)
+    return scene.model_copy(update={"task": task})
+
+
+def _judged(rows: list[CheckedSetting], reason: str, seconds: float) -> PlanCheck:
+    """Places by the pictures: ``ok`` first, then what is doubtful, by variance; what cannot be measured has none."""
+    order = sorted(range(len(rows)), key=lambda i: (np.isinf(rows[i].propagated), rows[i].status != status.OK,
+                                                    rows[i].propagated))  # fmt: skip
+    ranked = [
+        replace(row, rank_after=None if np.isinf(row.propagated) else order.index(i) + 1) for i, row in enumerate(rows)
+    ]
+    proposed = next((row for row in ranked if row.rank_after == 1), None)
+    if rows and proposed is None:
+        reason = f"none of the {len(rows)} pictures can be measured ({', '.join(sorted({r.status for r in rows}))})"
+    changed = None if proposed is None else order != sorted(order)
+    return PlanCheck(tuple(ranked), proposed, changed, reason, seconds)

@@ -1,0 +1,160 @@
+"""What ``ice plan`` prints."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+import planner
+from render import Tolerance
+from scenes import Pose
+from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
+
+
+def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float) -> Group:
+    """Plan, trace, candidates, what rendering them says, and the robust plan."""
+    units = _units(found)
+    parts = [Text(_head(found, units, seconds))]
+    if found.trace:
+        parts.append(_trace(found, units))
+    parts.append(_candidates(found, units))
+    if checked:
+        parts.append(_checked(found, checked))
+    if safe:
+        parts.append(_robust(safe))
+    return Group(*parts)
+
+
+def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
+    """The best setting, what it gives, and what is known of it."""
+    p, edges = found.prediction, " ".join(found.scene.task.edges)
+    return (
+        f"{found.scene.title or found.scene.name}\n"
+        f"Best {found.objective} variance ({found.model} model), required edges {edges}:\n"
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}\n"
+        f"  standard deviation {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]},"
+        f" {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]} in the image\n"
+        f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one\n"
+        f"  Guarantee: {found.guarantee}."
+    )
+
+
+def _units(found: planner.Plan) -> tuple[str, str]:
+    """Of the measurand in the object and in the image."""
+    return ("cm", "px") if found.prediction.kind == "distance" else ("degrees", "degrees")
+
+
+def _trace(found: planner.Plan, units: tuple[str, str]) -> Table:
+    unit = units[0] if found.objective == "object" else units[1]
+    gap = "" if found.gap is None else f", {100 * found.gap:.1f} % above the best"
+    table = _table(f"\nAlternating search{gap}", "fixed", "", "found", "", f"variance, {unit}^2")
+    for step in found.trace:
+        row = step.fixed, _pose(step.fixed_pose), step.found, _pose(step.found_pose), f"{step.variance:.4g}"
+        table.add_row(*row)
+    return table
+
+
+def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
+    names = (f"object, 1e-6 {units[0]}^2", f"image, 1e-6 {units[1]}^2")
+    table = _table("\nClearly different settings, the best first", "sensor", "light", "edges", *names, "over best")
+    best = found.candidates[0]
+    for c in found.candidates:
+        ratio = c.variance_object / best.variance_object
+        if found.objective == "image":
+            ratio = c.variance_image / best.variance_image
+        values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
+        table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
+    return table
+
+
+def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
+    """The rendered settings, and what follows from them."""
+    if checked.proposed is None:
+        lines = [f"\nNot checked by rendering: {checked.reason}."]
+        return Group(*([_checked_table(found, checked)] if checked.settings else []), Text("\n".join(lines)))
+    lines = [_order(checked), _proposal(checked)]
+    if checked.without_formula:
+        many = sum(bool(row.without_formula) for row in checked.settings)
+        names = ", ".join(checked.without_formula)
+        lines.append(f"  Without a formula, so that only the pictures know: {names} (in {many} of them).")
+    lines.append(f"  The check took {checked.seconds:.1f} s (--no-check leaves it out).")
+    return Group(_checked_table(found, checked), Text("\n".join(lines)))
+
+
+def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
+    unit = f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
+    columns = (
+        "place",
+        "now",
+        "sensor",
+        "light",
+        f"calibrated, {unit}",
+        "propagated",
+        "ratio",
+        "status",
+        "not in formulas",
+    )
+    table = _table(f"\nThe best settings rendered, and measured by {ESTIMATOR}", *columns)
+    for row in checked.settings:
+        values = (f"{1e6 * value:.4g}" if math.isfinite(value) else "-" for value in (row.calibrated, row.propagated))
+        now = "-" if row.rank_after is None else str(row.rank_after)
+        ratio = "-" if row.ratio is None else f"{row.ratio:.3f}"
+        names = ", ".join(row.without_formula)
+        table.add_row(str(row.rank_before), now, _pose(row.sensor), _pose(row.light), *values, ratio, row.status, names)
+    return table
+
+
+def _order(checked: PlanCheck) -> str:
+    if not checked.order_changed:
+        return "  The order did not change."
+    moved = sum(row.rank_after != row.rank_before for row in checked.settings)
+    return f"  The order changed: {moved} of {len(checked.settings)} settings have another place."
+
+
+def _proposal(checked: PlanCheck) -> str:
+    best, plan = checked.proposed, checked.settings[0]
+    if best.rank_before == 1:
+        return f"  Proposed: the plan above, {best.status}."
+    return f"  Proposed: sensor {_pose(best.sensor)}, light {_pose(best.light)}, {best.status}: {_gain(best, plan)}."
+
+
+def _gain(best: CheckedSetting, plan: CheckedSetting) -> str:
+    """What the proposal gains over the plan, in words."""
+    if plan.rank_after is None:
+        return f"the plan's picture cannot be measured ({plan.status})"
+    change = best.propagated / plan.propagated - 1
+    if plan.status != best.status:
+        return f"{100 * change:+.1f} % variance, but the plan's picture is {plan.status}"
+    small = f", less than effects that are left out may matter ({100 * Tolerance().variance:g} %)"
+    return f"{100 * change:+.1f} % variance{small if -change < Tolerance().variance else ''}"
+
+
+def _robust(safe: planner.Robust) -> Group:
+    against = f"{100 * (safe.worst / safe.plan_worst - 1):+.1f} % against" if safe.plan_worst < float("inf") else "not"
+    text = (
+        f"\nRobust plan: sensor {_pose(safe.sensor)}, light {_pose(safe.light)}: variance {safe.nominal:.4g}, at worst"
+        f" {safe.worst:.4g} in {safe.cases} cases\n"
+    )
+    text += (
+        f"  {against} the plan above" if against != "not" else "  (the plan above cannot be measured in its worst case)"
+    )
+    title = "\nHow the plan's optimum moves if one input is off"
+    table = _table(title, "input", "factor", "variance there", "at the new best", "sensor, deg", "light, deg")
+    for m in safe.moves:
+        row = f"{m.factor:.3g}", f"{m.variance:.4f}", f"{m.best:.4f}", f"{m.sensor_deg:.2f}", f"{m.light_deg:.2f}"
+        table.add_row(m.input, *row)
+    return Group(Text(text), table) if safe.moves else Group(Text(text))
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def _pose(pose: Pose) -> str:
+    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
