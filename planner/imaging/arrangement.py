@@ -7,6 +7,7 @@ recorded coordinates, those of the pixels. `planner.imaging.blurred` makes the i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,7 @@ BACKGROUND = 0  # the region outside everything
 _DEGREE = 4  # of the polynomial that a known shading is told by
 _GRID = np.linspace(0.02, 0.98, 7)
 _CURVED = 30.0  # px: faces larger than this may shade quadratically where the light is not known
+_OUTSIDE = 2.0  # reaches from the middle, beyond which a level is held: it counts for nothing there
 _FAINT = 1e-6  # of the brightest signal: a face below is dark
 
 
@@ -54,22 +56,23 @@ class Region:
 
     def basis(self, points: np.ndarray) -> np.ndarray:
         """Basis functions of the level at recorded places (n, 2), shape (count, n)."""
-        x, y = ((points - self.middle) / self.reach).T
-        return _terms(x, y, self.order) * self._shade(x, y)
+        terms = self._terms(points)
+        return terms[: self.count] * (self.shade @ terms[: self.shade.size])
 
     def slope(self, points: np.ndarray) -> np.ndarray:
         """Their derivatives by x and y, grey levels a px, shape (count, 2, n)."""
-        x, y = ((points - self.middle) / self.reach).T
-        free, known = _terms(x, y, self.order), self._shade(x, y)
-        degree = _degree(self.shade.size)
-        slopes = [
-            d_free * known + free * (self.shade @ d_known)
-            for d_free, d_known in zip(_derivatives(x, y, self.order), _derivatives(x, y, degree), strict=True)
-        ]
+        terms = self._terms(points)
+        known, free = self.shade @ terms[: self.shade.size], terms[: self.count]
+        slopes = []
+        for axis in (0, 1):
+            d_known = self.shade @ _derivatives(self.shade.size, axis) @ terms[: self.shade.size]
+            d_free = _derivatives(self.count, axis) @ free
+            slopes.append(d_free * known + free * d_known)
         return np.stack(slopes, 1) / self.reach
 
-    def _shade(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return self.shade @ _terms(x, y, _degree(self.shade.size))
+    def _terms(self, points: np.ndarray) -> np.ndarray:
+        x, y = np.clip((points - self.middle) / self.reach, -_OUTSIDE, _OUTSIDE).T
+        return _terms(x, y, max(_degree(self.shade.size), self.order))
 
     @classmethod
     def flat(cls, points: np.ndarray, order: int) -> Region:
@@ -257,12 +260,65 @@ def _powers(degree: int) -> list[tuple[int, int]]:
 
 def _terms(x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
     """x^i y^j for i + j <= degree, the lowest first, shape (terms, n)."""
-    return np.stack([x**i * y**j for i, j in _powers(degree)])
+    found = np.empty(((degree + 1) * (degree + 2) // 2, x.size))
+    found[0], first = 1.0, 0
+    for total in range(1, degree + 1):
+        found[first + total : first + 2 * total] = found[first : first + total] * x
+        found[first + 2 * total] = found[first + total - 1] * y
+        first += total
+    return found
 
 
-def _derivatives(x: np.ndarray, y: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of `_terms` by x and by y."""
-    zero = np.zeros_like(x)
-    by_x = np.stack([i * x ** (i - 1) * y**j if i else zero for i, j in _powers(degree)])
-    by_y = np.stack([j * x**i * y ** (j - 1) if j else zero for i, j in _powers(degree)])
-    return by_x, by_y
+@lru_cache(maxsize=32)
+def _derivatives(count: int, axis: int) -> np.ndarray:
+    """Matrix (count, count) that makes of the `_terms` their derivatives by x (axis 0) or y."""
+    powers = _powers(_degree(count))
+    matrix = np.zeros((count, count))
+    for k, pair in enumerate(powers):
+        if pair[axis]:
+            matrix[k, powers.index((pair[0] - (axis == 0), pair[1] - (axis == 1)))] = pair[axis]
+    return matrix
+
+
+def near_pixels(arrangement: Arrangement, shape: tuple[int, int], reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels (y, x) of an image (height, width) within ``reach`` px of a required edge as it is recorded."""
+    wanted = np.zeros(shape, bool)
+    for start, stop in _segments(arrangement, arrangement.required[arrangement.required[:, 0] >= 0]):
+        low = np.floor(np.minimum(start, stop) - reach)
+        high = np.ceil(np.maximum(start, stop) + reach) + 1
+        if not np.isfinite([low, high]).all():
+            continue
+        (left, top), (right, bottom) = (np.clip(v, 0, shape[::-1]).astype(int) for v in (low, high))
+        y, x = np.mgrid[top:bottom, left:right]
+        wanted[top:bottom, left:right] |= _distance(np.stack([x, y], -1), start, stop) <= reach
+    return np.nonzero(wanted)
+
+
+def near_vertices(arrangement: Arrangement, reach: float) -> np.ndarray:
+    """Vertices of all pieces that come within ``reach`` px of a required edge, sorted."""
+    required = [pair for pair in arrangement.required if pair[0] >= 0]
+    found = set()
+    for piece in arrangement.pieces:
+        start, stop = arrangement.vertices[piece]
+        points = start + np.linspace(0, 1, 33)[:, None] * (stop - start)
+        near = (_distance(points, *arrangement.vertices[pair]).min() <= reach for pair in required)
+        if any(near):
+            found |= set(piece.tolist())
+    return np.array(sorted(found), int)
+
+
+def _segments(arrangement: Arrangement, pairs: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Recorded pieces of the lines between pairs of vertices, short enough to be straight."""
+    t = np.linspace(0, 1, 2 if arrangement.camera is None else 9)[:, None]
+    found = []
+    for a, b in pairs:
+        start, stop = arrangement.vertices[[a, b]]
+        found += list(pairwise(arrangement.recorded(start + t * (stop - start))))
+    return found
+
+
+def _distance(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """Distance of points (..., 2) from a segment, px."""
+    along = stop - start
+    fraction = np.clip((points - start) @ along / max(float(along @ along), np.finfo(float).tiny), 0, 1)
+    return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)
