@@ -280,10 +280,16 @@ def _derivatives(count: int, axis: int) -> np.ndarray:
     return matrix
 
 
-def near_pixels(arrangement: Arrangement, shape: tuple[int, int], reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (y, x) of an image (height, width) within ``reach`` px of a required edge as it is recorded."""
+def near_pixels(
+    arrangement: Arrangement, shape: tuple[int, int], reach: float, pairs: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels (y, x) of an image (height, width) within ``reach`` px of lines between pairs of vertices as recorded.
+
+    The pairs are those of the required edges where none are given.
+    """
     wanted = np.zeros(shape, bool)
-    for start, stop in _segments(arrangement, arrangement.required[arrangement.required[:, 0] >= 0]):
+    pairs = arrangement.required[arrangement.required[:, 0] >= 0] if pairs is None else pairs
+    for start, stop in _segments(arrangement, pairs):
         low = np.floor(np.minimum(start, stop) - reach)
         high = np.ceil(np.maximum(start, stop) + reach) + 1
         if not np.isfinite([low, high]).all():

@@ -193,6 +193,16 @@ class BlurredModel:
             kernels.append(edges[:, :-1] - edges[:, 1:])
         return Kernels(kernels[0], kernels[1], first[:, 0], first[:, 1], place, traced.blur)
 
+    def slots(self, kernels: Kernels) -> np.ndarray:
+        """Number of the pixel at each place of each node's window, P where there is none, (n, w, w)."""
+        left, top, width, height = self._window
+        steps = np.arange(kernels.x.shape[1])
+        row, column = kernels.row[:, None] - top + steps, kernels.column[:, None] - left + steps
+        row = np.where((row >= 0) & (row < height), row * width, width * height)
+        inside = (column >= 0) & (column < width)
+        place = np.where(inside[:, None, :], row[:, :, None] + column[:, None, :], width * height)
+        return self._slots[np.minimum(place, width * height)]
+
     def image(self, state: State) -> np.ndarray:
         """Expected grey levels above darkness, shape (P,)."""
         return self.evaluate(state, derivatives=False)[0]
@@ -317,13 +327,7 @@ class Scatter:
 
     @classmethod
     def of(cls, model: BlurredModel, kernels: Kernels) -> Scatter:
-        left, top, width, height = model._window
-        steps = np.arange(kernels.x.shape[1])
-        row, column = kernels.row[:, None] - top + steps, kernels.column[:, None] - left + steps
-        row = np.where((row >= 0) & (row < height), row * width, width * height)
-        inside = (column >= 0) & (column < width)
-        place = np.where(inside[:, None, :], row[:, :, None] + column[:, None, :], width * height)
-        slot = model._slots[np.minimum(place, width * height)]
+        slot = model.slots(kernels)
         return cls(slot, kernels.y[:, :, None] * kernels.x[:, None, :], model.nodes.piece, model.x.size)
 
     def by_piece(self, weight: np.ndarray, count: int) -> np.ndarray:

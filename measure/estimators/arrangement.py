@@ -1,0 +1,274 @@
+"""Maximum likelihood of all visible faces around the required edges together.
+
+Unknown are the image positions of all vertices near the required edges, a level on each face, the background and the
+blur; `planner.imaging.blurred` says what image they make. From the expected place Fisher scoring climbs to the
+likelihood's maximum, with the model evaluated anew at each step. Other images of the same stack are solved around the
+place found for one of them, to where an expansion of fourth order holds (`measure.estimators.expansion`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from measure.estimators.expansion import Expansion, Pieces
+from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
+from planner.imaging.blurred import BlurredModel, State
+from planner.imaging.sensor import recorded
+from planner.models.bound import response
+from scenes import Noise
+
+REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
+FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
+_STEPS = 30
+_STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
+_SETTLED = 1e-4  # of a standard deviation
+_FREE = 1e3  # px: a standard deviation at which nothing is known
+_BLUR_KNOWN = 0.3  # of the blur: how well it is known before
+_VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
+_BATCH = 40  # images at a time, so that they stay in the processor's cache
+_ROUNDS = 4  # expansions before each image is measured alone
+
+
+class Fit(NamedTuple):
+    """The likelihood's maximum in one image.
+
+    Attributes
+    ----------
+    state : State
+    inverse : ndarray, shape (q, q)
+        Of the information on the parameters.
+    cost : float
+        Chi-square and what the parameters' distance from what was known before adds.
+    settled : bool
+        Whether the steps ended.
+    """
+
+    state: State
+    inverse: np.ndarray
+    cost: float
+    settled: bool
+
+
+class Found(NamedTuple):
+    """Most likely parameters in n images.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, V, 2)
+    levels : ndarray, shape (n, L)
+    blur : ndarray, shape (n,)
+    near, far : ndarray, shape (n,)
+        Chi-square near the pieces and elsewhere.
+    centre : ndarray of int, shape (n,)
+        Which of ``centres`` was expanded about.
+    settled : ndarray of bool, shape (n,)
+    centres : tuple of Centre
+    """
+
+    vertices: np.ndarray
+    levels: np.ndarray
+    blur: np.ndarray
+    near: np.ndarray
+    far: np.ndarray
+    centre: np.ndarray
+    settled: np.ndarray
+    centres: tuple[Centre, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A state with what images near it need.
+
+    Attributes
+    ----------
+    state : State
+    expansion : Expansion
+    covariance : ndarray, shape (q, q)
+        Of the parameters' errors.
+    bias : ndarray, shape (q,)
+        Mean of the parameters' errors, second order.
+    freedom : tuple of float
+        Degrees of freedom near the pieces and elsewhere.
+    """
+
+    state: State
+    expansion: Expansion
+    covariance: np.ndarray
+    bias: np.ndarray
+    freedom: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class ArrangementEstimator:
+    """Prepared for one expected arrangement in images of one shape.
+
+    Attributes
+    ----------
+    arrangement : Arrangement
+    shape : tuple of int
+        (height, width).
+    noise : Noise
+    """
+
+    arrangement: Arrangement
+    shape: tuple[int, int]
+    noise: Noise
+
+    @cached_property
+    def model(self) -> BlurredModel:
+        """The image at the pixels near the required edges."""
+        y, x = near_pixels(self.arrangement, self.shape, REACH)
+        return BlurredModel(
+            self.arrangement, x, y, near_vertices(self.arrangement, REACH + 6 * self.arrangement.blur_px)
+        )
+
+    @cached_property
+    def pixels(self) -> np.ndarray:
+        """Flat indices of the pixels that it looks at."""
+        return self.model.y * self.shape[1] + self.model.x
+
+    @cached_property
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Precision and mean of what is known of (vertices, levels, blur) before, both (q,)."""
+        model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
+        precision = [np.full(2 * model.free.size, _FREE**-2)]
+        mean = [self.arrangement.vertices[model.free].ravel()]
+        for region in self.arrangement.regions:
+            precision.append(np.full(region.count, 1.0 if region.known else (1e4 * sigma) ** -2))
+            mean.append(np.eye(region.count)[0] * region.known)
+        blur = self.model.start().blur
+        return np.concatenate([*precision, [(_BLUR_KNOWN * blur) ** -2]]), np.concatenate([*mean, [blur]])
+
+    def parameters(self, state: State) -> np.ndarray:
+        """All parameters as one array (q,)."""
+        return np.concatenate([state.vertices[self.model.free].ravel(), state.levels, [state.blur]])
+
+    def taken(self, images: np.ndarray, order: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """The used pixels of images (n, height, width), above darkness, (n, P)."""
+        return np.take(images.reshape(len(images), -1), self.pixels[order], 1) - self.noise.dark_level
+
+    def expected(self, state: State, derivatives: bool = True):
+        """Recorded level above darkness, weighted by one over the noise's variance; (P,), (P,), (P,), (P, q)."""
+        image, jacobian = self.model.evaluate(state, derivatives)
+        gain, variance = response(self.noise, image)
+        return self._recorded(image), 1 / variance, gain, jacobian
+
+    def _recorded(self, image: np.ndarray) -> np.ndarray:
+        return recorded(self.noise, image + self.noise.dark_level).level - self.noise.dark_level
+
+    def start(self, used: np.ndarray) -> State:
+        """The expected place, with the levels that fit one image (P,) best there."""
+        state = self.model.start()
+        _, weight, _, jacobian = self.expected(state)
+        first, last = 2 * self.model.free.size, -1
+        design, (precision, mean) = jacobian[:, first:last], self.prior
+        matrix = design.T @ (design * weight[:, None]) + np.diag(precision[first:last])
+        told = design.T @ (weight * used) + precision[first:last] * mean[first:last]
+        return state._replace(levels=np.linalg.solve(matrix, told))
+
+    def climb(self, used: np.ndarray, state: State) -> Fit:
+        """Fisher scoring from a state to the likelihood's maximum for one image (P,)."""
+        precision, mean = self.prior
+        cost, damping, settled = np.inf, 0.0, False
+        for _ in range(_STEPS):
+            expected, weight, gain, jacobian = self.expected(state)
+            away, before = used - expected, mean - self.parameters(state)
+            weighted = jacobian * (gain * weight)[:, None]
+            fisher = weighted.T @ (jacobian * gain[:, None]) + np.diag(precision)
+            score = away @ weighted + precision * before
+            cost = float(away @ (weight * away) + precision @ before**2)
+            inverse = _inverse(fisher)
+            if settled:
+                break
+            state, settled, damping = self._step(used, state, fisher, score, cost, damping)
+        return Fit(state, inverse, cost, settled)
+
+    def _step(self, used, state, fisher, score, cost, damping) -> tuple[State, bool, float]:
+        """The next state, shortened or damped until the likelihood grows; whether it hardly differs; the damping."""
+        precision, mean = self.prior
+        for _ in range(12):
+            step = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), score)
+            moves = step[: 2 * self.model.free.size]
+            step = step * min(1.0, _STRIDE / max(np.abs(moves).max(initial=0.0), 1e-12))
+            there = self.model.moved(state, step)
+            small = bool(step @ fisher @ step < _SETTLED**2)
+            if small and damping < 1e-3:
+                return there, True, 0.0
+            expected, weight, _, _ = self.expected(there, derivatives=False)
+            reached = float(weight @ (used - expected) ** 2 + precision @ (mean - self.parameters(there)) ** 2)
+            if reached <= cost * (1 + 1e-12):
+                return there, False, damping / 10 if damping > 1e-4 else 0.0
+            damping = max(10 * damping, 1e-3)
+        return state, True, damping
+
+    def centre(self, fit: Fit) -> Centre:
+        """Prepare a state for a stack of images."""
+        precision, mean = self.prior
+        expected, weight, gain, jacobian = self.expected(fit.state)
+        first = 2 * self.model.free.size
+        expansion = Expansion.of(
+            Pieces.of(self.model, fit.state), expected, weight, gain, jacobian[:, first:],
+            fit.inverse, precision, mean - self.parameters(fit.state),
+        )  # fmt: skip
+        spread = fit.inverse - (fit.inverse * precision) @ fit.inverse
+        taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
+        fitted = len(precision) - precision @ np.diag(fit.inverse) - taken
+        near, far = expansion.near, self.pixels.size - expansion.near
+        return Centre(fit.state, expansion, spread, expansion.bias(spread), (near - fitted, max(far - taken, 0.0)))
+
+    def find(self, images: np.ndarray) -> Found:
+        """Most likely parameters in images (n, height, width).
+
+        The first image is measured by itself; the others around it, as far as the expansion holds.
+        """
+        count, first = len(images), 2 * self.model.free.size
+        q = self.model.count
+        parameters, squares = np.full((count, q), np.nan), np.full((count, 2), np.nan)
+        owner, settled = np.zeros(count, int), np.zeros(count, bool)
+        centres, open_ = [], np.arange(count)
+        guess = None
+        while open_.size:
+            used = self.taken(images[open_[:1]])[0]
+            fit = self.climb(used, guess or self.start(used))
+            guess = fit.state if fit.settled else None
+            centre = self.centre(fit)
+            alone = len(centres) >= _ROUNDS
+            done = []
+            for at in range(0, 1 if alone else open_.size, _BATCH):
+                part = open_[at : at + (1 if alone else _BATCH)]
+                solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
+                good = self._good(solved.left, centre)
+                if at == 0:
+                    good[0] = True
+                    settled[part[0]] = fit.settled
+                keep = part[good]
+                parameters[keep] = self.parameters(fit.state) + solved.steps[good]
+                squares[keep] = np.stack([solved.near, solved.far], 1)[good]
+                owner[keep] = len(centres)
+                settled[keep[1:] if at == 0 else keep] = True
+                done.append(keep)
+            centres.append(centre)
+            open_ = np.setdiff1d(open_, np.concatenate(done))
+        vertices = np.broadcast_to(self.arrangement.vertices, (count, *self.arrangement.vertices.shape)).copy()
+        vertices[:, self.model.free] = parameters[:, :first].reshape(count, -1, 2)
+        return Found(
+            vertices, parameters[:, first:-1], parameters[:, -1], squares[:, 0], squares[:, 1], owner, settled,
+            tuple(centres),
+        )  # fmt: skip
+
+    def _good(self, left: np.ndarray, centre: Centre) -> np.ndarray:
+        """Where what is left out of an expansion moves no measured corner."""
+        place = np.searchsorted(self.model.free, self.arrangement.corners)
+        index = (2 * place[:, None] + [0, 1]).ravel()
+        sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
+        return (left[:, index] < _VALID * sigma).all(1)
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a positive matrix whose rows differ much in size."""
+    scale = 1 / np.sqrt(np.diag(matrix))
+    return np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale
