@@ -148,17 +148,14 @@ class ArrangementEstimator:
         return np.concatenate([state.vertices[self.model.free].ravel(), state.levels, [state.blur]])
 
     def taken(self, images: np.ndarray, order: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """The used pixels of images (n, height, width), above darkness, (n, P)."""
-        return np.take(images.reshape(len(images), -1), self.pixels[order], 1) - self.noise.dark_level
+        """The used pixels of images (n, height, width), (n, P)."""
+        return np.take(images.reshape(len(images), -1), self.pixels[order], 1).astype(float, copy=False)
 
     def expected(self, state: State, derivatives: bool = True):
-        """Recorded level above darkness, weighted by one over the noise's variance; (P,), (P,), (P,), (P, q)."""
+        """Recorded level (P,), one over its noise's variance, its derivative by the signal, the signal's Jacobian."""
         image, jacobian = self.model.evaluate(state, derivatives)
         gain, variance = response(self.noise, image)
-        return self._recorded(image), 1 / variance, gain, jacobian
-
-    def _recorded(self, image: np.ndarray) -> np.ndarray:
-        return recorded(self.noise, image + self.noise.dark_level).level - self.noise.dark_level
+        return recorded(self.noise, image + self.noise.dark_level).level, 1 / variance, gain, jacobian
 
     def start(self, used: np.ndarray) -> State:
         """The expected place, with the levels that fit one image (P,) best there."""
@@ -167,7 +164,7 @@ class ArrangementEstimator:
         first, last = 2 * self.model.free.size, -1
         design, (precision, mean) = jacobian[:, first:last], self.prior
         matrix = design.T @ (design * weight[:, None]) + np.diag(precision[first:last])
-        told = design.T @ (weight * used) + precision[first:last] * mean[first:last]
+        told = design.T @ (weight * (used - self.noise.dark_level)) + precision[first:last] * mean[first:last]
         return state._replace(levels=np.linalg.solve(matrix, told))
 
     def climb(self, used: np.ndarray, state: State) -> Fit:

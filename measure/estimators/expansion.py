@@ -243,12 +243,12 @@ class Expansion:
     pieces : Pieces
     expected : ndarray, shape (P,)
         Recorded level at the state.
-    weight : ndarray, shape (P,)
-        One over the variance of the noise.
-    gain : ndarray, shape (P,)
-        Derivative of the recorded level by the signal.
+    root : ndarray, shape (P,)
+        One over the standard deviation of the noise.
     linear : ndarray, shape (P, l)
-        Derivatives by levels and blur.
+        Derivatives by levels and blur, in standard deviations of the noise.
+    rows : tuple of ndarray, shape (p, ROWS)
+        The pieces' rows, in standard deviations of the noise.
     near : int
         So many of the pixels, the first ones, lie near a piece.
     gram : ndarray, shape (l + N ROWS, l + N ROWS)
@@ -264,9 +264,9 @@ class Expansion:
     order: np.ndarray
     pieces: Pieces
     expected: np.ndarray
-    weight: np.ndarray
-    gain: np.ndarray
+    root: np.ndarray
     linear: np.ndarray
+    rows: tuple[np.ndarray, ...]
     near: int
     gram: np.ndarray
     gram_far: np.ndarray
@@ -284,26 +284,30 @@ class Expansion:
         place = np.empty(order.size, int)
         place[order] = np.arange(order.size)
         pieces = replace(pieces, pixels=tuple(place[pixels] for pixels in pieces.pixels))
-        expected, weight, gain, linear = (part[order] for part in (expected, weight, gain, linear))
-        count, scale = linear.shape[1], gain * np.sqrt(weight)
-        columns = np.zeros((near, count + len(pieces.rows) * ROWS))
+        expected, root = expected[order], np.sqrt(weight[order])
+        scale = gain[order] * root
+        linear = linear[order] * scale[:, None]
+        rows = tuple(
+            np.ascontiguousarray((rows * scale[pixels]).T)
+            for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)
+        )
+        count = linear.shape[1]
+        columns = np.zeros((near, count + len(rows) * ROWS))
         columns[:, :count] = linear[:near]
-        for n, (pixels, rows) in enumerate(zip(pieces.pixels, pieces.rows, strict=True)):
-            columns[pixels, count + n * ROWS : count + (n + 1) * ROWS] = rows.T
-        columns *= scale[:near, None]
-        gram, beyond = columns.T @ columns, linear[near:] * scale[near:, None]
-        gram_far = beyond.T @ beyond
+        for n, (pixels, images) in enumerate(zip(pieces.pixels, rows, strict=True)):
+            columns[pixels, count + n * ROWS : count + (n + 1) * ROWS] = images
+        gram, gram_far = columns.T @ columns, linear[near:].T @ linear[near:]
         gram[:count, :count] += gram_far
-        return cls(order, pieces, expected, weight, gain, linear, near, gram, gram_far, inverse, prior, offset)
+        return cls(order, pieces, expected, root, linear, rows, near, gram, gram_far, inverse, prior, offset)
 
     def solve(self, used: np.ndarray) -> Solved:
-        """Most likely steps for pixels (n, P) of n images."""
-        away = used - self.expected
-        weighted = away * (self.weight * self.gain)
+        """Most likely steps for pixels (n, P) of n images, which are used up."""
+        away = np.subtract(used, self.expected, out=used)
+        away *= self.root
         near, count = self.near, self.linear.shape[1]
-        far_told = weighted[:, near:] @ self.linear[near:]
-        told = np.concatenate([weighted[:, :near] @ self.linear[:near] + far_told] + [
-            weighted[:, pixels] @ rows.T for pixels, rows in zip(self.pieces.pixels, self.pieces.rows, strict=True)
+        far_told = away[:, near:] @ self.linear[near:]
+        told = np.concatenate([away[:, :near] @ self.linear[:near] + far_told] + [
+            away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)
         ], 1)  # fmt: skip
         steps = np.zeros((len(used), self.inverse.shape[0]))
         change = np.inf
@@ -314,10 +318,10 @@ class Expansion:
             steps = steps + change
             if (np.abs(change) < _SETTLED * np.sqrt(np.diag(self.inverse))).all():
                 break
-        columns, squares = self._columns(steps), away * away * self.weight
-        level = steps[:, -count:]
-        far = squares[:, near:].sum(1) + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
-        whole = squares.sum(1) + ((columns @ self.gram - 2 * told) * columns).sum(1)
+        columns, level = self._columns(steps), steps[:, -count:]
+        squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
+        far = squares[1] + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
+        whole = sum(squares) + ((columns @ self.gram - 2 * told) * columns).sum(1)
         return Solved(steps, whole - far, far, np.abs(change) + np.abs(self._highest(steps)))
 
     def bias(self, covariance: np.ndarray) -> np.ndarray:
