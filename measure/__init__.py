@@ -4,7 +4,7 @@ from measure.bounds import bound, image_bound
 from measure.estimators.registry import ESTIMATORS
 from measure.features.conic import Ellipse, find_ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
-from measure.measurement import Measurement, distance
+from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, propagate
@@ -19,7 +19,7 @@ __all__ = [
     "Propagated",
     "Quadrilateral",
     "bound",
-    "distance",
+    "distance", "distances",
     "find_ellipse",
     "fit_ellipse",
     "image_bound",

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from planner.models.models import PAPER_KAPPA2
 
 from measure import status
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
@@ -19,6 +18,7 @@ from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
 from planner.features.locator import information_bound, kappa2
+from planner.models.paper import PAPER_KAPPA2
 from scenes import Scene
 
 RATIOS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from measure import status
-from measure.features.layout import layout_of
+from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
 from scenes import InvalidInput, Picture, Scene
 
@@ -75,23 +76,39 @@ def distance(
         Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``polygon``.
     estimator : {"gradient", "canny", "strip", "polygon"}
         ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, edge pixels
-        above a gradient threshold refined by a parabola. ``strip``: maximum likelihood along each edge. ``polygon``:
-        all edges of the face together, corners included; the most precise.
+        above a gradient threshold, each moved to where the gradient across the edge is largest. ``strip``: maximum
+        likelihood along each edge. ``polygon``: all edges of the face together, corners included; the most precise.
     threshold : float, optional
-        Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given.
+        Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given. ``low_contrast`` where
+        noise decides whether more than a tenth of an edge passes it.
 
     Raises
     ------
     InvalidInput
         If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
     """
-    picture = Picture.of(scene, sensor, light)
+    (found,) = distances(image, Picture.of(scene, sensor, light), ((estimator, threshold),))
+    return found
+
+
+def distances(
+    image: np.ndarray, picture: Picture, methods: Sequence[tuple[str, float | None]]
+) -> tuple[Measurement, ...]:
+    """The task's distance by several methods (estimator, threshold of ``canny``) in the same images, checked once.
+
+    Parameters and errors are those of `distance`.
+    """
     camera, layout = picture.scene.camera, layout_of(picture)
-    threshold = picture.scene.locator.thresholds[0] if threshold is None else threshold
     images = checked_image(image, (camera.height, camera.width))
-    stack = images.reshape(-1, *images.shape[-2:])
+    first = picture.scene.locator.thresholds[0]
+    return tuple(
+        _by_method(images, layout, name, first if threshold is None else threshold) for name, threshold in methods
+    )
+
+
+def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
+    stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
-    lead = images.shape[:-2]
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}

@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.prediction import DEFAULT_OBJECTIVE, Objective, in_units, minimised
+from planner.prediction import DEFAULT_OBJECTIVE, Objective, minimised
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene
 
@@ -63,4 +63,4 @@ def variance_map(
         part = slice(at, at + _CHUNK)
         poses = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
         values[part] = minimised(evaluate(Pictures.of(scene, *poses)), objective)
-    return in_units(scene, values, 2)
+    return values

@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.features.measurand import required_edges
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.prediction import DEFAULT_OBJECTIVE, Objective, Prediction, check_objective, in_units, predict
+from planner.prediction import DEFAULT_OBJECTIVE, Objective, Prediction, check_objective, predict
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates
 from planner.search.constraints import Constraints
@@ -155,7 +155,7 @@ def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
 
 @dataclass(frozen=True)
 class _Result:
-    """What searching one set of required edges gave; variances in rad^2 for an angle."""
+    """What searching one set of required edges gave."""
 
     sensor: np.ndarray
     light: np.ndarray
@@ -229,13 +229,13 @@ def _finish(options: list[_Option], results: list[_Result], best: int, objective
         light=Pose(*map(float, light)),
         objective=objective,
         model=option.model,
-        variance=float(in_units(scene, variance, 2)),
+        variance=float(variance),
         grid_sensor=Pose(*map(float, result.sensor)),
         grid_light=Pose(*map(float, result.light)),
-        grid_variance=float(in_units(scene, result.variance, 2)),
+        grid_variance=float(result.variance),
         prediction=predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model),
         trace=partial.trace if partial else (),
-        partial_variance=float(in_units(scene, partial.variance, 2)) if partial else float("nan"),
+        partial_variance=float(partial.variance) if partial else float("nan"),
         gap=partial.variance / result.variance - 1 if partial and found else None,
         guarantee=_guarantee(option, found),
         pairs=sum(r.found.pairs for r in results if r.found),

@@ -120,7 +120,7 @@ def variances(
     >>> round(float(v[1] / v[0]), 1)  # the paper's Table 3: 0.595 / 0.070 = 8.5
     9.0
     """
-    return in_units(scene, minimised(variance_model(model)(Pictures.of(scene, sensors, lights)), objective), 2)
+    return minimised(variance_model(model)(Pictures.of(scene, sensors, lights)), objective)
 
 
 def predict(
@@ -170,10 +170,10 @@ def predict(
     return Prediction(
         model=model,
         kind=scene.task.kind,
-        value_image=float(in_units(scene, known.value, 1)),
-        value_object=float(in_units(scene, known.value_object, 1)),
-        variance_image=float(in_units(scene, evaluated.variance, 2)),
-        variance_object=float(in_units(scene, evaluated.variance_object, 2)),
+        value_image=float(known.value),
+        value_object=float(known.value_object),
+        variance_image=float(evaluated.variance),
+        variance_object=float(evaluated.variance_object),
         corners=known.points,
         covariances=_covariances(scene, evaluated),
         edges=edges,
@@ -182,7 +182,7 @@ def predict(
 
 
 def minimised(errors: Errors, objective: str) -> np.ndarray:
-    """The variance that an objective is about (rad^2 for an angle)."""
+    """The variance that an objective is about (degrees^2 for an angle)."""
     return errors.variance if check_objective(objective) == "image" else errors.variance_object
 
 
@@ -191,11 +191,6 @@ def check_objective(objective: str) -> str:
     if objective not in get_args(Objective):
         raise InvalidInput(f"objective must be one of {', '.join(get_args(Objective))}, got {objective!r}")
     return objective
-
-
-def in_units(scene: Scene, value, power: int):
-    """Angles in degrees."""
-    return value if scene.task.kind == "distance" else value * np.degrees(1.0) ** power
 
 
 def _covariances(scene: Scene, evaluated: Errors) -> np.ndarray:

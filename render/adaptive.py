@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,19 @@ from planner import Pictures, projected_edges
 from render.rays import Rays
 from scenes import Picture
 
-_STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
-_TILE = 8  # fine pixels
+STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 
 
-def crossed(fine: np.ndarray, reach: int = 0) -> np.ndarray:
+def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP) -> np.ndarray:
     """Fine pixels that differ from one of their eight neighbours, as a mask; with others within ``reach`` of them.
+
+    ``step`` is the part of the brightest pixel that they must differ by.
 
     >>> crossed(np.array([[0.0, 0, 0, 1, 1, 1]])).astype(int)
     array([[0, 0, 1, 1, 0, 0]])
     """
     span = maximum_filter(fine, 3, mode="nearest") - minimum_filter(fine, 3, mode="nearest")
-    marked = span > _STEP * max(float(fine.max()), np.finfo(float).tiny)
+    marked = span > step * max(float(fine.max()), np.finfo(float).tiny)
     return maximum_filter(marked, 2 * reach + 1) if reach else marked
 
 
@@ -56,28 +56,4 @@ def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples
     """
     result, places = fine.copy(), np.nonzero(marked)
     result[places] = rays.radiance(scene, *places, fine.shape, samples)
-    return result
-
-
-def refine_tiles(
-    mitsuba: Any,
-    scene: Any,
-    sensor: Callable[[int, tuple[slice, slice]], dict],
-    fine: np.ndarray,
-    marked: np.ndarray,
-    samples: int,
-    seed: int,
-) -> np.ndarray:
-    """As `refine`, by a scalar variant, which can only render rectangles: tiles that hold a marked pixel.
-
-    ``sensor(samples, crop)`` describes the sensor for rows and columns of ``fine``.
-    """
-    result = fine.copy()
-    for top in range(0, fine.shape[0], _TILE):
-        for left in range(0, fine.shape[1], _TILE):
-            tile = slice(top, min(top + _TILE, fine.shape[0])), slice(left, min(left + _TILE, fine.shape[1]))
-            if marked[tile].any():
-                seed += 1
-                view = mitsuba.load_dict(sensor(samples, tile))
-                result[tile] = np.array(mitsuba.render(scene, sensor=view, seed=seed), float)[:, :, 0]
     return result

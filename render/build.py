@@ -14,9 +14,11 @@ from planner.imaging.reflectance import Index, diffuse
 from render import bsdf, lights
 from render.meshes import mesh
 from render.rays import SURFACES
-from scenes import Floor, Picture, Scene
+from render.texture import Face, faces, shapes
+from scenes import Floor, Picture, Scene, Solid
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
+_BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
 CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
 
 
@@ -27,6 +29,7 @@ def description(
     size: tuple[int, int],
     crop: tuple[slice, slice],
     samples: int,
+    textures: tuple[tuple[Face, ...], ...] | None = None,
 ) -> dict:
     """Description of a scene with the named effects.
 
@@ -40,18 +43,25 @@ def description(
         Rows and columns of fine pixels to render.
     samples : int
         Rays a fine pixel.
+    textures : tuple of tuple of Face, optional
+        Of `textured`, to be used instead of the surface's own reflectance.
     """
-    integrator = {"type": "path", "max_depth": SURFACES + 1, "rr_depth": 99} if "interreflection" in active else {}
-    scene, surface = picture.scene, _surface(mitsuba, picture, active)
+    scene = picture.scene
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
+    if "interreflection" in active:
+        integrator = {"type": "path", "max_depth": SURFACES + 1, "rr_depth": 99}
     parts = {
         "type": "scene",
-        "integrator": {"type": "direct", "hide_emitters": True, **integrator},
+        "integrator": {**integrator, "hide_emitters": True, "block_size": _BLOCK},
         "sensor": view(mitsuba, picture, active, size, crop, samples),
         **lights.description(mitsuba, picture, active),
-        "object": mesh(mitsuba, scene.solid, surface),
     }
-    for i, obstacle in enumerate(scene.obstacles if "cast_shadow" in active else ()):
-        parts[f"obstacle{i}"] = mesh(mitsuba, obstacle.solid, surface)
+    if textures is None:
+        surface = _surface(mitsuba, picture, active)
+        made = [mesh(mitsuba, solid.triangles, surface) for solid in _solids(scene, active)]
+    else:
+        made = [shape for faces in textures for shape in shapes(mitsuba, faces)]
+    parts.update((f"part{i}", shape) for i, shape in enumerate(made))
     if "floor" in active:
         parts["floor"] = _floor(
             mitsuba, scene.floor or Floor(reflectance=0.0, height=_lowest(scene)), "analyser" in active
@@ -63,6 +73,27 @@ def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
     """Radius of the aperture as it is simulated, cm."""
     least = _TINY_APERTURE * scene.camera.distance
     return max(scene.camera.lens.aperture_radius, least) if "depth_of_field" in active else 0.0
+
+
+def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...], ...] | None:
+    """Each solid's surface with the paper's reflectance as textures; None where it has no such form (`render.texture`).
+
+    Light between surfaces, several lights, and light or an aperture of some size need the reflectance for more than one
+    direction.
+    """
+    if "interreflection" in active or len(picture.scene.lights) > 1:
+        return None
+    found = []
+    for solid in _solids(picture.scene, active):
+        found.append(faces(solid, picture))
+        if found[-1] is None:
+            return None
+    return tuple(found)
+
+
+def _solids(scene: Scene, active: frozenset[str]) -> list[Solid]:
+    """The object, and what else throws a shadow."""
+    return [scene.solid, *(obstacle.solid for obstacle in (scene.obstacles if "cast_shadow" in active else ()))]
 
 
 def _surface(mitsuba, picture: Picture, active: frozenset[str]) -> dict:

@@ -1,4 +1,4 @@
-"""A solid becomes a Mitsuba mesh of flat faces."""
+"""Triangles become a Mitsuba mesh of flat faces."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from scenes import Solid
 
+def mesh(mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None) -> Any:
+    """Triangles, shape (T, 3, 3), and where their corners lie in a texture, shape (T, 3, 2), if they have one.
 
-def mesh(mitsuba: Any, solid: Solid, bsdf: dict) -> Any:
-    """The solid's surface. Without vertex normals Mitsuba shades each triangle by its own plane: exactly flat."""
+    Without vertex normals Mitsuba shades each triangle by its own plane: exactly flat.
+    """
     properties = mitsuba.Properties()
     properties["bsdf"] = mitsuba.load_dict(bsdf)
-    corners = solid.triangles.reshape(-1, 3)
-    shape = mitsuba.Mesh("solid", vertex_count=len(corners), face_count=len(solid.triangles), props=properties)
+    corners = triangles.reshape(-1, 3)
+    sizes = {"vertex_count": len(corners), "face_count": len(triangles)}
+    shape = mitsuba.Mesh("solid", **sizes, props=properties, has_vertex_texcoords=texels is not None)
     values = mitsuba.traverse(shape)
     values["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
     values["faces"] = np.arange(len(corners), dtype=np.uint32)
+    if texels is not None:
+        values["vertex_texcoords"] = np.ascontiguousarray(texels, np.float32).ravel()
     values.update()
     return shape

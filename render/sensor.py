@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.sensor import recorded, shot_noise
+from planner.imaging.sensor import full_scale, recorded, shot_noise
 from scenes import InvalidInput, Noise
 
 TILE = 16  # px; large enough that making a tile's stream costs little, small enough to follow an edge
@@ -47,19 +47,26 @@ def expose(
         raise InvalidInput(f"count must be at least 1, got {count}")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
     sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
-    pictures = np.repeat((np.asarray(image, float) + fixed_pattern(image, noise))[None], count, axis=0)
+    steady = np.asarray(image, float) + fixed_pattern(image, noise)
     height, width = image.shape
+    pictures = np.empty((count, height, width))
+    pictures[:] = digitised(steady.copy(), noise)
     across = -(-width // TILE)
     for index in range(across * -(-height // TILE)):
         top, left = TILE * (index // across), TILE * (index % across)
         tile = np.s_[top : top + TILE, left : left + TILE]
         if where is None or where[tile].any():
             stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
-            block = pictures[(slice(None), *tile)]
-            block += sigma[tile] * stream.standard_normal(block.shape)
-    if noise.bits is not None:
-        np.clip(np.rint(pictures, out=pictures), 0, 2**noise.bits - 1, out=pictures)
+            block = stream.standard_normal((count, *steady[tile].shape))
+            block *= sigma[tile]
+            block += steady[tile]
+            pictures[(slice(None), *tile)] = digitised(block, noise)
     return pictures
+
+
+def digitised(levels: np.ndarray, noise: Noise) -> np.ndarray:
+    """Grey levels as the sensor writes them: rounded and cut off at both ends of the scale; changed in place."""
+    return levels if noise.bits is None else np.clip(np.rint(levels, out=levels), 0, full_scale(noise), out=levels)
 
 
 def variance(image: np.ndarray, noise: Noise) -> np.ndarray:

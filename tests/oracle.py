@@ -1,14 +1,14 @@
-"""Images made without the renderer: convex polygons, exactly blurred and exactly averaged over square pixels."""
+"""Images made without the renderer: convex polygons, exactly blurred and exactly averaged over square pixels.
+
+Projection and shading are written out here: nothing is shared with the model of the image that they are to judge.
+"""
 
 import numpy as np
 from scipy.special import ndtr
 
-from planner.imaging.projection import direction, facing, frame, project
-from planner.imaging.irradiance import bands
-from planner.imaging.reflectance import reflected
 from validation.hard.polygon import _scan_lines, _spans, polygon_image
 
-__all__ = ["block_image", "polygon_image", "shaded_image"]
+__all__ = ["axes", "block_image", "pinhole", "polygon_image", "shaded_image"]
 
 _FEW, _FEW_WEIGHTS = np.polynomial.legendre.leggauss(4)
 
@@ -47,31 +47,48 @@ def shaded_image(faces, shape, blur):
     return picture
 
 
-def block_image(scene, sensor, light):
-    """Exact image of the scene's convex solid before darkness; shading by `planner.reflectance`."""
-    camera, solid, pose = scene.camera, scene.solid, np.array(sensor, float)
-    axes, eye = frame(pose), camera.distance * direction(pose)
-    lamp = scene.light.distance * direction(np.array(light, float))
-    image = project(solid.vertices, pose, camera)
+def pinhole(points, pose, camera):
+    """Images (n, 2) of points (n, 3), px, of a camera without distortion that looks at the origin; z axis up."""
+    out, right, down = axes(pose)
+    depth = camera.distance - points @ out
+    middle = np.array([camera.width - 1, camera.height - 1]) / 2
+    return middle + camera.focal_px * np.stack([points @ right, points @ down], -1) / depth[:, None]
 
-    def shading(normal, offset):
+
+def axes(pose):
+    """Unit vectors of a pose in degrees: from the origin to it, to the right in its image, and down."""
+    polar, azimuth = np.radians(pose)
+    sine, cosine = np.sin(azimuth), np.cos(azimuth)
+    out = np.array([np.sin(polar) * cosine, np.sin(polar) * sine, np.cos(polar)])
+    down = np.array([np.cos(polar) * cosine, np.cos(polar) * sine, -np.sin(polar)])
+    return out, np.array([-sine, cosine, 0.0]), down
+
+
+def block_image(scene, sensor, light):
+    """Exact image of the scene's convex diffuse solid before darkness: N.L / r^2 behind a pinhole."""
+    camera, solid, material = scene.camera, scene.solid, scene.material
+    assert material.is_diffuse
+    assert camera.look_at == (0, 0, 0)
+    out, right, down = axes(sensor)
+    eye, lamp = camera.distance * out, scene.light.distance * axes(light)[0]
+    white = camera.exposure * (1 - material.specular_fraction) * material.diffuse_reflectance
+
+    def shading(normal, corner):
         def shade(x, y):
             u, v = ((p - (n - 1) / 2) / camera.focal_px for p, n in ((x, camera.width), (y, camera.height)))
-            ray = axes.forward + u[..., None] * axes.right + (v + 0 * u)[..., None] * axes.down
-            point = eye + ray * ((offset - eye @ normal) / (ray @ normal))[..., None]
-            to_light, to_sensor = lamp - point, eye - point
-            distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
-            to_sensor /= np.linalg.norm(to_sensor, axis=-1, keepdims=True)
-            level = reflected(scene.material, bands(scene, scene.light), np.broadcast_to(normal, point.shape), to_light / distance, to_sensor)
-            return camera.exposure * level * (scene.light.distance / distance[..., 0]) ** 2
+            ray = -out + u[..., None] * right + (v + 0 * u)[..., None] * down
+            point = eye + ray * ((corner - eye) @ normal / (ray @ normal))[..., None]
+            away = lamp - point
+            distance = np.linalg.norm(away, axis=-1)
+            return white * np.maximum(away @ normal, 0) / distance * (scene.light.distance / distance) ** 2
 
         return shade
 
-    faces = [
-        (image[list(face)], shading(normal, offset))
-        for face, normal, offset, seen in zip(
-            solid.faces, solid.normals, solid.offsets, facing(solid, eye), strict=True
-        )
-        if seen
-    ]
+    faces = []
+    for face in solid.faces:
+        corners = solid.vertices[list(face)]
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
+        normal = normal / np.linalg.norm(normal)
+        if normal @ (eye - corners[0]) > 0:
+            faces.append((pinhole(corners, sensor, camera), shading(normal, corners[0])))
     return scene.noise.dark_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)

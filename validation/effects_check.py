@@ -12,7 +12,7 @@ from scipy import stats
 import measure
 import render
 from render.phenomena import Choice, Influence, Tolerance
-from scenes import Scene, Setting
+from scenes import Picture, Scene, Setting
 
 RENDERED = (
     "cast_shadow", "interreflection", "floor", "specular_lobe", "polarisation", "analyser", "wavelength", "light_size",
@@ -76,7 +76,7 @@ def check(
     settings = scene.settings if settings is None else settings
     for done, setting in enumerate(settings):
         progress("settings", done, len(settings))
-        chosen = render.choose(scene, "auto", tolerance, setting.sensor, setting.light)
+        chosen = render.choose(scene, "auto", tolerance, Picture.of(scene, setting.sensor, setting.light))
         base = _Runs(scene, setting, chosen.active, quality)
         for name in RENDERED:
             if name in only and name not in chosen.active:

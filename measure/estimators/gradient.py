@@ -77,12 +77,14 @@ class GradientLocator:
         profiles = self._profiles(images)
         turned = _reversed(profiles)
         profiles *= _polarity(profiles)
-        crossing, start, found = _bracket(profiles)
+        return self._points(*_bracket(profiles), profiles, turned)
+
+    def _points(self, crossing, start, found, profiles: np.ndarray, turned: np.ndarray) -> EdgePoints:
         offset, slope = _refine(profiles, crossing, start)
         valid = found & (np.abs(offset - start) < 1)
         offset = np.where(valid, self.offsets[0] + STEP * offset, 0.0)
         slope = np.where(valid, -slope / STEP, 0.0)
-        along = np.broadcast_to(self.positions, (len(images), self.positions.size))
+        along = np.broadcast_to(self.positions, (profiles.shape[2], self.positions.size))
         contrast, trend, _ = trend_along(along, self.slope_to_contrast * slope.T, 1.0 * valid.T)
         return EdgePoints(along, offset.T * self.gain, valid.T, contrast, turned, trend, trapezoid(self.positions))
 
@@ -95,9 +97,9 @@ class GradientLocator:
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
         profiles = self._profiles(clean[None])
-        polarity = _polarity(profiles)
+        turned, polarity = _reversed(profiles), _polarity(profiles)
         profiles *= polarity
-        crossing, start, _ = _bracket(profiles)
+        crossing, start, found = _bracket(profiles)
         root, slope = _refine(profiles, crossing, start)
         weights = _cubic_weights(root - crossing)
         rows = np.arange(crossing.shape[0])[:, None]
@@ -109,7 +111,7 @@ class GradientLocator:
         near = pick @ self.kernel
         near = sparse.coo_array(near)
         full = sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (rows.size, clean.size))
-        return self.locate(clean[None]), full
+        return self._points(crossing, start, found, profiles, turned), full
 
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """Second derivative at all places, shape (m, T, n)."""

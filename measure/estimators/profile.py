@@ -46,8 +46,8 @@ def top(profiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
     good : ndarray of bool, shape (k,)
         Whether there is a top within a pixel.
     """
-    gradient, second = profiles[:, 0], profiles[:, 1:].T
-    powers = np.arange(_TERMS)[:, None]
+    gradient, *second = np.ascontiguousarray(profiles.T)
+    second, powers = np.array(second), np.arange(_TERMS, dtype=profiles.dtype)[:, None]
     third = (second * powers)[1:]
     curve = gradient * third[0] - second[0] ** 2  # of the gradient's logarithm, a parabola on a clean edge
     start = np.clip(-gradient * second[0] / np.where(curve < 0, curve, -np.inf), -1, 1)

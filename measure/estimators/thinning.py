@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-TRUNCATE = 4  # standard deviations at which the gradient's kernel ends
+TRUNCATE = 3  # standard deviations at which the gradient's kernel ends: it only has to find the pixels
 _FIXED_POINT = 1024  # Canny takes gradients as 16-bit integers: so many units are the threshold
 _LARGEST = 32767
 _SINGLE = 2.0**16  # grey levels that single precision resolves to 1/256; darkness is brought below

@@ -16,6 +16,7 @@ from scenes import InvalidInput
 
 _STEPS = 12
 _MIN_FOUND = 0.5
+_UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,8 @@ class Ellipse:
     Attributes
     ----------
     parameters : ndarray, shape (..., 5)
-        Centre (x, y), semi-axes a and b, px, and the angle of a from the x axis towards y, rad. For a circle a = b and
-        the angle is 0.
+        Centre (x, y), semi-axes a and b, px, and the angle of a from the x axis towards y, degrees. For a circle a = b
+        and the angle is 0.
     covariance : ndarray, shape (..., 5, 5)
         Of the parameters. For a circle a and b are the same number, and the angle has no error.
     status : ndarray of str, shape (...)
@@ -89,7 +90,7 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     spread = response @ full @ response.T
     if not (good and known):
         return _nothing((), status.ILL_CONDITIONED)
-    return Ellipse(parameters, _whole(spread, circle), np.array(status.OK))
+    return Ellipse(parameters * _UNITS, _whole(spread, circle) * np.outer(_UNITS, _UNITS), np.array(status.OK))
 
 
 def find_ellipse(
@@ -110,7 +111,7 @@ def find_ellipse(
     spacing : float
         Distance of the edge points in units of the smoothing scale.
     """
-    expected = np.asarray(expected, float)
+    expected = np.asarray(expected, float) / _UNITS
     stack = images.reshape(-1, *images.shape[-2:])
     angles, places, normals = _positions(expected, optics, spacing)
     if len(angles) < max(MIN_POSITIONS, 5):
@@ -134,7 +135,8 @@ def find_ellipse(
     state = np.where(seen, np.where(good, status.OK, status.ILL_CONDITIONED), status.LOW_CONTRAST)
     parameters = np.where((state == status.OK)[:, None], parameters, np.nan)
     lead = images.shape[:-2]
-    return Ellipse(parameters.reshape(*lead, 5), np.array(covariances).reshape(*lead, 5, 5), state.reshape(lead))
+    covariance = np.array(covariances).reshape(*lead, 5, 5) * np.outer(_UNITS, _UNITS)
+    return Ellipse(parameters.reshape(*lead, 5) * _UNITS, covariance, state.reshape(lead))
 
 
 def _positions(expected: np.ndarray, optics: Optics, spacing: float):

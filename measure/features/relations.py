@@ -38,7 +38,7 @@ def point_distance(
 
 
 def line_angle(shape: Shape, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
-    """Angle between two lines of a shape, 0 to pi / 2, rad, and its variance, rad^2, shape (n,).
+    """Angle between two lines of a shape, 0 to 90 degrees, and its variance, degrees^2, shape (n,).
 
     Errors of the two lines may be correlated; their joint covariance is used.
     """
@@ -47,4 +47,4 @@ def line_angle(shape: Shape, first: int, second: int) -> tuple[np.ndarray, np.nd
     cosine = np.abs((a * b).sum(1))
     tilt = shape.tilt_covariance
     variance = tilt[:, first, first] + tilt[:, second, second] - 2 * tilt[:, first, second]
-    return np.arctan2(sine, cosine), variance
+    return np.degrees(np.arctan2(sine, cosine)), variance * np.degrees(1.0) ** 2

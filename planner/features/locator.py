@@ -29,7 +29,7 @@ def kappa2(scale: float, blur_px):
 
     Examples
     --------
-    >>> round(kappa2(1.0, 1.3), 2)
+    >>> round(float(kappa2(1.0, 1.3)), 2)
     8.0
     """
     return 3 / 8 * (1 + (edge_blur(blur_px) / scale) ** 2) ** 3

@@ -17,10 +17,12 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import from_axis, jacobian_ideal, project_ideal
 from scenes import Centre, Corner, Edge, Scene, Task
 
+_DEGREE = float(np.degrees(1.0))
+
 
 @dataclass(frozen=True)
 class Measurand:
-    """The measured quantity for sensor poses of leading shape (...); px and cm for a distance, rad for an angle.
+    """The measurand for sensor poses of leading shape (...); px and cm for a distance, degrees for an angle.
 
     Attributes
     ----------
@@ -144,7 +146,7 @@ def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand
     lines = np.array([solid.vertices[e[1]] - solid.vertices[e[0]] for e in ends])
     lines /= np.linalg.norm(lines, axis=1, keepdims=True)
     axis = np.cross(*lines)
-    inside = np.arctan2(np.linalg.norm(axis), lines[0] @ lines[1])
+    inside = _DEGREE * np.arctan2(np.linalg.norm(axis), lines[0] @ lines[1])
     pivots = np.array([solid.vertices[e[0]] if shared else solid.vertices[e].mean(0) for e in ends])
     derivative = jacobian_ideal(pivots, sensors, scene.camera)
     images = np.einsum("...kij,kj->...ki", derivative, lines)
@@ -152,10 +154,10 @@ def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand
     moved = np.einsum("...kij,kj->...ki", derivative, turning)
     rates = _cross(images, moved) / (images**2).sum(-1)
     crossing = _cross(images[..., 0, :], images[..., 1, :])
-    value = np.arctan2(np.abs(crossing), (images[..., 0, :] * images[..., 1, :]).sum(-1))
+    value = _DEGREE * np.arctan2(np.abs(crossing), (images[..., 0, :] * images[..., 1, :]).sum(-1))
     sign = np.sign(crossing)
     scale = sign * rates.sum(-1) / 2
-    tilt = np.stack([-sign, sign], -1)
+    tilt = _DEGREE * np.stack([-sign, sign], -1)
     points = project_ideal(pivots, sensors, scene.camera)
     return Measurand(view, value, float(inside), scale, np.zeros_like(tilt), tilt, np.zeros((*value.shape, 2)), points)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -36,8 +37,7 @@ class Pictures:
     def of(cls, scene: Scene | Picture, sensors: Any = None, lights: Any = None) -> Pictures:
         """From a picture, or from a scene, sensors (..., 2) and the poses of its light (..., 2) or of each light."""
         if isinstance(scene, Picture):
-            lights = tuple(np.array(list(pose)) for pose in scene.lights)
-            return cls(scene.scene, np.array(list(scene.sensor)), lights)
+            return _of_picture(scene)
         each = () if lights is None else lights if isinstance(lights, tuple) and len(scene.lights) > 1 else (lights,)
         return cls(scene, np.asarray(sensors, float), tuple(np.asarray(poses, float) for poses in each))
 
@@ -64,3 +64,10 @@ class Pictures:
         if key not in self._known:
             self._known[key] = make()
         return self._known[key]
+
+
+@lru_cache(maxsize=64)
+def _of_picture(picture: Picture) -> Pictures:
+    """One object for equal pictures, so that what one asks of it is there for all who ask."""
+    lights = tuple(np.array(list(pose)) for pose in picture.lights)
+    return Pictures(picture.scene, np.array(list(picture.sensor)), lights)

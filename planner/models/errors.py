@@ -28,8 +28,8 @@ class Errors:
     measurand : Measurand
         What is measured; its arrays have the sensors' leading shape.
     variance, variance_object : ndarray, shape (...)
-        In the image (px^2, or rad^2 of an angle) and in the object (cm^2, or rad^2); infinite where it cannot be
-        measured.
+        In the image (px^2, or degrees^2 of an angle) and in the object (cm^2, or degrees^2); infinite where it
+        cannot be measured.
     line_variance : callable
         (A, B) of shape (..., E) to the variance of A d + B theta of each line, px^2.
     contrast : ndarray, shape (..., E)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.imaging.projection import direction
-from planner.prediction import in_units
 from planner.search.exhaustive import evaluate_pairs
 from scenes import Pose
 
@@ -52,9 +51,7 @@ def candidates(options, results, objective: str, count: int = 10):
 
 def _candidate(option, sensor: np.ndarray, light: np.ndarray) -> Candidate:
     values = [
-        float(
-            in_units(option.scene, evaluate_pairs(option.scene, sensor[None], light[None], option.model, units)[0], 2)
-        )
+        float(evaluate_pairs(option.scene, sensor[None], light[None], option.model, units)[0])
         for units in ("object", "image")
     ]
     return Candidate(Pose(*map(float, sensor)), Pose(*map(float, light)), option.scene.task.edges, *values)

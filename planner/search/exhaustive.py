@@ -30,7 +30,7 @@ class Found:
     sensor, light : int
         Indices into the poses searched; -1 where no pair can measure.
     variance : float
-        Of the objective (rad^2 for an angle).
+        Of the objective (degrees^2 for an angle).
     pairs : int
         How many pairs were covered, and ...
     evaluated : int

@@ -9,7 +9,6 @@ import numpy as np
 
 from planner.imaging.projection import direction
 from planner.planning import Plan
-from planner.prediction import in_units
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
 from planner.search.refinement import refine, shifted
@@ -145,9 +144,9 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
     return Robust(
         sensor=Pose(*map(float, sensor)),
         light=Pose(*map(float, light)),
-        worst=in_units(plan.scene, value, 2),
-        nominal=in_units(plan.scene, nominal, 2),
-        plan_worst=in_units(plan.scene, values[0], 2),
+        worst=value,
+        nominal=nominal,
+        plan_worst=values[0],
         moves=moves,
         cases=len(worlds) * len(_with_pose_errors(sensor, light, tolerances)[0]),
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures, pose_spread, variances
+from planner import Pictures, pose_spread
 from planner.jitter import LEAST_SINE
+from planner.models import DEFAULT_MODEL, variance_model
 from render.phenomena.base import SAFETY, Effect, Influence, changed
 from scenes import Pose, Scene
 
@@ -25,7 +26,7 @@ class PoseJitter(Effect):
         """By how much the projected distance changes with the sensor's pose; the light only changes contrasts."""
         scene = pictures.scene
         spread = pose_spread(scene, pictures.sensors)
-        own = variances(scene, pictures.sensors, pictures.lights[0])
+        own = variance_model(DEFAULT_MODEL)(pictures).variance
         contrast = 6 * np.radians(scene.jitter.light_deg) ** 2  # the mean of 1 / cos^2 over small tilts
         share = float(np.max(spread.variance / own) + contrast)
         return Influence(SAFETY * float(spread.bias.max()), SAFETY * share)

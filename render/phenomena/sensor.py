@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures, variances
+from planner import Pictures
+from planner.models import DEFAULT_MODEL, variance_model
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
 from render.phenomena.edges import sides
 from scenes import Scene
@@ -73,8 +74,10 @@ class FixedPattern(Effect):
         scene = pictures.scene
         noise, temporal = scene.noise, max(scene.noise.variance, 1e-12)
         pattern = noise.dsnu**2 + (noise.prnu * _brightest(pictures)) ** 2
-        reference = scene.model_copy(update={"noise": noise.model_copy(update={"sigma": temporal**0.5, "bits": None})})
-        spread = float(variances(reference, pictures.sensors, pictures.lights[0]).max())
+        reference = scene.model_copy(
+            update={"noise": noise.model_copy(update={"sigma": temporal**0.5, "bits": None, "gain": 0.0})}
+        )
+        spread = float(variance_model(DEFAULT_MODEL)(pictures.with_scene(reference)).variance.max())
         return Influence(4 * float(np.sqrt(spread * pattern / temporal)), 0.0)
 
     def without(self, scene: Scene) -> Scene:

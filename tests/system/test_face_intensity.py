@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from render.reflectance import NUMPY, Index, brightness, polarised_across
 
 import render
-from planner.imaging.projection import direction, frame
 from render import variant
-from render.build import polariser_axes
 from scenes import Material, Pose
+from tests import textbook
+from tests.oracle import axes
 
 pytestmark = pytest.mark.render
 MATERIALS = {
@@ -61,36 +60,46 @@ def compare(scene, sensor, light, name, effects):
 
 def behind(scene, sensor):
     """Points of the plane x = 0 behind the pixels' centres, cm, shape (height, width, 3)."""
-    camera, axes = scene.camera, frame(np.array(list(sensor)))
+    camera, (out, right, down) = scene.camera, axes(list(sensor))
     x, y = np.meshgrid(np.arange(camera.width) - (camera.width - 1) / 2, np.arange(camera.height) - 7.5)
-    rays = axes.forward + (x[..., None] * axes.right + y[..., None] * axes.down) / camera.focal_px
-    start = scene.position("sensor", sensor)
+    rays = -out + (x[..., None] * right + y[..., None] * down) / camera.focal_px
+    start = camera.distance * out
     return start - rays * (start[0] / rays[..., 0])[..., None]
 
 
 def closed_form(scene, sensor, light, points):
-    """Grey levels above darkness."""
-    away = [scene.position(role, pose) - points for role, pose in (("light", light), ("sensor", sensor))]
-    distance = [np.linalg.norm(part, axis=-1, keepdims=True) for part in away]
-    beams = [tuple(np.moveaxis(part / far, -1, 0)) for part, far in zip(away, distance, strict=True)]
-    axes = [
-        None if axis is None else polarised_across(NUMPY, tuple(axis), beam)
-        for axis, beam in zip(polariser_axes(scene, sensor, light), beams, strict=True)
-    ]
-    material, zero = scene.material, np.zeros(points.shape[:2])
-    normal = zero - 1.0, zero, zero
-    if material.is_diffuse or scene.camera.analyser_deg is None:
-        assert axes == [None, None]
-    index = (Index(material.refractive_index, material.extinction, 1.0),)
-    value = brightness(NUMPY, material, index, normal, *beams, *axes)
-    return scene.camera.exposure * value * (scene.light.distance / distance[0][..., 0]) ** 2
+    """Grey levels above darkness: the textbook's reflectance of the face of normal -x, and the inverse square."""
+    eye, lamp = scene.camera.distance * axes(list(sensor))[0], scene.light.distance * axes(list(light))[0]
+    polarisation, analyser = polarisers(scene, sensor, light)
+    levels = np.empty(points.shape[:2])
+    for at in np.ndindex(levels.shape):
+        to_light, to_sensor = lamp - points[at], eye - points[at]
+        crossed = (
+            None if axis is None else np.cross(ray, np.cross(axis, ray))
+            for axis, ray in ((polarisation, to_light), (analyser, to_sensor))
+        )
+        value = float(textbook.brightness(scene.material, (-1, 0, 0), to_light, to_sensor, *crossed))
+        levels[at] = scene.camera.exposure * value * scene.light.distance**2 / (to_light @ to_light)
+    return levels
+
+
+def polarisers(scene, sensor, light):
+    """Directions of the light's polarisation (from downwards to the right) and of the analyser (from right to down)."""
+    (_, right, down), (_, across, under) = axes(list(sensor)), axes(list(light))
+    turned = [
+        None if angle is None else np.cos(np.radians(angle)) * first + np.sin(np.radians(angle)) * second
+        for angle, first, second in (
+            (scene.light.polarisation_deg, under, across), (scene.camera.analyser_deg, right, down)
+        )
+    ]  # fmt: skip
+    return turned
 
 
 def test_the_closed_form_here_is_lamberts_for_a_matt_face(task1):
     """The reference itself: cosine, albedo and inverse square, written out."""
     scene, sensor, light = close(task1, MATERIALS["diffuse"]), upright(0, 170), upright(60, 180)
     (point,) = points = np.array([[[0.0, 0.5, 0.5]]])
-    to_light = 100 * direction(np.array(list(light))) - point[0]
+    to_light = np.array([-100 * np.sin(np.radians(30)), 0, 100 * np.cos(np.radians(30))]) - point[0]
     far = np.linalg.norm(to_light)
     expected = 200 * 0.9 * (-to_light[0] / far) * (100 / far) ** 2
     assert math.isclose(closed_form(scene, sensor, light, points)[0, 0], expected, rel_tol=1e-12)

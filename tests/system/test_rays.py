@@ -10,6 +10,7 @@ from render.build import description
 from render.optics import blur_and_bin
 from render.renderer import Quality, window
 from render.testing import assert_images_agree
+from scenes import Picture
 
 pytestmark = [
     pytest.mark.render,
@@ -34,14 +35,15 @@ def small(name, updates):
 def theirs(scene, setting, active, quality):
     """Mitsuba's integrator, the same many rays in every fine pixel."""
     mitsuba, k = variant.use(variant.choose()), quality.supersample
-    rows, columns = window(scene, setting.sensor)
+    picture = Picture.of(scene, setting.sensor, setting.light)
+    rows, columns = window(picture)
     crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
     size = scene.camera.width * k, scene.camera.height * k
-    made = description(mitsuba, scene, setting.sensor, setting.light, active, size, crop, quality.random_samples)
+    made = description(mitsuba, picture, active, size, crop, quality.random_samples)
     fine = np.array(mitsuba.render(mitsuba.load_dict(made), seed=quality.seed), float)[:, :, 0]
-    picture = np.full((scene.camera.height, scene.camera.width), scene.noise.dark_level)
-    picture[rows, columns] += blur_and_bin(fine, scene.camera.blur_px, k)
-    return picture
+    image = np.full((scene.camera.height, scene.camera.width), scene.noise.dark_level)
+    image[rows, columns] += blur_and_bin(fine, scene.camera, k, (crop[1].start, crop[0].start))
+    return image
 
 
 @pytest.mark.parametrize("effect", CASES)

@@ -7,27 +7,25 @@ import measure
 import render
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from planner.imaging.projection import direction, frame, project
 from render.renderer import window
-from scenes import InvalidInput, Pose
-from tests.oracle import block_image, polygon_image
+from scenes import InvalidInput, Picture
+from tests.oracle import axes, block_image, pinhole, polygon_image
 
 pytestmark = pytest.mark.render
 
 
 def brightness(scene, normal, point, light):
     """Lambertian surface under a point light: albedo x exposure x cos x (distance of the light / r)^2."""
-    away = scene.light.distance * direction(np.array(light, float)) - point
+    away = scene.light.distance * axes(light)[0] - point
     r = np.linalg.norm(away)
     return 0.9 * scene.camera.exposure * (away @ normal / r) * (scene.light.distance / r) ** 2
 
 
 def behind(scene, pose, pixel):
     """Point of the top face's plane that a pixel's centre looks at."""
-    axes, camera = frame(pose), scene.camera
+    (out, right, down), camera = axes(pose), scene.camera
     u, v = (pixel - np.array([camera.width - 1, camera.height - 1]) / 2) / camera.focal_px
-    ray = axes.forward + u * axes.right + v * axes.down
-    start = -camera.distance * axes.forward
+    ray, start = -out + u * right + v * down, camera.distance * out
     return start + ray * (scene.object.size[2] - start[2]) / ray[2]
 
 
@@ -35,10 +33,9 @@ def behind(scene, pose, pixel):
 def test_face_intensity_is_cosine_over_squared_distance(task1, sensor, light):
     """Five pixels of the top face, each against the point of the face behind its centre, to 1e-4."""
     picture = render.image(task1, sensor, light) - task1.noise.dark_level
-    pose = np.array(sensor, float)
-    centre = np.rint(project(np.array([[6.25, 3.75, 2.5]]), pose, task1.camera)[0]).astype(int)
+    centre = np.rint(pinhole(np.array([[6.25, 3.75, 2.5]]), sensor, task1.camera)[0]).astype(int)
     for pixel in centre + np.array([[0, 0], [6, 0], [-6, 0], [0, 6], [0, -6]]):
-        point = behind(task1, pose, pixel)
+        point = behind(task1, sensor, pixel)
         expected = brightness(task1, np.array([0, 0, 1.0]), point, light)
         assert picture[tuple(pixel[::-1])] == pytest.approx(expected, rel=1e-4)
         assert picture[tuple(pixel[::-1])] != pytest.approx(1.01 * expected, rel=1e-4)
@@ -47,7 +44,7 @@ def test_face_intensity_is_cosine_over_squared_distance(task1, sensor, light):
 def test_darkness_is_the_black_level_and_a_face_behind_is_dark(task1):
     picture = render.image(task1, (30, 90), (150, 90))
     assert picture[0, 0] == task1.noise.dark_level
-    top = np.rint(project(np.array([[6.0, 4.0, 2.5]]), np.array([30.0, 90.0]), task1.camera)[0]).astype(int)
+    top = np.rint(pinhole(np.array([[6.0, 4.0, 2.5]]), (30, 90), task1.camera)[0]).astype(int)
     assert picture[top[1], top[0]] == task1.noise.dark_level
 
 
@@ -57,7 +54,7 @@ def test_camera_at_the_pole_against_the_exact_polygon(task1, sensor):
     scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
     picture = render.image(scene, sensor, (0, 0)) - scene.noise.dark_level
     corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
-    exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), picture.shape, 0.6, 180.0)
+    exact = polygon_image(pinhole(corners, sensor, scene.camera), picture.shape, 0.6, 180.0)
     assert np.abs(picture - exact).max() < 0.01 * 180
 
 
@@ -67,7 +64,7 @@ def test_edges_lie_where_the_exact_image_has_them(task1, sensor):
     scene = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1e5})})
     rendered = render.image(scene, sensor, (0, 0)) - scene.noise.dark_level
     corners = np.array([scene.solid.vertex(v) for v in ("v4", "v3", "v7", "v6")])
-    exact = polygon_image(project(corners, np.array(sensor, float), scene.camera), rendered.shape, 0.6, 180.0)
+    exact = polygon_image(pinhole(corners, sensor, scene.camera), rendered.shape, 0.6, 180.0)
     ours, oracle = (measure.distance(image, scene, sensor) for image in (rendered, exact))
     assert abs(float(ours.value_px) - float(oracle.value_px)) < 0.002
 
@@ -84,7 +81,7 @@ def test_lines_lie_where_the_exact_shaded_image_has_them(task1, sensor, light):
 
 def _line_offsets(scene, sensor, image):
     """Offset of each fitted line at the middle of its edge, px."""
-    tool = prepared(layout_of(scene, Pose(*sensor)), "gradient", 12.0)
+    tool = prepared(layout_of(Picture.of(scene, sensor)), "gradient", 12.0)
     found = tool.estimate(image[None])
     return (found.level + found.slope * [frame.length / 2 for frame in tool.calipers])[0]
 
@@ -95,8 +92,8 @@ def test_same_seed_is_bit_identical(task1):
 
 
 def test_only_what_the_object_covers_is_rendered(task1):
-    rows, columns = window(task1, Pose(30, 135))
-    corners = project(task1.solid.vertices, np.array([30.0, 135.0]), task1.camera)
+    rows, columns = window(Picture.of(task1, (30, 135)))
+    corners = pinhole(task1.solid.vertices, (30, 135), task1.camera)
     assert columns.start < corners[:, 0].min() - 4 * 0.6
     assert rows.stop > corners[:, 1].max() + 4 * 0.6
     assert (rows.stop - rows.start) * (columns.stop - columns.start) < 0.4 * 256 * 240

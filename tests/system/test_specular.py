@@ -1,24 +1,21 @@
-"""The paper's reflectance inside the renderer, against `planner.reflectance` and closed forms of polarisation."""
+"""The paper's reflectance inside the renderer, against the textbook and closed forms of polarisation."""
 
 import math
 
 import numpy as np
 import pytest
 
-from planner.imaging.reflectance import fresnel, reflected
+from planner.imaging.irradiance import bands
+from planner.imaging.reflectance import reflected
 from render import bsdf, variant
-from render.reflectance import NUMPY, Index, brightness, indices
-from render.reflectance import fresnel as complex_fresnel
-from scenes import Material
+from render.lights import lamps
+from scenes import Material, Picture
+from tests import textbook
+from tests.unit.test_reflectance import plain
 
 pytestmark = pytest.mark.render
 METAL = Material(specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.8, extinction=2.0, roughness=0.2)
 GLASS = Material(specular_fraction=0.5, diffuse_reflectance=0.6, refractive_index=1.5, roughness=0.3)
-
-
-def plain(material):
-    """The material's one index."""
-    return (Index(material.refractive_index, material.extinction, 1.0),)
 
 
 def ray(polar, azimuth=0.0):
@@ -37,7 +34,7 @@ def test_bsdf_is_the_papers_reflectance(name, material):
     mitsuba = variant.use(name)
     import drjit as dr
 
-    surface = bsdf.Surface(material, plain(material), (0.0, 0.0, 100.0), (0.0, 0.0, 100.0))
+    surface = bsdf.Surface(material, plain(material), (0.0, 0.0, 100.0))
     made, context = mitsuba.load_dict(bsdf.describe(mitsuba, surface)), mitsuba.BSDFContext()
     hit = dr.zeros(mitsuba.SurfaceInteraction3f)
     hit.sh_frame = mitsuba.Frame3f(mitsuba.Normal3f(0, 0, 1))
@@ -46,38 +43,11 @@ def test_bsdf_is_the_papers_reflectance(name, material):
             light, sensor = ray(t), ray(u, phi)
             hit.wi = mitsuba.Vector3f(*sensor.tolist())
             ours = np.array(made.eval(context, hit, mitsuba.Vector3f(*light.tolist()), True)).ravel()[0] * math.pi
-            assert ours == pytest.approx(float(reflected(material, np.array([0, 0, 1.0]), light, sensor)), rel=1e-4)
-
-
-def test_numpy_text_is_the_planners_to_ten_digits(rng):
-    vectors = rng.normal(size=(2, 500, 3)) * [1, 1, 0.5] + [0, 0, 1.2]
-    light, sensor = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    up = (np.zeros(500), np.zeros(500), np.ones(500))
-    for material in (METAL, GLASS):
-        ours = brightness(NUMPY, material, plain(material), up, tuple(light.T), tuple(sensor.T))
-        expected = reflected(material, np.broadcast_to([0, 0, 1.0], (500, 3)), light, sensor)
-        assert ours == pytest.approx(expected, rel=1e-10, abs=1e-12)
-
-
-@pytest.mark.parametrize(("n", "k"), [(1.5, 0.0), (1.1, 6.9), (1.8, 2.0)])
-def test_coherent_term_is_that_of_the_complex_amplitudes(n, k):
-    """Real part of r_parallel conj(r_perpendicular), Born and Wolf's amplitudes, and both squares."""
-    cosine = np.cos(np.radians([0.0, 20, 50, 56.3, 70, 85]))
-    index = n - 1j * k
-    inside = np.sqrt(1 - (1 - cosine**2) / index**2)
-    perpendicular = (cosine - index * inside) / (cosine + index * inside)
-    parallel = (index * cosine - inside) / (index * cosine + inside)
-    ours = complex_fresnel(NUMPY, cosine, n, k)
-    assert ours[0] == pytest.approx(np.abs(parallel) ** 2, abs=1e-12)
-    assert ours[1] == pytest.approx(np.abs(perpendicular) ** 2, abs=1e-12)
-    assert ours[2] == pytest.approx((parallel * perpendicular.conj()).real, abs=1e-12)
-    assert np.array(ours[:2]) == pytest.approx(np.array(fresnel(cosine, n, k)), abs=1e-12)
+            assert ours == pytest.approx(float(textbook.brightness(material, (0, 0, 1), light, sensor)), rel=1e-4)
 
 
 def seen(material, light, sensor, polarisation=None, analyser=None):
-    up = (np.array(0.0), np.array(0.0), np.array(1.0))
-    axes = (None if axis is None else tuple(np.array(axis, float)) for axis in (polarisation, analyser))
-    return float(brightness(NUMPY, material, plain(material), up, tuple(light), tuple(sensor), *axes))
+    return float(reflected(material, plain(material), ray(0), light, sensor, polarisation, analyser))
 
 
 def test_polarisation_in_the_plane_of_incidence():
@@ -109,21 +79,26 @@ def test_crossed_polarisers_leave_half_of_the_diffuse_term():
     up = ray(0)
     diffuse = 0.5 * 0.6
     mirror = seen(GLASS, up, up) - diffuse
-    assert seen(GLASS, up, up, (1, 0, 0), (0, 1, 0)) == pytest.approx(diffuse / 2, rel=1e-9)
-    assert seen(GLASS, up, up, (1, 0, 0), (1, 0, 0)) == pytest.approx(diffuse / 2 + mirror, rel=1e-9)
+    assert seen(GLASS, up, up, np.eye(3)[0], np.eye(3)[1]) == pytest.approx(diffuse / 2, rel=1e-9)
+    assert seen(GLASS, up, up, np.eye(3)[0], np.eye(3)[0]) == pytest.approx(diffuse / 2 + mirror, rel=1e-9)
 
 
 def test_the_spectrum_weighs_the_indices(task1):
     material = GLASS.model_copy(update={"index_table": ((450.0, 1.52, 0.0), (650.0, 1.48, 0.0))})
     light = task1.light.model_copy(update={"spectrum": ((450.0, 1.0), (650.0, 3.0))})
-    index = indices(task1.model_copy(update={"material": material, "light": light}))
-    assert [i.weight for i in index] == [0.25, 0.75]
+    index = bands(task1.model_copy(update={"material": material, "light": light}))
+    assert [i.share for i in index] == [0.25, 0.75]
     assert [i.n for i in index] == [1.52, 1.48]
 
 
 def test_polarised_light_is_known_by_the_size_it_is_simulated_with(task1):
-    from render.build import light_radius
+    """A lamp of radius 0.4 cm at 100 cm spans 8 mrad, and nothing where its size is not simulated."""
 
-    large = task1.model_copy(update={"light": task1.light.model_copy(update={"radius": 0.4})})
-    assert light_radius(large, frozenset({"light_size"})) == 0.4
-    assert light_radius(large, frozenset()) == light_radius(task1, frozenset({"light_size"})) == 0.0
+    def angle(radius, *effects):
+        light = task1.light.model_copy(update={"radius": radius, "polarisation_deg": 20.0})
+        picture = Picture.of(task1.model_copy(update={"light": light}), (30, 135), (15, 315))
+        (lamp,) = lamps(picture, frozenset({"polarisation", *effects}))
+        return lamp.angle
+
+    assert angle(0.4, "light_size") == pytest.approx(0.008)
+    assert angle(0.4) == angle(0.0, "light_size") == 0.0

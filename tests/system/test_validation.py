@@ -105,7 +105,7 @@ def test_what_is_predicted_is_what_is_measured(task1):
     """
     case = Campaign.of(task1).case(10)
     clean = work.render_setting(case, variant.choose())
-    image, sensor = clean.picture.array(), case.setting.sensor
+    image, sensor = clean.image.array(), case.setting.sensor
     response = measure.propagate(image, task1, sensor).response
     chunk = measure_chunk(case, image, 1, 0, 200)
     pictures = render.expose(
@@ -114,7 +114,7 @@ def test_what_is_predicted_is_what_is_measured(task1):
     linear = np.einsum("nij,ij->n", pictures - image, response)
     measured = chunk.distances["gradient"][:50]
     assert np.corrcoef(linear, measured)[0, 1] > 0.999
-    noise = task1.noise.variance_at(image)
+    noise = render.variance(image, task1.noise)
     assert clean.propagated["gradient"][0] == pytest.approx(float((noise * response**2).sum()), rel=1e-9)
     known = measure.propagate(image, task1, sensor, case.setting.light).variance_px2
     assert abs(clean.propagated["gradient"][0] / known - 1) > 0.02  # negative control

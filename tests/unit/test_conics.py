@@ -7,7 +7,8 @@ import measure
 import planner
 import scenes
 from planner.features.circles import fisher_centre, rim
-from planner.models.models import PAPER_KAPPA2, paper
+from planner.imaging.pictures import Pictures
+from planner.models.paper import PAPER_KAPPA2, paper
 
 COUNT = 1500
 TOLERANCE = 4 * np.sqrt(2 / (COUNT - 1))  # four standard errors of a variance
@@ -23,7 +24,7 @@ def check(empirical, predicted):
 
 def test_rim_is_measured_from_the_ellipses_own_centre():
     plate = scenes.load("plate")
-    seen = rim(plate, plate.solid.circle("c2"), np.array([50.0, 30.0]), np.array([20.0, 100.0]), fall_off=True)
+    seen = rim(Pictures.of(plate, (50, 30), (20, 100)), plate.solid.circle("c2"))
     normal = seen.design[:, :2]
     points = seen.design[:, 2:4] / normal
     assert np.linalg.norm(normal, axis=1) == pytest.approx(np.ones(len(normal)))
@@ -34,15 +35,15 @@ def test_rim_is_measured_from_the_ellipses_own_centre():
 def test_centre_of_a_hole_by_fitting(rng):
     """The paper model of the plate's hole is that of an ellipse fitted to points with the paper's errors."""
     plate = scenes.load("plate")
-    sensor, light = np.array([40.0, 30.0]), np.array([25.0, 100.0])
-    seen = rim(plate, plate.solid.circle("c2"), sensor, light, fall_off=False)
+    pictures = Pictures.of(plate, (40, 30), (25, 100))
+    seen = rim(pictures, plate.solid.circle("c2"), fall_off=False)
     used = seen.counted
     weight = seen.squared[used] / (PAPER_KAPPA2 * plate.noise.sigma**2)
     x, y = (seen.design[used, i] / seen.design[used, i - 2] for i in (2, 3))
     points, sigma = np.stack([x, y], -1), 1 / np.sqrt(weight)
     keep = sigma < 1.0  # a point worse than a pixel is nearly no point, and its distance is not linear
     predicted = fisher_centre(seen, seen.squared / (PAPER_KAPPA2 * plate.noise.sigma**2) * 1.0, used)
-    evaluated = paper(plate, sensor, light)
+    evaluated = paper(pictures)
     assert evaluated.centres[0] == pytest.approx(predicted)
     centres = [
         measure.fit_ellipse(
@@ -51,4 +52,4 @@ def test_centre_of_a_hole_by_fitting(rng):
         for _ in range(COUNT)
     ]
     check(np.var(centres, axis=0, ddof=1), np.diag(predicted))
-    assert planner.predict(plate, sensor, light, "paper").variance_px2 == pytest.approx(evaluated.variance)
+    assert planner.predict(plate, (40, 30), (25, 100), "paper").variance_px2 == pytest.approx(evaluated.variance)

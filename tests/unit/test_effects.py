@@ -5,8 +5,9 @@ import pytest
 
 import render
 import scenes
+from planner import Pictures
 from render.phenomena import REGISTER, Tolerance, choose
-from scenes import Floor, InvalidInput, Noise, Obstacle, Pose
+from scenes import Floor, InvalidInput, Noise, Obstacle, Picture, Pose
 from scenes.load import load, names
 
 SENSOR, LIGHT = Pose(30, 135), Pose(15, 315)
@@ -20,7 +21,7 @@ NEEDED = {
 
 
 def active(scene, **tolerance):
-    return choose(scene, "auto", Tolerance(**tolerance), SENSOR, LIGHT).active
+    return choose(scene, "auto", Tolerance(**tolerance), Picture.of(scene, SENSOR, LIGHT)).active
 
 
 def test_register_has_every_effect_once():
@@ -53,17 +54,16 @@ def test_tolerance_decides(task1):
     scene = task1.model_copy(update={"floor": Floor(reflectance=1e-3)})
     assert "floor" in active(scene)
     assert not {"floor", "interreflection"} & active(scene, bias_px=0.1, variance=0.1)
-    assert choose(scene, "auto", Tolerance(0.1, 0.1), SENSOR, LIGHT).scene.floor is None
+    assert choose(scene, "auto", Tolerance(0.1, 0.1), Picture.of(scene, SENSOR, LIGHT)).scene.floor is None
 
 
 def test_decision_is_made_for_the_setting(task1):
     """An upright that shades a required edge from one light and not from the other."""
     scene = task1.model_copy(update={"obstacles": (Obstacle(corner=(14, 0, 0), size=(1, 7.5, 10)),)})
     shades = REGISTER["cast_shadow"]
-    from render.phenomena.base import Poses
 
     def influence(light):
-        return shades.influence(scene, Poses(np.array([[30.0, 135.0]]), np.array([light], float)))
+        return shades.influence(Pictures.of(scene, [[30, 135]], [light]))
 
     assert influence((40, 0)).variance == np.inf
     assert influence((40, 180)) == (0, 0)
@@ -94,14 +94,6 @@ def test_shaken_poses_scatter_as_said(task1, rng):
     along = (poses - [30, 135]) * [1, np.sin(np.radians(30))]
     assert along.std(0) == pytest.approx(0.1, rel=4 / np.sqrt(2 * 2000))
     assert render.shaken(scene, "light", LIGHT, rng) == LIGHT
-
-
-def test_noise_that_needs_darkness_names_it(tmp_path):
-    text = (scenes.load.__globals__["BUNDLED"] / "low_light.toml").read_text()
-    path = tmp_path / "bad.toml"
-    path.write_text(text.replace("dark_level = 20.0", "dark_level = 3.0"))
-    with pytest.raises(InvalidInput, match=r"noise.dark_level must be noise.dark_level \(20\) where"):
-        scenes.load(path)
 
 
 def test_saturation_only_where_levels_reach_the_end(task1):

@@ -5,10 +5,12 @@ import pytest
 
 import planner
 import scenes
-from planner.features.measurand import jacobian, measurand, required_edges
+from planner.features.measurand import measurand, required_edges
 from planner.features.projected_edges import projected_edges
-from planner.imaging.projection import edge_points, project
-from planner.models.models import paper
+from planner.imaging.appearance import paper_contrast2
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import edge_points, jacobian, project
+from planner.models.paper import paper
 from scenes import InvalidInput
 
 SENSOR, LIGHT = np.array([35.0, 70.0]), np.array([20.0, 200.0])
@@ -48,7 +50,7 @@ def test_scale_of_a_distance(task1):
         return np.linalg.norm(np.diff(project(moved, SENSOR, task1.camera), axis=0))
 
     numeric = (image_distance(1e-4) - image_distance(-1e-4)) / 2e-4
-    assert measurand(task1, SENSOR).scale == pytest.approx(numeric, rel=1e-6)
+    assert measurand(Pictures.of(task1, SENSOR)).scale == pytest.approx(numeric, rel=1e-6)
     prediction = planner.predict(task1, SENSOR, LIGHT)
     assert prediction.variance_cm2 == pytest.approx(prediction.variance_px2 / numeric**2, rel=1e-6)
 
@@ -70,10 +72,10 @@ def test_scale_of_an_angle(angle):
         one, two = image[1:] - image[0]
         return np.arccos(one @ two / np.linalg.norm(one) / np.linalg.norm(two))
 
-    assert measurand(angle, SENSOR).value == pytest.approx(image_angle(0.0), rel=1e-12)
-    assert measurand(angle, SENSOR).value_object == pytest.approx(np.pi / 2)
+    assert measurand(Pictures.of(angle, SENSOR)).value == pytest.approx(image_angle(0.0), rel=1e-12)
+    assert measurand(Pictures.of(angle, SENSOR)).value_object == pytest.approx(np.pi / 2)
     numeric = (image_angle(1e-5) - image_angle(-1e-5)) / 2e-5
-    assert measurand(angle, SENSOR).scale == pytest.approx(numeric, rel=1e-5)
+    assert measurand(Pictures.of(angle, SENSOR)).scale == pytest.approx(numeric, rel=1e-5)
 
 
 def measured(scene, lines, view):
@@ -105,7 +107,7 @@ def shared(scene, view):
 def test_derivatives_by_the_lines(name, angle):
     """Every line's displacement and rotation against central differences; the wedge's corners share an edge."""
     scene = angle if name == "angle" else scenes.load(name)
-    known = measurand(scene, SENSOR)
+    known = measurand(Pictures.of(scene, SENSOR))
     step = np.array([1e-4, 1e-6])
     for e in range(len(known.view.names)):
         for k, ours in enumerate((known.offset, known.tilt)):
@@ -119,14 +121,12 @@ def test_derivatives_by_the_lines(name, angle):
 def test_paper_price_by_monte_carlo(name, angle, rng):
     """The variance of fits to points with the paper's errors; 1.3 x the prediction and 0 are rejected."""
     scene = angle if name == "angle" else scenes.load(name)
-    evaluated = paper(scene, SENSOR, LIGHT)
+    evaluated = paper(Pictures.of(scene, SENSOR, LIGHT))
     view = evaluated.measurand.view
     fractions = np.linspace(0, 1, 100)
     points = edge_points(scene.solid, view.names, fractions)
     image = project(points.reshape(-1, 3), SENSOR, scene.camera).reshape(len(view.names), 100, 2)
-    from planner.imaging.contrast import squared_contrast
-
-    squared = squared_contrast(scene, view.names, fractions, SENSOR, LIGHT, fall_off=False)
+    squared = paper_contrast2(Pictures.of(scene, SENSOR, LIGHT), view.names, fractions)
     sigma = np.sqrt(8.697) * scene.noise.sigma / np.sqrt(squared)
     along = (view.ends[:, 1] - view.ends[:, 0]) / view.lengths[:, None]
     normal = np.stack([-along[:, 1], along[:, 0]], -1)
@@ -172,7 +172,7 @@ def test_bad_tasks(task1):
 def test_outline_of_a_hidden_edge_keeps_what_is_seen():
     bracket = scenes.load("bracket")
     sensor = np.array([55.0, 178.0])  # behind the upright
-    view = projected_edges(bracket, sensor, ("e14",))
+    view = projected_edges(Pictures.of(bracket, sensor), ("e14",))
     shown = view.shown[0]
     assert 0 < shown[0] < shown[1] == 1 or not view.visible[0]
     assert view.trims[0, 0] > shown[0] * view.lengths[0]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import measure
-import scenes
 from measure import status
 from measure.features.corners import intersect, line_equations
 from measure.features.layout import layout_of
@@ -12,7 +11,7 @@ from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from measure.features.shape import prepared
 from planner.imaging.projection import project
-from scenes import InvalidInput, Noise
+from scenes import InvalidInput, Noise, Picture
 from tests.oracle import polygon_image
 
 SENSOR = (30, 135)
@@ -96,7 +95,7 @@ def test_canny_deviates_because_it_chooses_pixels(quiet, rng):
     predicted = measure.propagate(image, quiet, SENSOR, estimator="canny").variance_px2
     free, _ = sample_variance(quiet, image, SENSOR, "canny", np.random.default_rng(5))
     frozen = []
-    tool = prepared(layout_of(quiet, scenes.Pose(*SENSOR)), "canny", 12.0)
+    tool = prepared(layout_of(Picture.of(quiet, SENSOR)), "canny", 12.0)
     canny = [part.locator for part in tool.parts]
     masks = [edge.edge_pixels(*edge.gradient(image)) for edge in canny]
     for _ in range(40):

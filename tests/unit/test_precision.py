@@ -3,10 +3,11 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from planner.models.models import paper
 
 import planner
 from planner.features.propagation import corner_covariance
+from planner.imaging.pictures import Pictures
+from planner.models.paper import paper
 
 mp.mp.dps = 50
 
@@ -104,7 +105,7 @@ def exact_model(scene, sensor, light):
 def test_whole_model(task1, sensor, light):
     """Face-on, grazing sensor, grazing light, light = view direction."""
     exact = exact_model(task1, sensor, light)
-    ours = paper(task1, np.array(sensor, float), np.array(light, float)).variance
+    ours = paper(Pictures.of(task1, sensor, light)).variance
     assert abs(mp.mpf(float(ours)) / exact - 1) < 1e-12
     fixed = planner.variance_map(
         task1, sensor=sensor, space=_One(light), model="paper", objective="image"

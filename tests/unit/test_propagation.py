@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from planner.models.models import paper
 
 from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
-from measure.features.lines import fit_lines, unit_covariance
+from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from measure.measurement import separation
+from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
+from planner.imaging.pictures import Pictures
+from planner.models.paper import paper
 from tests.scalar import weighted_points
 
 SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)
@@ -52,7 +54,7 @@ def displacement(edge, place):
 
 @pytest.fixture(scope="module")
 def predicted(task1):
-    return paper(task1, np.array(SENSOR), np.array(LIGHT))
+    return paper(Pictures.of(task1, SENSOR, LIGHT))
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0, 1.7])
@@ -97,10 +99,11 @@ def test_the_variance_of_correlated_points_against_monte_carlo(rng):
     offset = sigma * rng.standard_normal((DRAWS, 25)) @ root.T
     whole = np.ones(offset.shape, bool)
     lines = fit_lines(EdgePoints(np.broadcast_to(along, offset.shape), offset, whole, whole[:, 0], whole[:, 0]))
-    ours = sigma**2 * unit_covariance(along, scale)
+    response = regression(along)
+    ours = sigma**2 * response @ correlation(along[:, None] - along, scale) @ response.T
     for values, known in ((lines.mean_offset, ours[0, 0]), (np.tan(lines.tilt), ours[1, 1])):
         assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)
-    independent = sigma**2 * unit_covariance(along, 1e-6)
+    independent = sigma**2 * response @ response.T
     assert lines.mean_offset.var(ddof=1) != pytest.approx(independent[0, 0], rel=WITHIN)
 
 

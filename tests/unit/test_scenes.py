@@ -80,6 +80,23 @@ def test_task1_is_the_papers(task1):
     assert np.linalg.norm(task1.solid.vertex("v3") - task1.solid.vertex("v6")) == pytest.approx(np.hypot(12.5, 7.5))
 
 
+def older(tmp_path, noise=""):
+    """Task1 as older files say it, the level of darkness with the camera."""
+    path = tmp_path / "older.toml"
+    text = re.sub(r"dark_level = .*\n", "", TASK1).replace("exposure = 200.0", "exposure = 200.0\nblack_level = 20.0")
+    path.write_text(text.replace("sigma = 2.4", f"sigma = 2.4\n{noise}"))
+    return path
+
+
+def test_the_dark_level_of_older_files(tmp_path, task1):
+    """It stood with the camera; twice the same is taken, two different ones are refused."""
+    assert task1.noise.dark_level == 20.0
+    for noise in ("", "dark_level = 20.0"):
+        assert scenes.load(older(tmp_path, noise)).noise == task1.noise
+    with pytest.raises(InvalidInput, match=r"noise\.dark_level must be camera\.black_level \(20\.0\), got 3\.0"):
+        scenes.load(older(tmp_path, "dark_level = 3.0"))
+
+
 def test_block_is_closed_and_its_normals_point_outwards():
     solid = block((3.0, 2.0, 1.0))
     assert len(solid.edges) == 12

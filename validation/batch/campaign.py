@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 import scenes
-from scenes import InvalidInput, Pose, Scene, Setting
+from scenes import InvalidInput, Picture, Pose, Scene, Setting
 from scenes.errors import describe
 from scenes.model import Model
 
@@ -59,6 +59,11 @@ class Case:
     scene: Scene
     setting: Setting
     parameters: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def picture(self) -> Picture:
+        """The setting as planner, renderer and measurement take it."""
+        return Picture.of(self.scene, self.setting.sensor, self.setting.light)
 
 
 class Campaign(Model):

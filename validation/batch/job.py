@@ -30,13 +30,13 @@ from validation.batch.result import Validation, collect
 from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
-from validation.batch.work import CHUNK, Found, Picture, Rendering, Task
+from validation.batch.work import CHUNK, Found, Packed, Rendering, Task
 from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
 _PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
 _MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
-_PICTURES = 64  # settings whose image is kept for the report
+_IMAGES = 64  # settings whose image is kept for the report
 _BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
 _CHECK_S = 5.0  # between looks at whether the workers are still there
 Progress = Callable[[str, int, int], None]
@@ -230,7 +230,7 @@ class _Batch:
                 if setting is None:
                     break
                 pending[crew.executor.submit(work.perform, setting.task(group))] = setting
-                if setting.picture and setting.left:
+                if setting.image and setting.left:
                     opened.appendleft(setting)
             if not pending:
                 return
@@ -243,7 +243,7 @@ class _Batch:
                 found = self._result(future, crew)
                 self._commit(setting.case.index, found)
                 if found.clean and setting.left:
-                    setting.picture = found.clean.picture
+                    setting.image = found.clean.image
                     opened.append(setting)
 
     def _result(self, future: Future, crew: Crew) -> Found:
@@ -256,8 +256,8 @@ class _Batch:
     def _commit(self, index: int, found: Found) -> None:
         self.store.add(index, found)
         finished = len(self.store.chunks(index)) == len(self.stages.sizes(index))
-        if index >= _PICTURES and finished and self.more is None:
-            self.store.drop_picture(index)
+        if index >= _IMAGES and finished and self.more is None:
+            self.store.drop_image(index)
         sizes = self.stages.sizes(index)
         images = sum(sizes[chunk] for chunk in found.chunks)
         self.done += images
@@ -277,7 +277,7 @@ class _Batch:
             except InvalidInput as error:
                 self._commit(index, Found(None, {}, str(error)))
                 continue
-            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.picture(index))
+            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.packed(index))
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
@@ -293,9 +293,9 @@ class _Setting:
     seed: int
     variant: str
     how: Rendering
-    picture: Picture | None
+    image: Packed | None
 
     def task(self, group: int) -> Task:
         """The next task."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
-        return Task(self.case, chunks, self.seed, self.variant, self.picture, self.how)
+        return Task(self.case, chunks, self.seed, self.variant, self.image, self.how)

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenes import InvalidInput
 from validation.batch.stopped import Stopped
-from validation.batch.work import Chunk, Clean, Found, Picture
+from validation.batch.work import Chunk, Clean, Found, Packed
 
 _SCHEMA = """
 BEGIN IMMEDIATE;
@@ -112,20 +112,20 @@ class RunFile:
             for number, chunk in found.chunks.items():
                 self._add_chunk(setting, number, chunk)
 
-    def drop_picture(self, setting: int) -> None:
+    def drop_image(self, setting: int) -> None:
         """Give up the image of a finished setting, so that a long campaign's file stays small."""
         with self._transaction():
             self._db.execute("UPDATE setting SET image = NULL WHERE setting = ?", (setting,))
 
-    def picture(self, setting: int) -> Picture | None:
+    def packed(self, setting: int) -> Packed | None:
         """Noise-free image of a setting, or None if it is not rendered or not kept."""
         row = self._db.execute("SELECT height, width, image FROM setting WHERE setting = ?", (setting,)).fetchone()
-        return Picture(*row) if row and row[2] is not None else None
+        return Packed(*row) if row and row[2] is not None else None
 
     def image(self, setting: int) -> np.ndarray | None:
         """The same as an array, grey levels."""
-        picture = self.picture(setting)
-        return picture and picture.array()
+        packed = self.packed(setting)
+        return packed and packed.array()
 
     def chunks(self, setting: int) -> dict[int, int]:
         """The finished chunks of a setting, with their number of images."""
@@ -173,7 +173,7 @@ class RunFile:
         return total
 
     def _add_clean(self, setting: int, clean: Clean) -> None:
-        row = setting, *clean.picture, json.dumps(clean.predicted), json.dumps(clean.seconds)
+        row = setting, *clean.image, json.dumps(clean.predicted), json.dumps(clean.seconds)
         self._db.execute("INSERT OR REPLACE INTO setting VALUES (?, ?, ?, ?, ?, ?, NULL)", row)
         rows = [(setting, method, *found) for method, found in clean.propagated.items()]
         self._db.executemany("INSERT OR REPLACE INTO propagated VALUES (?, ?, ?, ?, ?)", rows)

@@ -46,7 +46,7 @@ def methods(scene: Scene) -> tuple[Method, ...]:
     return (Method("gradient"), *(Method("canny", threshold) for threshold in scene.locator.thresholds))
 
 
-class Picture(NamedTuple):
+class Packed(NamedTuple):
     """A noise-free image as it travels and is stored: zlib-compressed little-endian float64."""
 
     height: int
@@ -54,7 +54,7 @@ class Picture(NamedTuple):
     data: bytes
 
     @classmethod
-    def of(cls, image: np.ndarray) -> Picture:
+    def of(cls, image: np.ndarray) -> Packed:
         return cls(*image.shape, zlib.compress(image.astype("<f8").tobytes(), 1))
 
     def array(self) -> np.ndarray:
@@ -67,14 +67,14 @@ class Clean:
 
     Attributes
     ----------
-    picture : Picture
+    image : Packed
     propagated : dict
         Variance (px^2), distance in the image (px) and status, by method.
     predicted : dict
         Variances that need no image, px^2 (``paper`` without its free scale), and the model's distance ``value_px``.
     """
 
-    picture: Picture
+    image: Packed
     propagated: dict[str, tuple[float, float, str]]
     predicted: dict[str, float]
     seconds: dict[str, float]
@@ -100,13 +100,13 @@ class Rendering:
 
 @dataclass(frozen=True)
 class Task:
-    """Chunks of one setting, (number, images) each; without a picture the worker renders it."""
+    """Chunks of one setting, (number, images) each; without an image the worker renders it."""
 
     case: Case
     chunks: tuple[tuple[int, int], ...]
     seed: int
     variant: str
-    picture: Picture | None = None
+    image: Packed | None = None
     rendering: Rendering = Rendering()
 
 
@@ -138,10 +138,10 @@ def _perform(task: Task) -> Found:
         variants.use(task.variant)  # what the machine cannot do is not the setting's fault
     try:
         clean = None
-        if task.picture is None:
+        if task.image is None:
             with _RENDERER:
                 clean = render_setting(task.case, task.variant, task.rendering)
-        image = (task.picture or clean.picture).array()
+        image = (task.image or clean.image).array()
         shots = _shots(task)
         return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, n, shots) for k, n in task.chunks})
     except InvalidInput as error:
@@ -163,30 +163,30 @@ def _shots(task: Task) -> Shots | None:
 
 def _jitter(case: Case, how: Rendering) -> Jitter:
     """How exactly poses are set, as far as it is simulated."""
-    scene, setting = case.scene, case.setting
+    scene = case.scene
     if scene.jitter == Jitter():  # nearly always: spare the choice
         return scene.jitter
-    return render.choose(scene, how.effects, how.tolerance, setting.sensor, setting.light).scene.jitter
+    return render.choose(scene, how.effects, how.tolerance, case.picture).scene.jitter
 
 
 def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
     """Render a setting, and predict with and without its image."""
     clock = _Clock()
-    scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
-    predicted = {model: planner.predict(scene, sensor, light, model) for model in ("paper", "calibrated", "bound")}
+    scene, picture = case.scene, case.picture
+    predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
     numbers = {model: found.variance_px2 for model, found in predicted.items()}
     numbers["value_px"] = predicted["calibrated"].value_px
     clock.lap("predict")
-    image = render.image(scene, sensor, light, how.quality, variant, how.effects, how.tolerance)
+    image = render.image(picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance)
     clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
-    spread = float(planner.pose_spread(shaken, np.array([list(sensor)])).variance[0])
-    propagated = {}
+    spread = float(planner.pose_spread(shaken, np.array([list(picture.sensor)])).variance[0])
+    propagated, measured = {}, picture.unlit()  # as it is measured
     for method in methods(scene):
-        found = measure.propagate(image, scene, sensor, None, method.locator, method.threshold)  # as it is measured
+        found = measure.propagate(image, measured, estimator=method.locator, threshold=method.threshold)
         propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
     clock.lap("propagate")
-    return Clean(Picture.of(image), propagated, numbers, clock.seconds)
+    return Clean(Packed.of(image), propagated, numbers, clock.seconds)
 
 
 def measure_chunk(
@@ -201,8 +201,8 @@ def measure_chunk(
     """
     cv2.setNumThreads(1)  # workers share the cores among themselves
     clock = _Clock()
-    scene, sensor = case.scene, case.setting.sensor
-    where = measure.region_of_interest(scene, sensor)
+    scene, picture = case.scene, case.picture.unlit()
+    where = measure.region_of_interest(picture)
     clock.lap("prepare")
     parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
     for batch, first in enumerate(range(0, count, _BATCH)):
@@ -211,7 +211,7 @@ def measure_chunk(
         pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
         clock.lap("expose")
         for method in methods(scene):
-            found = measure.distance(pictures, scene, sensor, None, method.locator, method.threshold)
+            found = measure.distance(pictures, picture, estimator=method.locator, threshold=method.threshold)
             parts[method.name].append(found)
             clock.lap(method.name)
     distances = {name: np.concatenate([part.value_px for part in found]) for name, found in parts.items()}

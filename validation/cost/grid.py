@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 import planner
-from planner.search.exhaustive import is_separable
+from planner.search.exhaustive import has_bound
 from scenes import Scene
 from validation.cost.parameter import Fit, Parameter, slope
 
@@ -15,7 +15,7 @@ _COARSE = (30.0, 20.0, 15.0)  # where every pair has to be evaluated
 
 def grid_parameter(scene: Scene) -> Parameter:
     """Variance of the grid's optimum over the refined one's, less 1, against the step."""
-    steps, rows = _STEPS if is_separable(scene, "calibrated") else _COARSE, []
+    steps, rows = _STEPS if has_bound(scene, "calibrated") else _COARSE, []
     plans = []
     for step in steps:
         for search in ("exhaustive", "alternating"):

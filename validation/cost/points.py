@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.features.projected_edges import image_fractions
-from planner.imaging.contrast import squared_contrast
+from planner.imaging.appearance import edge_contrast
+from planner.imaging.pictures import Pictures
 from validation.batch.campaign import Case
 from validation.cost.parameter import Fit, Parameter, slope
 
@@ -70,9 +71,9 @@ def points_parameter(case: Case) -> Parameter:
 def _end_variance(case: Case, fractions: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Variance at the end of each required edge's line, its length and information density being 1, shape (E,)."""
     names = case.scene.task.edges
-    sensor, light = (np.array(list(pose)) for pose in (case.setting.sensor, case.setting.light))
-    u = image_fractions(case.scene, names, sensor, np.concatenate([[0.0], fractions, [1.0]]))[..., 1:-1]
-    density = squared_contrast(case.scene, names, fractions, sensor, light, fall_off=True) * weights
+    pictures = Pictures.of(case.picture)
+    u = image_fractions(case.scene, names, pictures.sensors, fractions)
+    density = edge_contrast(pictures, names, fractions).squared * weights
     total = density.sum(-1)
     mean = (density * u).sum(-1) / total
     spread = (density * (u - mean[..., None]) ** 2).sum(-1)

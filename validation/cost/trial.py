@@ -119,7 +119,7 @@ class _Tried:
         self.case, self.variant, self.seed, self.how = case, variant, seed, how
         clean = work.render_setting(case, variant, how)
         self.seconds = sum(clean.seconds.values())
-        self.image = clean.picture.array()
+        self.image = clean.image.array()
         self.found = self._propagate(self.image, case.setting.sensor)
         self.status = self.found.status
         self.usable = math.isfinite(self.found.variance_px2)

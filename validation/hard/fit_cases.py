@@ -9,9 +9,10 @@ import numpy as np
 from measure.features.calipers import Caliper
 from measure.features.conic import fit_ellipse
 from measure.features.corners import corner_response, intersect
-from measure.features.lines import fit_lines, unit_covariance
+from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from measure.measurement import separation
+from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
 from validation.hard.case import Answer, Case, Reference
 
@@ -91,7 +92,7 @@ def line_reference(points: EdgePoints, weights: np.ndarray | float, place: str) 
 
 
 def _covariances() -> list[Case]:
-    """The line's variance from points that the smoothing correlates, as Canny's line is said to have."""
+    """The line's variance from points that the smoothing correlates, by the least-squares line's own weights."""
     settings = {
         "shortest edge: 3 points on 2 px": (np.linspace(0, 2, 3), 1.0),
         "8 points, 1 px apart": (np.arange(8.0), 1.0),
@@ -107,7 +108,8 @@ def _covariances() -> list[Case]:
 
 def _spread(along: np.ndarray, scale: float) -> Answer:
     lever = np.array([1.0, along[-1] - along.mean()])
-    return Answer(float(lever @ unit_covariance(along, scale) @ lever))
+    response = lever @ regression(along)
+    return Answer(float(response @ correlation(along[:, None] - along, scale) @ response))
 
 
 def _spread_reference(along: np.ndarray, scale: float) -> Reference:

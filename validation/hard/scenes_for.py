@@ -29,11 +29,22 @@ def scaled(factor: float) -> Scene:
     )
 
 
+class _Made(Mesh):
+    """A solid that no file holds."""
+
+    made: Any
+
+    @property
+    def solid(self) -> Solid:
+        return self.made
+
+    def __hash__(self) -> int:
+        return id(self.made)
+
+
 def with_solid(scene: Scene, solid: Solid) -> Scene:
     """The scene with another solid of the block's names, wherever it stands."""
-    mesh = Mesh.model_construct(kind="mesh", file="made.stl", names={})
-    mesh.__dict__["solid"] = solid
-    return scene.model_copy(update={"object": mesh})
+    return scene.model_copy(update={"object": _Made(kind="mesh", file="made.stl", made=solid)})
 
 
 def moved_block(scene: Scene, shift: tuple[float, float, float]) -> Scene:

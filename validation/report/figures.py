@@ -40,7 +40,7 @@ def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path)
 def _panels(campaign: Campaign, store: RunFile) -> dict[str, list[Case]]:
     """The first settings that have an image, by sensor and scene, as pictures' names."""
     panels: dict[str, list[Case]] = {}
-    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.picture(i))
+    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.packed(i))
     for case in map(campaign.case, itertools.islice(shown, _SHOWN)):
         sensor = case.setting.sensor
         labels = [case.scene.name] * (len(campaign.scenes) > 1) + [f"{v:g}" for v in _numbers(case.parameters)]
@@ -61,7 +61,7 @@ def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
 
 def _covered(case: Case, picture: np.ndarray) -> np.ndarray:
     """The part of a picture that the object covers."""
-    rows, columns = window(case.scene, case.setting.sensor)
+    rows, columns = window(case.picture)
     return picture[max(rows.start - 8, 0) : rows.stop + 8, max(columns.start - 8, 0) : columns.stop + 8]
 
 

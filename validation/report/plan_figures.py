@@ -10,13 +10,16 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from planner import Plan, ViewingSpace, variance_map
+from planner import Pictures, Plan, ViewingSpace, variance_map
 from planner.features.projected_edges import projected_edges, straight
+from planner.imaging.appearance import is_separable, signal
+from planner.imaging.lens import recorded
 from planner.imaging.projection import direction, facing, project
 from planner.imaging.visibility import visible_spans
 
 _STEP = 1.0  # degrees, where a map takes a moment; where it takes longer:
 _COARSE = 4.0
+_PIECES = 17  # of an edge as it is drawn: a lens may bend it
 
 
 def draw(plan: Plan, directory: Path) -> list[Path]:
@@ -45,7 +48,7 @@ def map_picture(plan: Plan, path: Path) -> Path:
 
 
 def _map(plan: Plan, role: str) -> tuple[ViewingSpace, np.ndarray]:
-    space = ViewingSpace(_STEP if plan.scene.solid.is_convex and plan.scene.material.is_diffuse else _COARSE, (0, 180))
+    space = ViewingSpace(_STEP if is_separable(plan.scene) else _COARSE, (0, 180))
     fixed = {"sensor": plan.sensor} if role == "light" else {"light": plan.light}
     return space, variance_map(plan.scene, **fixed, space=space, model=plan.model, objective=plan.objective)
 
@@ -126,33 +129,32 @@ def _surface(plan, space, values, title, path: Path) -> Path:
 
 
 def _seen(plan: Plan, path: Path) -> Path:
-    """ProjectedEdges of the object from the optimal sensor: faces by brightness, required edges in colour."""
-    scene, pose = plan.scene, np.array(list(plan.sensor))
-    solid, camera = scene.solid, scene.camera
+    """The object from the optimal sensor: faces by brightness, required edges in colour."""
+    scene, pictures = plan.scene, Pictures.of(plan.scene, list(plan.sensor), list(plan.light))
+    solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
     figure, axis = plt.subplots(figsize=(6.5, 6), layout="constrained")
     axis.set_facecolor("0.05")
-    position = scene.position("sensor", plan.sensor)
-    light = scene.position("light", plan.light)
     shown = facing(solid, position)
+    levels = signal(pictures, solid.triangles.mean(1), solid.normals[solid.triangle_faces], 1)
+    brightest = max(levels.max(), np.finfo(float).tiny)
     corners = project(solid.triangles.reshape(-1, 3), pose, camera).reshape(-1, 3, 2)
     away = np.linalg.norm(solid.triangles.mean(1) - position, axis=1)
     for k in np.argsort(-away):
         face = solid.triangle_faces[k]
         if shown[face]:
-            towards = light - solid.triangles[k].mean(0)
-            level = max(float(solid.normals[face] @ towards / np.linalg.norm(towards)), 0.0)
-            axis.fill(*corners[k].T, color=str(0.08 + 0.85 * level), lw=0.4, ec=str(0.08 + 0.85 * level))
+            grey = str(0.08 + 0.85 * levels[k] / brightest)
+            axis.fill(*corners[k].T, color=grey, lw=0.4, ec=grey)
     for edge in solid.edges:
-        for span in visible_spans(solid, edge, position):
+        for span in visible_spans(scene.bodies, edge, position):
             _segment(axis, scene, pose, edge, span, color="0.5", lw=0.7)
-    view = projected_edges(scene, pose, tuple(dict.fromkeys(straight(scene))))
+    view = projected_edges(pictures, tuple(dict.fromkeys(straight(scene))))
     for i, name in enumerate(view.names):
-        for span in visible_spans(solid, solid.edge(name), position):
+        for span in visible_spans(scene.bodies, solid.edge(name), position):
             _segment(axis, scene, pose, solid.edge(name), span, color=f"C{i % 10}", lw=2.5, label=name)
     for name in dict.fromkeys(scene.task.edges):
         if name not in view.names:
             _rim(axis, scene, pose, solid.circle(name))
-    axis.plot(*plan.prediction.corners.T, "o", mfc="none", color="w", ms=11, mew=1.5)
+    axis.plot(*recorded(plan.prediction.corners, camera).T, "o", mfc="none", color="w", ms=11, mew=1.5)
     low, high = (f(project(solid.vertices, pose, camera), axis=0) for f in (np.min, np.max))
     axis.set(
         xlim=(low[0] - 12, high[0] + 12),
@@ -168,7 +170,7 @@ def _seen(plan: Plan, path: Path) -> Path:
 
 def _segment(axis, scene, pose, edge, span, **style) -> None:
     start, stop = scene.solid.vertices[list(edge.ends)]
-    points = project(start + np.array(span)[:, None] * (stop - start), pose, scene.camera)
+    points = project(start + np.linspace(*span, _PIECES)[:, None] * (stop - start), pose, scene.camera)
     axis.plot(*points.T, solid_capstyle="round", **style)
 
 

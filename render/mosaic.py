@@ -1,0 +1,121 @@
+"""Rays of single fine pixels in a scalar variant of Mitsuba, which renders nothing but rectangles.
+
+Small square tiles that hold the wanted pixels are looked at by a sensor each, all of them side by side on one film: a
+call of the renderer takes as long as a thousand rays, making a sensor as long as some twenty.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from render.adaptive import crossed
+
+_SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels
+_SENSOR = {"perspective": 20, "thinlens": 200}  # rays that take as long as making a sensor
+_MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed the tip of a corner from a refined one
+_AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
+
+
+def refine_tiles(
+    mitsuba: Any,
+    scene: Any,
+    view: dict,
+    start: tuple[int, int],
+    fine: np.ndarray,
+    marked: np.ndarray,
+    samples: int,
+    seed: int,
+) -> np.ndarray:
+    """The image with its marked fine pixels rendered again, and then those that turn out to be crossed as well.
+
+    Parameters
+    ----------
+    mitsuba : module
+        With a scalar variant set.
+    scene : mitsuba.Scene
+    view : dict
+        Description of the sensor.
+    start : tuple of int
+        Row and column in the sensor's whole frame of the first pixel of ``fine``.
+    fine : ndarray
+        The image as rendered so far.
+    marked : ndarray of bool
+    samples : int
+        Multi-jittered rays a fine pixel, a square number.
+    seed : int
+        The same gives the same image, bit by bit, whatever the number of processor cores.
+    """
+    first = _mosaic(mitsuba, scene, view, start, fine, marked, samples, (seed, 0))
+    missed = crossed(first, step=_MISSED) & ~marked
+    return _mosaic(mitsuba, scene, view, start, first, missed, samples, (seed, 1))
+
+
+def _mosaic(mitsuba, scene, view, start, fine, marked, samples, seed: tuple[int, int]) -> np.ndarray:
+    """The image with the tiles that hold a marked fine pixel rendered again."""
+    side = _side(marked, samples, _SENSOR[view["type"]])
+    corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side
+    parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
+    seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
+    result = np.pad(fine, [(0, -size % side) for size in fine.shape])
+    for part, number in zip(parts, seeds, strict=True):
+        sensor = _side_by_side(mitsuba, view, [(y + start[0], x + start[1]) for y, x in part], side, samples)
+        strip = np.array(mitsuba.render(scene, sensor=sensor, seed=number), float)[:, :, 0]
+        for i, (y, x) in enumerate(part):
+            result[y : y + side, x : x + side] = strip[:, i * side : (i + 1) * side]
+    return result[: fine.shape[0], : fine.shape[1]]
+
+
+def _held(marked: np.ndarray, side: int) -> np.ndarray:
+    """Which square tiles hold a marked pixel.
+
+    >>> _held(np.array([[0, 0, 1], [0, 0, 0]], bool), 2)
+    array([[False,  True]])
+    """
+    padded = np.pad(marked, [(0, -size % side) for size in marked.shape])
+    return padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side).any((1, 3))
+
+
+def _side(marked: np.ndarray, samples: int, sensor: int) -> int:
+    """The side of tiles that take the least time, where making a sensor takes as long as some rays."""
+    return min(_SIDES, key=lambda side: int(_held(marked, side).sum()) * (sensor + side * side * samples))
+
+
+def _side_by_side(mitsuba: Any, view: dict, corners: list[tuple[int, int]], side: int, samples: int) -> Any:
+    """One sensor whose film holds the tiles of the whole frame at some corners (row, column) from left to right."""
+    make, frame = mitsuba.PluginManager.instance().create_object, view["film"]
+    film = {key: value for key, value in frame.items() if not key.startswith("crop")}
+    row = mitsuba.Properties("batch")
+    row["film"] = mitsuba.load_dict({**film, "width": side * len(corners), "height": side})
+    row["sampler"] = mitsuba.load_dict({"type": "multijitter", "sample_count": samples})
+    one = mitsuba.Properties(view["type"])
+    for key in view.keys() - {"type", "film", "sampler"}:
+        one[key] = view[key]
+    one["sampler"], one["film"] = row["sampler"], mitsuba.load_dict({**film, "width": side, "height": side})
+    lens, sensors = view["type"] == "thinlens", []
+    if not lens:
+        one["fov"] = 2 * math.degrees(math.atan(math.tan(math.radians(view["fov"] / 2)) * side / frame["width"]))
+    for i, (y, x) in enumerate(corners):
+        if lens:
+            one["film"] = mitsuba.load_dict(film)
+        else:  # its whole film is the tile; offsets are in parts of the film
+            one["principal_point_offset_x"] = (x - frame["width"] / 2) / side + 0.5
+            one["principal_point_offset_y"] = (y - frame["height"] / 2) / side + 0.5
+        sensors.append(make(one))
+        row[f"tile{i:04}"] = sensors[-1]
+    made = make(row)
+    for sensor, corner in zip(sensors if lens else (), corners, strict=False):
+        _crop(mitsuba, sensor, frame, corner, side)  # only now, for the row has given each film its own size
+    return made
+
+
+def _crop(mitsuba: Any, sensor: Any, frame: dict, corner: tuple[int, int], side: int) -> None:
+    """Make a sensor see a tile of its frame, where its lens has an aperture: that kind has no principal point."""
+    values = mitsuba.traverse(sensor.film())
+    values["size"] = frame["width"], frame["height"]
+    values.update()
+    values["crop_offset"], values["crop_size"] = corner[::-1], (side, side)
+    values.update()
+    sensor.parameters_changed()

@@ -1,0 +1,172 @@
+"""The paper's reflectance as textures of plane faces, where light and sensor are known to a point.
+
+From one place, under a light at one place, how bright a face is depends on the place in its plane alone. So in a scalar
+variant, which would run `render.bsdf` as interpreted Python ray by ray, a face that is lit and seen becomes a diffuse
+one whose reflectance is a table of brightness over N.L: cosine, fall-off and shadows stay the renderer's own.
+
+A table is interpolated linearly. Every other of its nodes alone would miss the nodes between by less than 1e-4 of the
+table's largest value anywhere, and by less than 4e-5 on average over any part of an eighth by an eighth of it. What is
+left is a quarter of that, 1e-5 on average, or half of it along a crease of the attenuation G. A face that needs more
+than _MOST nodes for it has no table: a roughness below about 0.02, a crease at grazing angles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planner.imaging.appearance import signal
+from planner.imaging.irradiance import beam
+from planner.imaging.pictures import Pictures
+from render.meshes import mesh
+from scenes import Picture, Solid
+
+Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+_MEAN, _LARGEST = 4e-5, 1e-4  # of a table's largest value: what every other of its nodes may miss
+_FEWEST, _MOST = 16, 1 << 22  # intervals along a side, nodes
+_PARTS = 8  # of a side, over which errors are averaged
+_LOBE = 0.5  # roughnesses that a facet's slope may differ by between neighbours of the first table, lest it miss a lobe
+_AT_ONCE = 1 << 13  # points whose temporary arrays stay in the processor's cache
+_GRAZING = 1e-9  # sine: light or sensor in the face's plane
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """Part of a solid's surface with its brightness.
+
+    Attributes
+    ----------
+    triangles : ndarray, shape (T, 3, 3)
+        Corners, cm.
+    places : ndarray, shape (T, 3, 2)
+        Where the corners lie in the table: 0 at its first and 1 at its last row and column.
+    values : ndarray, shape (rows, columns)
+        Brightness over N.L.
+    """
+
+    triangles: np.ndarray
+    places: np.ndarray
+    values: np.ndarray
+
+
+def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
+    """The solid's surface in parts, or None where a table would need too many nodes.
+
+    Faces that are dark or turned away share one part, of brightness 0.
+
+    Parameters
+    ----------
+    solid : Solid
+    picture : Picture
+        Of one light; its parts that are not simulated are neutral.
+    """
+    found, dark = [], np.ones(len(solid.triangles), bool)
+    pictures = Pictures.of(picture)
+    places = pictures.lights_at[0], pictures.sensor_at
+    heights = [solid.normals @ place - solid.offsets for place in places]
+    distances = [np.linalg.norm(place) for place in places]
+    for index in np.flatnonzero((heights[0] > _GRAZING * distances[0]) & (heights[1] > _GRAZING * distances[1])):
+        of_face = solid.triangle_faces == index
+        made = _face(solid.triangles[of_face], solid.normals[index], pictures)
+        if made is None:
+            return None
+        found.append(made)
+        dark &= ~of_face
+    rest = solid.triangles[dark]
+    return (*found, Face(rest, np.zeros((*rest.shape[:2], 2)), np.zeros((2, 2))))
+
+
+def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
+    """Mitsuba's meshes of the parts that `faces` gives."""
+    made = []
+    for part in parts:
+        if len(part.triangles):
+            picture = mitsuba.Bitmap(part.values.astype(np.float32)[..., None])
+            table = {"type": "bitmap", "bitmap": picture, "raw": True, "format": "variant", "wrap_mode": "clamp"}
+            size = np.array(part.values.shape[::-1])
+            texels = (0.5 + part.places * (size - 1)) / size  # a node is the centre of a texel
+            made.append(mesh(mitsuba, part.triangles, {"type": "diffuse", "reflectance": table}, texels))
+    return made
+
+
+def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures) -> Face | None:
+    """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
+    sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
+    first = sides[np.linalg.norm(sides, axis=1).argmax()]
+    axes = np.array([first / np.linalg.norm(first), np.cross(normal, first / np.linalg.norm(first))])
+    flat = triangles @ axes.T
+    low, high = flat.min((0, 1)), flat.max((0, 1))
+    origin = low @ axes + normal * (normal @ triangles[0, 0])
+
+    def at(across: np.ndarray, down: np.ndarray) -> np.ndarray:
+        """Points of the plane at fractions of the rectangle's sides, shape (down, across, 3)."""
+        return origin + np.stack(np.meshgrid(across, down), -1) * (high - low) @ axes
+
+    values = _table(at, normal, pictures)
+    return None if values is None else Face(triangles, (flat - low) / (high - low), values)
+
+
+def _table(at: Points, normal: np.ndarray, pictures: Pictures) -> np.ndarray | None:
+    """Values on a grid with as many intervals each way as they need; None if that is too many."""
+    counts = _first_counts(at, normal, pictures)
+    while (counts[0] + 1) * (counts[1] + 1) <= _MOST:
+        across, down = (np.linspace(0, 1, count + 1) for count in counts)
+        share = max(_AT_ONCE // across.size, 1)
+        rows = [down[first : first + share] for first in range(0, down.size, share)]
+        values = np.concatenate([shade(pictures, normal, at(across, part)) for part in rows])
+        excess = [_excess(part) for part in (values.T, values)]
+        if not np.isfinite(excess).all():
+            return None
+        if max(excess) <= values.max():
+            return values
+        more = [max(math.ceil(math.log2(part / values.max()) / 2), 0) for part in excess]  # errors fall as h^2 at best
+        counts = [count << doublings for count, doublings in zip(counts, more, strict=True)]
+    return None
+
+
+def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures) -> list[int]:
+    """Intervals across and down with which no lobe falls between two nodes, powers of two."""
+    few = np.linspace(0, 1, _FEWEST + 1)
+    slope = _slope(at(few, few), normal, pictures) / (_LOBE * pictures.scene.material.roughness)
+    steps = [np.linalg.norm(np.diff(slope, axis=axis), axis=-1).max() for axis in (1, 0)]
+    return [_FEWEST << max(math.ceil(math.log2(max(step, 1.0))), 0) for step in steps]
+
+
+def _excess(values: np.ndarray) -> float:
+    """The table's largest value with which linear interpolation of every other row would just do for those between."""
+    missed = np.abs(values[1::2] - (values[:-2:2] + values[2::2]) / 2)
+    parts = missed[:, 1:].reshape(_PARTS, len(missed) // _PARTS, _PARTS, -1).mean((1, 3))
+    return 2 * max(missed.max() / _LARGEST, parts.max() / _MEAN)  # each direction may spend half of what is allowed
+
+
+def _slope(points: np.ndarray, normal: np.ndarray, pictures: Pictures) -> np.ndarray:
+    """Tangent of the angle by which a facet that mirrors the light to the sensor is tilted, as a vector in the face."""
+    half = sum(_towards(place, points) for place in (pictures.lights_at[0], pictures.sensor_at))
+    return half / (half @ normal)[..., None] - normal
+
+
+def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Brightness over N.L of points of a plane that is lit and seen, shape (...).
+
+    Parameters
+    ----------
+    pictures : Pictures
+        Of one picture with one light.
+    normal : ndarray, shape (3,)
+    points : ndarray, shape (..., 3)
+        cm.
+    """
+    scene, arriving = pictures.scene, beam(pictures.scene.lights[0], pictures.lights_at[0], points)
+    white = scene.camera.exposure * arriving.strength * (arriving.to_light @ normal)
+    return signal(pictures, points, normal, points.ndim - 1) / white
+
+
+def _towards(place: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Unit vectors from points to a place."""
+    away = place - points
+    return away / np.linalg.norm(away, axis=-1, keepdims=True)
