@@ -27,6 +27,7 @@ _STEPS = 30
 _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
 _SETTLED = 1e-4  # of a standard deviation
 _FREE = 1e3  # px: a standard deviation at which nothing is known
+_FOLLOWS = 0.3  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _BLUR_KNOWN = 0.3  # of the blur: how well it is known before
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
@@ -133,15 +134,34 @@ class ArrangementEstimator:
 
     @cached_property
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Precision and mean of what is known of (vertices, levels, blur) before, both (q,)."""
+        """Precision (q, q) and mean (q,) of what is known of (vertices, levels, blur) before."""
         model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
-        precision = [np.full(2 * model.free.size, _FREE**-2)]
-        mean = [self.arrangement.vertices[model.free].ravel()]
+        levels, mean = [], [self.arrangement.vertices[model.free].ravel()]
         for region in self.arrangement.regions:
-            precision.append(np.full(region.count, 1.0 if region.known else (1e4 * sigma) ** -2))
+            levels.append(np.full(region.count, 1.0 if region.known else (1e4 * sigma) ** -2))
             mean.append(np.eye(region.count)[0] * region.known)
-        blur = self.model.start().blur
-        return np.concatenate([*precision, [(_BLUR_KNOWN * blur) ** -2]]), np.concatenate([*mean, [blur]])
+        blur, places = model.start().blur, self._held()
+        precision = np.zeros((model.count, model.count))
+        precision[: len(places), : len(places)] = places
+        rest = np.arange(len(places), model.count)
+        precision[rest, rest] = np.concatenate([*levels, [(_BLUR_KNOWN * blur) ** -2]])
+        return precision, np.concatenate([*mean, [blur]])
+
+    def _held(self) -> np.ndarray:
+        """Precision of the free vertices' places before, (2 F, 2 F).
+
+        The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
+        """
+        free, places = self.model.free, self.arrangement.vertices[self.model.free]
+        required = np.isin(free, self.arrangement.required)
+        x, y = (places - places.mean(0)).T
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        motion = np.stack([np.stack([one, zero, x, -y], -1), np.stack([zero, one, y, x], -1)], 1)  # (F, 2, 4)
+        follow = motion[~required].reshape(-1, 4) @ np.linalg.pinv(motion[required].reshape(-1, 4))
+        apart = np.zeros((follow.shape[0], 2 * free.size))
+        apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
+        apart[:, np.repeat(required, 2)] = -follow
+        return apart.T @ apart / _FOLLOWS**2 + np.eye(2 * free.size) / _FREE**2
 
     def parameters(self, state: State) -> np.ndarray:
         """All parameters as one array (q,)."""
@@ -163,8 +183,9 @@ class ArrangementEstimator:
         _, weight, _, jacobian = self.expected(state)
         first, last = 2 * self.model.free.size, -1
         design, (precision, mean) = jacobian[:, first:last], self.prior
-        matrix = design.T @ (design * weight[:, None]) + np.diag(precision[first:last])
-        told = design.T @ (weight * (used - self.noise.dark_level)) + precision[first:last] * mean[first:last]
+        known = precision[first:last, first:last]
+        matrix = design.T @ (design * weight[:, None]) + known
+        told = design.T @ (weight * (used - self.noise.dark_level)) + known @ mean[first:last]
         return state._replace(levels=np.linalg.solve(matrix, told))
 
     def climb(self, used: np.ndarray, state: State) -> Fit:
@@ -175,9 +196,9 @@ class ArrangementEstimator:
             expected, weight, gain, jacobian = self.expected(state)
             away, before = used - expected, mean - self.parameters(state)
             weighted = jacobian * (gain * weight)[:, None]
-            fisher = weighted.T @ (jacobian * gain[:, None]) + np.diag(precision)
-            score = away @ weighted + precision * before
-            cost = float(away @ (weight * away) + precision @ before**2)
+            fisher = weighted.T @ (jacobian * gain[:, None]) + precision
+            score = away @ weighted + precision @ before
+            cost = float(away @ (weight * away) + before @ precision @ before)
             inverse = _inverse(fisher)
             if settled:
                 break
@@ -196,7 +217,8 @@ class ArrangementEstimator:
             if small and damping < 1e-3:
                 return there, True, 0.0
             expected, weight, _, _ = self.expected(there, derivatives=False)
-            reached = float(weight @ (used - expected) ** 2 + precision @ (mean - self.parameters(there)) ** 2)
+            before = mean - self.parameters(there)
+            reached = float(weight @ (used - expected) ** 2 + before @ precision @ before)
             if reached <= cost * (1 + 1e-12):
                 return there, False, damping / 10 if damping > 1e-4 else 0.0
             damping = max(10 * damping, 1e-3)
@@ -211,9 +233,9 @@ class ArrangementEstimator:
             Pieces.of(self.model, fit.state), expected, weight, gain, jacobian[:, first:],
             fit.inverse, precision, mean - self.parameters(fit.state),
         )  # fmt: skip
-        spread = fit.inverse - (fit.inverse * precision) @ fit.inverse
+        spread = fit.inverse - fit.inverse @ precision @ fit.inverse
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
-        fitted = len(precision) - precision @ np.diag(fit.inverse) - taken
+        fitted = len(precision) - (precision * fit.inverse).sum() - taken
         near, far = expansion.near, self.pixels.size - expansion.near
         return Centre(fit.state, expansion, spread, expansion.bias(spread), (near - fitted, max(far - taken, 0.0)))
 

@@ -21,6 +21,7 @@ ROWS = int(_STARTS[-1])
 _KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in zip(_STARTS, _STARTS[1:], strict=False))
 _ITERATIONS = 12
 _SETTLED = 1e-4  # of a standard deviation
+_STRIDE = 8.0  # standard deviations that one iteration may go
 
 
 class Displaced(NamedTuple):
@@ -257,7 +258,7 @@ class Expansion:
         The part of it that the other pixels make.
     inverse : ndarray, shape (q, q)
         Of the information on the parameters with what was known before.
-    prior, offset : ndarray, shape (q,)
+    prior, offset : ndarray, shape (q, q) and (q,)
         Precision of what was known before, and its distance from the state.
     """
 
@@ -313,16 +314,21 @@ class Expansion:
         change = np.inf
         for _ in range(_ITERATIONS):
             columns = self._columns(steps)
-            score = self._score(steps, told - columns @ self.gram) + self.prior * (self.offset - steps)
-            change = score @ self.inverse
+            score = self._score(steps, told - columns @ self.gram) + (self.offset - steps) @ self.prior
+            change = np.clip(score @ self.inverse, -_STRIDE * self.scale, _STRIDE * self.scale)
             steps = steps + change
-            if (np.abs(change) < _SETTLED * np.sqrt(np.diag(self.inverse))).all():
+            if (np.abs(change) < _SETTLED * self.scale).all():
                 break
         columns, level = self._columns(steps), steps[:, -count:]
         squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
         far = squares[1] + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
         whole = sum(squares) + ((columns @ self.gram - 2 * told) * columns).sum(1)
         return Solved(steps, whole - far, far, np.abs(change) + np.abs(self._highest(steps)))
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Standard deviation of each parameter, (q,)."""
+        return np.sqrt(np.diag(self.inverse))
 
     def bias(self, covariance: np.ndarray) -> np.ndarray:
         """Mean error of the most likely parameters (q,) when they scatter with a covariance (Box 1971)."""
