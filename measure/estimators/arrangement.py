@@ -25,7 +25,8 @@ REACH = 16.0  # px from a required edge up to which pixels are used; beyond it t
 FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _STEPS = 30
 _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
-_SETTLED = 1e-4  # of a standard deviation
+_SETTLED = 1e-3  # of a standard deviation
+_ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
 _FOLLOWS = 0.3  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _BLUR_KNOWN = 0.3  # of the blur: how well it is known before
@@ -210,17 +211,16 @@ class ArrangementEstimator:
         precision, mean = self.prior
         for _ in range(12):
             step = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), score)
-            moves = step[: 2 * self.model.free.size]
-            step = step * min(1.0, _STRIDE / max(np.abs(moves).max(initial=0.0), 1e-12))
+            size = float(step @ fisher @ step)
+            step = step * min(1.0, _STRIDE / max(np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), 1e-12))
             there = self.model.moved(state, step)
-            small = bool(step @ fisher @ step < _SETTLED**2)
-            if small and damping < 1e-3:
-                return there, True, 0.0
+            if size < _SETTLED**2:
+                return there if damping == 0 else state, True, 0.0
             expected, weight, _, _ = self.expected(there, derivatives=False)
             before = mean - self.parameters(there)
             reached = float(weight @ (used - expected) ** 2 + before @ precision @ before)
-            if reached <= cost * (1 + 1e-12):
-                return there, False, damping / 10 if damping > 1e-4 else 0.0
+            if reached <= cost + _ROUNDING:
+                return there, False, damping / 10 if damping > 1e-3 else 0.0
             damping = max(10 * damping, 1e-3)
         return state, True, damping
 
