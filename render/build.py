@@ -19,6 +19,7 @@ from scenes import Floor, Picture, Scene, Solid
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
+MANY_WAYS = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
 CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
 
 
@@ -81,7 +82,7 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
     Light between surfaces, several lights, and light or an aperture of some size need the reflectance for more than one
     direction.
     """
-    if "interreflection" in active or len(picture.scene.lights) > 1:
+    if active & MANY_WAYS or len(picture.scene.lights) > 1:
         return None
     found = []
     for solid in _solids(picture.scene, active):

@@ -13,15 +13,13 @@ from planner.imaging.lens import confusion, recorded
 from planner.imaging.projection import depth, project_ideal
 from render import variant as variants
 from render.adaptive import crossed, near_edges, refine
-from render.build import CUSTOM, description, textured, view
+from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.mosaic import refine_tiles
 from render.optics import blur_and_bin
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
 from render.rays import SURFACES, Rays
 from scenes import InvalidInput, Picture, Scene
-
-STOCHASTIC = {"interreflection", "depth_of_field", "light_size"}  # a single ray is random, wherever it hits
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
     """Image of fine pixels, before lens and pixel aperture."""
     camera = picture.scene.camera
     mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
-    size, sharp = (camera.width * k, camera.height * k), active - STOCHASTIC
+    size, sharp = (camera.width * k, camera.height * k), active - MANY_WAYS
     textures = textured(picture, sharp) if scalar and active & CUSTOM else None
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
 

@@ -34,8 +34,8 @@ Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")]
 
 
 @lru_cache(maxsize=64)
-def _bodies(measured: Block | Mesh, obstacles: tuple[Obstacle, ...]) -> Solid:
-    return assembled(measured.solid, *(obstacle.solid for obstacle in obstacles))
+def _bodies(measured: Solid, obstacles: tuple[Obstacle, ...]) -> Solid:
+    return assembled(measured, *(obstacle.solid for obstacle in obstacles))
 
 
 class Setting(Model):
@@ -81,7 +81,7 @@ class Scene(Model):
     @property
     def bodies(self) -> Solid:
         """The object and the obstacles as one solid: all that hides and shades. The object's faces come first."""
-        return _bodies(self.object, self.obstacles)
+        return _bodies(self.solid, self.obstacles)
 
     @property
     def lights(self) -> tuple[Light, ...]:

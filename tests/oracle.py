@@ -64,10 +64,13 @@ def axes(pose):
     return out, np.array([-sine, cosine, 0.0]), down
 
 
-def block_image(scene, sensor, light):
-    """Exact image of the scene's convex diffuse solid before darkness: N.L / r^2 behind a pinhole."""
+def block_image(scene, sensor, light, gloss=None):
+    """Exact image of the scene's convex solid before darkness: N.L / r^2 behind a pinhole.
+
+    For what is not diffuse ``gloss(normal, to_light, to_sensor)`` gives N.L times the reflectance.
+    """
     camera, solid, material = scene.camera, scene.solid, scene.material
-    assert material.is_diffuse
+    assert material.is_diffuse or gloss
     assert camera.look_at == (0, 0, 0)
     out, right, down = axes(sensor)
     eye, lamp = camera.distance * out, scene.light.distance * axes(light)[0]
@@ -80,7 +83,12 @@ def block_image(scene, sensor, light):
             point = eye + ray * ((corner - eye) @ normal / (ray @ normal))[..., None]
             away = lamp - point
             distance = np.linalg.norm(away, axis=-1)
-            return white * np.maximum(away @ normal, 0) / distance * (scene.light.distance / distance) ** 2
+            fall_off = (scene.light.distance / distance) ** 2
+            if gloss:
+                back = eye - point
+                back = back / np.linalg.norm(back, axis=-1, keepdims=True)
+                return camera.exposure * fall_off * gloss(normal, away / distance[..., None], back)
+            return white * np.maximum(away @ normal, 0) / distance * fall_off
 
         return shade
 

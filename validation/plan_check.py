@@ -12,8 +12,8 @@ import measure
 import planner
 import render
 from measure import status
-from render import Quality, Tolerance
-from scenes import InvalidInput, Picture, Pose, Scene
+from render import Quality
+from scenes import InvalidInput, Pose, Scene, Setting
 
 ESTIMATOR = "gradient"  # whose closed form the calibrated model is
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
@@ -154,7 +154,6 @@ def _checked(
     measured = measure.propagate(picture, scene, sensor, None, ESTIMATOR)
     planned, calibrated = (planner.predict(scene, sensor, light, model) for model in (found.model, "calibrated"))
     to_unit = planned.variance_object / planned.variance_image if found.objective == "object" else 1.0
-    chosen = render.choose(scene, "auto", Tolerance(), Picture.of(scene, sensor, light))
     return CheckedSetting(
         sensor=sensor,
         light=light,
@@ -162,9 +161,22 @@ def _checked(
         calibrated=calibrated.variance_object if found.objective == "object" else calibrated.variance_image,
         propagated=measured.variance_px2 * to_unit,
         status=measured.status,
-        without_formula=tuple(d.effect.name for d in chosen.decisions if d.on and not d.effect.has_formula),
+        without_formula=without_formula(scene, sensor, light),
         rank_before=rank,
     )
+
+
+def without_formula(scene: Scene, sensor: Pose, light: Pose) -> tuple[str, ...]:
+    """Names of the effects that are simulated in a setting and that no formula of the planner knows.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> without_formula(scenes.load("bracket"), Pose(45, 135), Pose(15, 0))
+    ('interreflection',)
+    """
+    here = scene.model_copy(update={"settings": (Setting(sensor=sensor, light=light),)})
+    return tuple(found.effect.name for found in render.effects(here) if found.on and not found.effect.has_formula)
 
 
 def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:

@@ -74,20 +74,26 @@ class CannyLocator:
         """Edge points in a stack of images, shape (n, height, width), or in its thinned window."""
         seen = self.thinning(images) if isinstance(images, np.ndarray) else images
         which, pixel = self._kept(seen)
-        shift, gradient, _, good = top(self._profiles(seen, which, pixel))
+        shift, gradient, curvature, good = top(self._profiles(seen, which, pixel))
         good &= np.abs(gradient) >= self.threshold
         counts = np.bincount(which, minlength=len(seen.parts))
         slot = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
-        along, offset, contrast = (np.zeros((len(counts), max(counts.max(), 1))) for _ in range(3))
-        valid = np.zeros(along.shape, bool)
+        size = len(counts), max(counts.max(), 1)
+        along, offset, valid, steep = np.zeros(size), np.zeros(size), np.zeros(size, bool), np.zeros((2, *size))
         along[which, slot], offset[which, slot] = self.along[pixel], self.offset[pixel] + shift * self.gain[pixel]
-        contrast[which, slot], valid[which, slot] = self._gradient_to_contrast * gradient, good
+        valid[which, slot], steep[0, which, slot] = good, gradient
+        steep[1, which, slot] = np.where(good, self._curvature_to_contrast * curvature, 0.0)
         weights = cells(along, valid, self._limits)
         late = along > self.caliper.positions.mean()
-        first, second = ((contrast * valid * half).sum(1) for half in (~late, late))
-        mean, trend, start = trend_along(along, np.abs(contrast), weights)
-        sure = self._sure(start, trend) & (weights.sum(1) > (1 - _LOST) * np.diff(self._limits))
-        return EdgePoints(along, offset, valid, mean, first * second < 0, trend, weights, sure)
+        first, second = ((steep[0] * valid * half).sum(1) for half in (~late, late))
+        (_, contrast), (rise, trend), (start, _) = trend_along(along, np.abs(steep), weights)
+        sure = self._sure(start, rise) & (weights.sum(1) > (1 - _LOST) * np.diff(self._limits))
+        return EdgePoints(along, offset, valid, contrast, first * second < 0, trend, weights, sure)
+
+    def edge_pixels(self, image: np.ndarray) -> np.ndarray:
+        """Row and column of the pixels that the edge points of one image are refined from, int, shape (k, 2)."""
+        _, pixel = self._kept(self.thinning(image[None]))
+        return self.near[pixel] + [self.thinning.rows.start, self.thinning.columns.start]
 
     @cached_property
     def pixels(self) -> np.ndarray:
@@ -134,11 +140,10 @@ class CannyLocator:
     def _sure(self, start: np.ndarray, trend: np.ndarray) -> np.ndarray:
         """Whether noise leaves hardly any point of the edge's dimmer half below the threshold, bool (n,).
 
-        Told from the contrast at the edge's start and its change per px: of one image of many, or the noise-free one.
+        Told from the gradient at the edge's start and its change per px: of one image of many, or the noise-free one.
         """
         first, last = self.caliper.positions[[0, -1]]
-        lower = start + trend * np.where(trend > 0, first, last)
-        half = np.linspace(lower, start + trend * (first + last) / 2, 5) / self._gradient_to_contrast
+        half = np.linspace(start + trend * np.where(trend > 0, first, last), start + trend * (first + last) / 2, 5)
         noise = np.sqrt(self.optics.noise_variance) * np.linalg.norm(self.kernel[:, 0])
         return ndtr((self.threshold - half) / max(noise, 1e-9 * self.threshold)).mean(0) < _LOST
 
@@ -151,15 +156,20 @@ class CannyLocator:
         return float(self.caliper.positions[0]) - 0.5, float(self.caliper.positions[-1]) + 0.5
 
     @property
-    def _gradient_to_contrast(self) -> float:
-        """Contrast of a straight blurred edge whose gradient is 1 at its middle."""
-        blur = edge_blur(self.caliper.blur(self.caliper.positions.mean()))
-        return float(np.sqrt(2 * np.pi) * np.hypot(self.optics.scale_px, blur))
+    def _width(self) -> float:
+        """Standard deviation of the smoothed gradient across the edge, px."""
+        blur = self.caliper.blur(self.caliper.positions.mean())
+        return float(np.hypot(self.optics.scale_px, edge_blur(blur)))
+
+    @property
+    def _curvature_to_contrast(self) -> float:
+        """Contrast of a straight blurred edge whose gradient has curvature 1 at its top: what noise is divided by."""
+        return float(np.sqrt(2 * np.pi) * self._width**3)
 
     @property
     def _step(self) -> float:
         """A contrast that passes the threshold everywhere."""
-        return 4 * self.threshold * self._gradient_to_contrast
+        return 4 * self.threshold * float(np.sqrt(2 * np.pi)) * self._width
 
     def _straight_edge(self) -> np.ndarray:
         """Noise-free image of an endless edge at the expected place, as far as it is looked at."""

@@ -27,6 +27,7 @@ from scenes import InvalidInput
 ESTIMATORS = ("canny", "gradient", "strip", "polygon")
 CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
+_FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
@@ -52,15 +53,15 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
     optics = layout.optics
-    own_reach = CLEARANCE * edge_blur(optics.blur_px)
+    own_reach = CLEARANCE * edge_blur(optics.blur_px)  # a face less than twice as wide has no pixel of its own level
     if name == "polygon":
-        whole = edge_calipers(layout, 0.0, 0.0)
+        whole = edge_calipers(layout, 0.0, 0.0, 2 * own_reach)
         found = polygon_estimator(layout, whole, own_reach) if _all_measurable(whole) else None
         if found is not None:
             return found
         name = "strip"  # no closed ring around one face: each edge by itself
     if name == "strip":
-        calipers = edge_calipers(layout, own_reach, 0.0)
+        calipers = edge_calipers(layout, own_reach, 0.0, 2 * own_reach)
         parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(calipers)]
         calipers = tuple(
             f if p or not _measurable(f) else replace(f, status=status.SHORT)
@@ -85,11 +86,13 @@ def _by_points(
 
 
 def _thinned(caliper: Caliper, scale: float) -> Caliper:
-    """Stations at most 2 scales apart, at least three: points in between add nothing (their errors are smooth)."""
+    """Positions at most 2 scales apart, and not too few: points in between add nothing (their errors are smooth)."""
     if caliper.positions.size < 3:
         return caliper
     first, last = caliper.positions[[0, -1]]
-    return replace(caliper, positions=np.linspace(first, last, max(3, int(np.ceil((last - first) / (2 * scale))) + 1)))
+    return replace(
+        caliper, positions=np.linspace(first, last, max(_FEWEST, int(np.ceil((last - first) / (2 * scale))) + 1))
+    )
 
 
 def _measurable(caliper: Caliper) -> bool:

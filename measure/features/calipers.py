@@ -75,7 +75,7 @@ class Caliper:
         return away @ self.direction, away @ self.normal
 
 
-def edge_calipers(layout: Layout, clear: float, margin: float) -> tuple[Caliper, ...]:
+def edge_calipers(layout: Layout, clear: float, margin: float, crowd: float | None = None) -> tuple[Caliper, ...]:
     """A caliper for each edge of a layout.
 
     Parameters
@@ -85,11 +85,14 @@ def edge_calipers(layout: Layout, clear: float, margin: float) -> tuple[Caliper,
         How far every other edge must be from the part that is used, px.
     margin : float
         How far from the image's border a position must be, px.
+    crowd : float, optional
+        How near an edge that shares no corner makes it ``clutter``, px; ``clear`` when not given.
     """
-    return tuple(_caliper(layout, i, clear, margin) for i in range(len(layout.names)))
+    crowd = clear if crowd is None else crowd
+    return tuple(_caliper(layout, i, clear, margin, crowd) for i in range(len(layout.names)))
 
 
-def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
+def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float) -> Caliper:
     start, stop = layout.ends[i]
     length = float(np.linalg.norm(stop - start))
     if not layout.visible[i] or not length > 0:
@@ -111,7 +114,7 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float) -> Caliper:
     elif inside.sum() < MIN_POSITIONS:
         state = status.NOT_VISIBLE
     else:
-        crowded = any(distance_to_segment(places[inside], *other).min() < clear for other in layout.apart[i])
+        crowded = any(distance_to_segment(places[inside], *other).min() < crowd for other in layout.apart[i])
         state = status.CLUTTER if crowded else status.OK
     return Caliper(layout.names[i], start, along, length, positions[inside], state, layout.optics, layout.defocus[i])
 

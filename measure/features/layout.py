@@ -10,7 +10,7 @@ from skimage.draw import polygon2mask
 
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
-from planner.features.projected_edges import projected_edges
+from planner.features.projected_edges import projected_edges, straight
 from planner.imaging.lens import signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
@@ -156,7 +156,8 @@ def layout_of(picture: Picture) -> Layout:
     if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
         raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
     pictures, solid, pose = Pictures.of(picture), scene.bodies, np.array(list(picture.sensor))
-    view = projected_edges(pictures)
+    names = tuple(dict.fromkeys(straight(scene)))  # the same edge in both corners is one line
+    view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
     seen = facing(solid, pictures.sensor_at)
     shadings = face_shadings(pictures) if picture.lights else [None] * len(solid.faces)
@@ -175,7 +176,7 @@ def layout_of(picture: Picture) -> Layout:
         ends=ends,
         visible=view.visible & np.isfinite(ends).all((1, 2)),
         shown=view.shown,
-        corners=tuple((2 * k, 2 * k + 1) for k in range(2)),
+        corners=tuple(tuple(names.index(name) for name in corner.edges) for corner in scene.task.corners),
         joints=_joints([edge.ends for edge in required]),
         beside=tuple(tuple(_away(points, edge, end, shown) for end in (0, 1)) for edge in required),
         apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),

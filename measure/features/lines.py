@@ -58,15 +58,15 @@ def trapezoid(along: np.ndarray) -> np.ndarray:
 
 
 def trend_along(along: np.ndarray, value: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weighted mean of values (n, m) at places (n, m), px, their change per px, and their line's value at 0, all (n,).
+    """Weighted mean of values (..., n, m) at places (n, m), px, their change per px, and their line's value at 0.
 
-    0 where there are none.
+    All of shape (..., n); 0 where there are no values.
     """
-    total = np.maximum(weights.sum(1), np.finfo(float).tiny)
-    mean, middle = ((part * weights).sum(1) / total for part in (value, along))
+    total = np.maximum(weights.sum(-1), np.finfo(float).tiny)
+    mean, middle = ((part * weights).sum(-1) / total for part in (value, along))
     s = (along - middle[:, None]) * weights
-    spread = (s * (along - middle[:, None])).sum(1)
-    slope = (s * value).sum(1) / np.where(spread > 0, spread, np.inf)
+    spread = (s * (along - middle[:, None])).sum(-1)
+    slope = (s * value).sum(-1) / np.where(spread > 0, spread, np.inf)
     return mean, slope, mean - slope * middle
 
 

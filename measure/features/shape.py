@@ -125,6 +125,7 @@ def _end_errors(covariance: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.ndarray) -> Shape:
+    """Corners from lines with covariance ``lines`` (n, 2 E, 2 E)."""
     calipers = tool.calipers
     normals, points = line_equations(calipers, estimate.level, estimate.slope)
     crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+import numpy as np
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from scenes.model import Model
 from scenes.parts import mesh
@@ -24,8 +24,15 @@ class Mesh(Model):
     file: Path
     names: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
 
+    _made: tuple[tuple, Solid] | None = PrivateAttr(None)  # what the file held when it was read
+
     def __hash__(self) -> int:
         return hash((self.file, tuple(sorted(self.names.items()))))
+
+    def __eq__(self, other: object) -> bool:
+        """A file that has changed is another mesh, so that nothing that was kept of the old one is taken for it."""
+        same = isinstance(other, Mesh) and (self.file, self.names) == (other.file, other.names)
+        return same and np.array_equal(self.solid.triangles, other.solid.triangles)
 
     @field_validator("file")
     @classmethod
@@ -34,14 +41,8 @@ class Mesh(Model):
 
     @property
     def solid(self) -> Solid:
-        """Vertices, faces, edges and circles of the mesh."""
-        try:
-            stamp = self.file.stat().st_mtime_ns
-        except OSError:
-            stamp = 0
-        return _read(self.file, tuple(self.names.items()), stamp)
-
-
-@lru_cache(maxsize=16)
-def _read(file: Path, names: tuple, _stamp: int) -> Solid:
-    return mesh.renamed(mesh.read(file), dict(names))
+        """Vertices, faces, edges and circles of the mesh, read once."""
+        key = self.file, tuple(self.names.items())
+        if self._made is None or self._made[0] != key:
+            self._made = key, mesh.renamed(mesh.read(self.file), self.names)
+        return self._made[1]

@@ -17,7 +17,7 @@ POSES = ViewingSpace(6, (0, 90)).poses
 
 def test_in_double_precision_it_is_the_planners_model(task1):
     lights = np.broadcast_to([15.0, 315.0], POSES.shape)
-    expected = planner.variances(task1, POSES, [15.0, 315.0], "paper")
+    expected = planner.variances(task1, POSES, [15.0, 315.0], "paper", "image")
     found = paper_in(np.float64, task1, POSES, lights)
     assert (np.isfinite(found) == np.isfinite(expected)).all()
     finite = np.isfinite(expected)

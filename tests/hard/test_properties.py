@@ -161,9 +161,10 @@ def test_scaling_intensity_and_noise_together(sensor, light, material, model, fa
 @few
 @given(*settings_of, log(0, 6))
 def test_more_light_never_increases_the_variance(sensor, light, material, model, factor):
-    scene = task1(material=material)
+    """As long as the sensor's scale has no end."""
+    scene = task1(material=material, noise={"bits": None})
     before, _ = predicted(scene, sensor, light, model)
-    brighter = task1(material=material, camera={"exposure": factor * scene.camera.exposure})
+    brighter = task1(material=material, noise={"bits": None}, camera={"exposure": factor * scene.camera.exposure})
     after, _ = predicted(brighter, sensor, light, model)
     assert (after <= before * (1 + RELATIVE)).all()
 
@@ -197,7 +198,7 @@ def shift(image, corners):
 def test_measurement_follows_the_image(estimator, move, turn, x, y, seed):
     """Flips, quarter turns and whole-pixel shifts of a noisy image move the corners likewise.
 
-    To 1e-9 px; canny, whose gradients are single precision as OpenCV wants them, to 1e-4.
+    To 1e-9 px; canny, which works in single precision as OpenCV wants it, to 1e-5.
     """
     corners = corners_of(turn, x, y)
     noise = np.random.default_rng(seed).standard_normal(SHAPE)
@@ -208,7 +209,7 @@ def test_measurement_follows_the_image(estimator, move, turn, x, y, seed):
     assert found.status == moved.status
     assume(found.status[0] in ("ok", "clutter"))
     _, expected = move(image, found.corners[0])
-    assert moved.corners[0] == pytest.approx(expected, abs=1e-4 if estimator == "canny" else 1e-9)
+    assert moved.corners[0] == pytest.approx(expected, abs=1e-5 if estimator == "canny" else 1e-9)
 
 
 def measured(image, corners, estimator):

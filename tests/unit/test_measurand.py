@@ -56,7 +56,7 @@ def test_scale_of_a_distance(task1):
 
 
 def test_scale_of_an_angle(angle):
-    """The image's angle when both edges turn about their vertex by half."""
+    """The image's angle when both edges turn about their vertex by half, degrees."""
     solid = angle.solid
     vertex = solid.vertex("v3")
     arms = [solid.vertex("v4") - vertex, solid.vertex("v7") - vertex]
@@ -64,17 +64,18 @@ def test_scale_of_an_angle(angle):
     normal = np.cross(*arms)
 
     def image_angle(wider):
+        half = np.radians(wider) / 2
         ends = [
-            vertex + np.cos(wider / 2) * arm + sign * np.sin(wider / 2) * np.cross(normal, arm)
+            vertex + np.cos(half) * arm + sign * np.sin(half) * np.cross(normal, arm)
             for sign, arm in zip((-1, 1), arms, strict=True)
         ]
         image = project(np.array([vertex, *ends]), SENSOR, angle.camera)
         one, two = image[1:] - image[0]
-        return np.arccos(one @ two / np.linalg.norm(one) / np.linalg.norm(two))
+        return np.degrees(np.arccos(one @ two / np.linalg.norm(one) / np.linalg.norm(two)))
 
     assert measurand(Pictures.of(angle, SENSOR)).value == pytest.approx(image_angle(0.0), rel=1e-12)
-    assert measurand(Pictures.of(angle, SENSOR)).value_object == pytest.approx(np.pi / 2)
-    numeric = (image_angle(1e-5) - image_angle(-1e-5)) / 2e-5
+    assert measurand(Pictures.of(angle, SENSOR)).value_object == pytest.approx(90)
+    numeric = (image_angle(1e-3) - image_angle(-1e-3)) / 2e-3
     assert measurand(Pictures.of(angle, SENSOR)).scale == pytest.approx(numeric, rel=1e-5)
 
 
@@ -88,7 +89,7 @@ def measured(scene, lines, view):
         i, j = (view.names.index(name) for name in scene.task.lines)
         cosine = turned[i] @ turned[j]
         away = [along[k] @ (view.ends[k].mean(0) - shared(scene, view)) for k in (i, j)]
-        return np.arccos(cosine * np.sign(away[0] * away[1]))
+        return np.degrees(np.arccos(cosine * np.sign(away[0] * away[1])))
     corners = []
     for corner in scene.task.corners:
         i, j = (view.names.index(name) for name in corner.edges)

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+import planner
 from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.lines import fit_lines, regression
+from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
-from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
 from planner.imaging.pictures import Pictures
 from planner.models.paper import paper
@@ -91,6 +92,18 @@ def test_the_printed_gamma_variance_fails_the_same_test(task1, fitted, predicted
         assert displacement(fitted[name], middle).var(ddof=1) != pytest.approx(printed, rel=WITHIN)
 
 
+def test_the_papers_distance_variance_against_monte_carlo(task1, fitted):
+    """Eq. 3, 5 and 6 in a row: corners where the drawn lines cross, and their distance; 1.3 x is refused."""
+    ends = []
+    for feature in task1.task.corners:
+        centroids, normals = (np.stack([fitted[name][k] for name in feature.edges], 1) for k in (3, 4))
+        ends.append(np.linalg.solve(normals, (normals * centroids).sum(-1)[..., None])[..., 0])
+    values, said = np.linalg.norm(ends[1] - ends[0], axis=1), planner.predict(task1, SENSOR, LIGHT, "paper")
+    assert values.mean() == pytest.approx(said.value_px, abs=4 * np.sqrt(said.variance_px2 / DRAWS))
+    assert values.var(ddof=1) == pytest.approx(said.variance_px2, rel=WITHIN)
+    assert values.var(ddof=1) != pytest.approx(1.3 * said.variance_px2, rel=WITHIN)
+
+
 def test_the_variance_of_correlated_points_against_monte_carlo(rng):
     """Mean and slope of lines through 20 000 draws of smoothed noise; that of independent points is refused."""
     along, scale, sigma = np.linspace(3, 27, 25), 1.5, 1e-3
@@ -100,7 +113,7 @@ def test_the_variance_of_correlated_points_against_monte_carlo(rng):
     whole = np.ones(offset.shape, bool)
     lines = fit_lines(EdgePoints(np.broadcast_to(along, offset.shape), offset, whole, whole[:, 0], whole[:, 0]))
     response = regression(along)
-    ours = sigma**2 * response @ correlation(along[:, None] - along, scale) @ response.T
+    ours = sigma**2 * response @ together @ response.T
     for values, known in ((lines.mean_offset, ours[0, 0]), (np.tan(lines.tilt), ours[1, 1])):
         assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)
     independent = sigma**2 * response @ response.T
@@ -138,8 +151,9 @@ def test_corner_covariance_against_central_differences(first, second):
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_corner_response_against_central_differences(first, second):
     """Level and slope of two of three lines found in the image; the third has no part in the corner."""
+    rest = 50.0, np.empty(0), "ok", Optics((100, 100)), np.zeros(2)
     calipers = tuple(
-        Caliper("", np.array(origin), np.array([np.cos(a), np.sin(a)]), 50.0, np.empty(0), "ok")
+        Caliper("", np.array(origin), np.array([np.cos(a), np.sin(a)]), *rest)
         for a, origin in ((first, (40.0, 30.0)), (0.7, (10.0, 10.0)), (second, (90.0, 70.0)))
     )
 

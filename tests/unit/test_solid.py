@@ -1,5 +1,6 @@
 """Solids from mesh files, and which parts of their edges a position sees."""
 
+import pickle
 import re
 
 import numpy as np
@@ -8,9 +9,11 @@ import trimesh
 
 import planner
 import scenes
+from measure.features.layout import layout_of
 from planner.imaging.projection import direction
 from planner.imaging.visibility import seen, turned, visible_spans
 from scenes import InvalidInput
+from scenes.load import BUNDLED
 from scenes.parts import mesh
 
 BLOCK = scenes.block((12.5, 7.5, 2.5))
@@ -94,6 +97,36 @@ def test_scene_names_the_key_of_a_bad_mesh(tmp_path):
     path.write_text(text)  # the mesh is not beside it
     with pytest.raises(InvalidInput, match=re.escape("object.file must be a readable mesh")):
         scenes.load(path)
+
+
+def bracket_in(folder, height=6.0):
+    """The bracket's scene with a mesh file of its own, the upright's height changed."""
+    lines = (BUNDLED / "bracket.obj").read_text().replace(" 6.00000000\n", f" {height:g}\n")
+    (folder / "bracket.obj").write_text(lines)
+    text = (BUNDLED / "bracket.toml").read_text()
+    (folder / "bracket.toml").write_text(text)
+    return scenes.load(folder / "bracket.toml")
+
+
+def test_a_scene_keeps_the_mesh_that_it_was_made_with(tmp_path):
+    """The file may go, and the scene may travel to where it never was."""
+    scene = bracket_in(tmp_path)
+    expected = scene.solid.vertices
+    (tmp_path / "bracket.obj").unlink()
+    for same in (scene, scene.model_copy(update={"settings": ()}), pickle.loads(pickle.dumps(scene))):
+        assert (same.solid.vertices == expected).all()
+        assert (same.bodies.vertices == expected).all()
+
+
+def test_a_file_that_changed_is_another_solid(tmp_path):
+    """In the same place, under the same name, within the same process: what hides and shades is the new one."""
+    before, after = bracket_in(tmp_path), bracket_in(tmp_path, 7.0)
+    assert [scene.bodies.vertices[:, 2].max() for scene in (before, after)] == [6.0, 7.0]
+    assert after.bodies is after.solid
+    assert after != before
+    assert pickle.loads(pickle.dumps(after)) == after
+    sizes = [np.ptp(layout_of(scenes.Picture.of(scene, (60, 300))).ends) for scene in (before, after)]
+    assert sizes[1] > sizes[0]
 
 
 def blocked(point, position, solid, own):

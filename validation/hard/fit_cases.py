@@ -9,10 +9,10 @@ import numpy as np
 from measure.features.calipers import Caliper
 from measure.features.conic import fit_ellipse
 from measure.features.corners import corner_response, intersect
-from measure.features.lines import fit_lines, regression
+from measure.features.lines import fit_lines, regression, trapezoid
+from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
-from planner.features.locator import correlation
 from planner.features.propagation import corner_covariance
 from validation.hard.case import Answer, Case, Reference
 
@@ -92,13 +92,14 @@ def line_reference(points: EdgePoints, weights: np.ndarray | float, place: str) 
 
 
 def _covariances() -> list[Case]:
-    """The line's variance from points that the smoothing correlates, by the least-squares line's own weights."""
+    """The variance of a line's offset beside its last point, of points that each err by 1 px independently."""
+    wide = 10.0 ** np.random.default_rng(4).uniform(-6, 6, 12)
     settings = {
         "shortest edge: 3 points on 2 px": (np.linspace(0, 2, 3), 1.0),
-        "8 points, 1 px apart": (np.arange(8.0), 1.0),
-        "8 points 1e6 px along the edge": (1e6 + np.arange(8.0), 1.0),
-        "8 points within a fifth of the scale": (np.linspace(0, 2, 8), 10.0),
-        "8 points, 1e4 scales apart": (np.linspace(0, 7e4, 8), 1.0),
+        "12 points, weights over 12 decades": (np.linspace(0, 60, 12), wide),
+        "12 points 1e6 px along the edge": (1e6 + np.linspace(0, 60, 12), trapezoid(np.arange(12))),
+        "12 points within 1e-6 px": (np.linspace(0, 1e-6, 12), 1.0),
+        "12 points on 1e6 px": (np.linspace(0, 1e6, 12), trapezoid(np.arange(12))),
     }
     return [
         Case("fit", name, "V(line at the end)", partial(_spread, *setting), partial(_spread_reference, *setting))
@@ -106,29 +107,27 @@ def _covariances() -> list[Case]:
     ]
 
 
-def _spread(along: np.ndarray, scale: float) -> Answer:
-    lever = np.array([1.0, along[-1] - along.mean()])
-    response = lever @ regression(along)
-    return Answer(float(response @ correlation(along[:, None] - along, scale) @ response))
+def _spread(along: np.ndarray, weights: np.ndarray | float) -> Answer:
+    whole = np.broadcast_to(weights, along.shape)
+    lever = np.array([1.0, along[-1] - whole @ along / whole.sum()])
+    return Answer(float(((lever @ regression(along, weights)) ** 2).sum()))
 
 
-def _spread_reference(along: np.ndarray, scale: float) -> Reference:
+def _spread_reference(along: np.ndarray, weights: np.ndarray | float) -> Reference:
     from validation.hard import precise
-    from validation.hard.precise import mp, mpf
+    from validation.hard.precise import mpf
+
+    count = along.size
 
     def value(numbers):
-        *places, smoothing = numbers
-        mean = sum(places) / len(places)
+        places, shares = numbers[:count], numbers[count:]
+        total = sum(shares)
+        mean = sum(w * place for w, place in zip(shares, places, strict=True)) / total
         away = [place - mean for place in places]
-        square = sum(s * s for s in away)
-        pull = [1 / mpf(len(places)) + away[-1] * s / square for s in away]
-        return sum(
-            a * b * mp.exp(-((s - t) ** 2) / (4 * smoothing**2))
-            for a, s in zip(pull, away, strict=True)
-            for b, t in zip(pull, away, strict=True)
-        )
+        square = sum(w * s * s for w, s in zip(shares, away, strict=True))
+        return sum((w / total + away[-1] * w * s / square) ** 2 for w, s in zip(shares, away, strict=True))
 
-    numbers = [mpf(float(v)) for v in (*along, scale)]
+    numbers = [mpf(float(v)) for v in (*along, *np.broadcast_to(weights, count))]
     return Reference.precise(value(numbers), precise.condition_of(value, numbers))
 
 
@@ -202,7 +201,7 @@ _LEVEL, _SLOPE = 0.01, 1e-6  # variance of a line's offset at its caliper's orig
 def _response(normals: np.ndarray, points: np.ndarray) -> Answer:
     """The corner's variance from those of the lines in their calipers."""
     calipers = tuple(
-        Caliper("", point, np.array([b, -a]), 60.0, np.empty(0), "ok")
+        Caliper("", point, np.array([b, -a]), 60.0, np.empty(0), "ok", Optics((200, 200)), np.zeros(2))
         for (a, b), point in zip(normals, points, strict=True)
     )
     response = corner_response(calipers, (0, 1))

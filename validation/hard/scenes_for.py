@@ -41,6 +41,9 @@ class _Made(Mesh):
     def __hash__(self) -> int:
         return id(self.made)
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Made) and self.made is other.made
+
 
 def with_solid(scene: Scene, solid: Solid) -> Scene:
     """The scene with another solid of the block's names, wherever it stands."""

@@ -15,7 +15,7 @@ import render
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
 from render.renderer import window
-from scenes import Pose, Scene
+from scenes import Picture, Pose, Scene
 from validation.batch.campaign import Campaign, Case
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
@@ -67,10 +67,11 @@ def _covered(case: Case, picture: np.ndarray) -> np.ndarray:
 
 def edge_pixels(scene: Scene, sensor: Pose, picture: np.ndarray) -> np.ndarray:
     """The pixels, bool, from which the estimator ``canny`` makes its edge points at the scene's first threshold."""
-    tool = prepared(layout_of(scene, sensor), "canny", scene.locator.thresholds[0])
+    tool = prepared(layout_of(Picture.of(scene, sensor)), "canny", scene.locator.thresholds[0])
     found = np.zeros(picture.shape, bool)
-    for locator in (part.locator for part in tool.parts if part):
-        found[locator.rows, locator.columns] |= locator.edge_pixels(*locator.gradient(picture))
+    for part in tool.parts:
+        if part:
+            found[tuple(part.locator.edge_pixels(picture).T)] = True
     return found
 
 

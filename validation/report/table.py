@@ -112,10 +112,7 @@ def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     headings, cells = names(found)
     main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
-    caption = (
-        "* : 1 lies outside the interval. Which pixels Canny picks is not linear in the noise; its prediction\n"
-        f"holds the choice fixed and is not exact. The verdict is about {main}. failed: one number a method."
-    )
+    caption = f"* : 1 lies outside the interval.\nThe verdict is about {main}. failed: one number a method."
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
         *headings, main, *others, "n", "failed", "bias px", "status",

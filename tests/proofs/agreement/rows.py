@@ -14,9 +14,9 @@ import measure
 import planner
 import render
 from measure import status
-from render import Tolerance
-from scenes import InvalidInput, Picture
+from scenes import InvalidInput
 from tests.proofs.agreement.settings import Place
+from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 
 KINDS = "calibrated", "propagated", "reported"
@@ -113,9 +113,7 @@ def _rows(place: Place, renders: int, seed: int, variant: str) -> list[Row]:
     scene, sensor, light = place.scene, place.sensor, place.light
     predicted = planner.predict(scene, sensor, light)
     clean = render.image(scene, sensor, light, variant=variant)
-    chosen = render.choose(scene, "auto", Tolerance(), Picture.of(scene, sensor, light)).decisions
-    unknown = tuple(decision.effect.name for decision in chosen if decision.on and not decision.effect.has_formula)
-    found = _measured(place, clean, renders, seed)
+    unknown, found = without_formula(scene, sensor, light), _measured(place, clean, renders, seed)
     rows = []
     for estimator in ESTIMATORS:
         propagated = measure.propagate(clean, scene, sensor, None, estimator)
