@@ -8,6 +8,7 @@ place found for one of them, to where an expansion of fourth order holds (`measu
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,12 +23,12 @@ from planner.models.bound import response
 from scenes import Noise
 
 REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
-FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _STEPS = 30
 _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
+_UNTOLD = 1e4  # the same of a level or the blur
 _FOLLOWS = 0.3  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _BLUR_KNOWN = 0.3  # of the blur: how well it is known before
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
@@ -104,6 +105,10 @@ class Centre:
     freedom: tuple[float, float]
 
 
+Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
+"""The maximum in one image, from its used pixels (P,) and the whole of it (height, width)."""
+
+
 @dataclass(frozen=True, eq=False)
 class ArrangementEstimator:
     """Prepared for one expected arrangement in images of one shape.
@@ -178,9 +183,10 @@ class ArrangementEstimator:
         gain, variance = response(self.noise, image)
         return recorded(self.noise, image + self.noise.dark_level).level, 1 / variance, gain, jacobian
 
-    def start(self, used: np.ndarray) -> State:
-        """The expected place, with the levels that fit one image (P,) best there."""
+    def start(self, used: np.ndarray, vertices: np.ndarray | None = None) -> State:
+        """The expected place, or another, with the levels that fit one image (P,) best there."""
         state = self.model.start()
+        state = state if vertices is None else state._replace(vertices=vertices)
         _, weight, _, jacobian = self.expected(state)
         first, last = 2 * self.model.free.size, -1
         design, (precision, mean) = jacobian[:, first:last], self.prior
@@ -239,52 +245,81 @@ class ArrangementEstimator:
         near, far = expansion.near, self.pixels.size - expansion.near
         return Centre(fit.state, expansion, spread, expansion.bias(spread), (near - fitted, max(far - taken, 0.0)))
 
-    def find(self, images: np.ndarray) -> Found:
+    def index(self, vertices: np.ndarray) -> np.ndarray:
+        """Where free vertices' x and y stand among the parameters."""
+        return (2 * np.searchsorted(self.model.free, vertices)[:, None] + [0, 1]).ravel()
+
+    def without_prior(self, centre: Centre) -> np.ndarray:
+        """Covariance of the parameters (q, q) as the image alone tells them; large where it does not."""
+        precision = self.prior[0]
+        least = np.where(np.arange(len(precision)) < 2 * self.model.free.size, _FREE, _UNTOLD)
+        return _inverse(_inverse(centre.expansion.inverse) - precision + np.diag(1 / least**2))
+
+    def derivative(self, centre: Centre) -> np.ndarray:
+        """Derivative of the parameters by the pixels at a state, (q, P)."""
+        _, weight, gain, jacobian = self.expected(centre.state)
+        return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
+
+    def find(self, images: np.ndarray, locate: Locate | None = None) -> Found:
         """Most likely parameters in images (n, height, width).
 
-        The first image is measured by itself; the others around it, as far as the expansion holds.
+        The first image is measured by itself; the others around it, as far as the expansion holds; the first that is
+        left by itself, and so on.
         """
-        count, first = len(images), 2 * self.model.free.size
-        q = self.model.count
-        parameters, squares = np.full((count, q), np.nan), np.full((count, 2), np.nan)
-        owner, settled = np.zeros(count, int), np.zeros(count, bool)
-        centres, open_ = [], np.arange(count)
-        guess = None
-        while open_.size:
-            used = self.taken(images[open_[:1]])[0]
-            fit = self.climb(used, guess or self.start(used))
-            guess = fit.state if fit.settled else None
-            centre = self.centre(fit)
-            alone = len(centres) >= _ROUNDS
-            done = []
-            for at in range(0, 1 if alone else open_.size, _BATCH):
-                part = open_[at : at + (1 if alone else _BATCH)]
-                solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
-                good = self._good(solved.left, centre)
-                if at == 0:
-                    good[0] = True
-                    settled[part[0]] = fit.settled
-                keep = part[good]
-                parameters[keep] = self.parameters(fit.state) + solved.steps[good]
-                squares[keep] = np.stack([solved.near, solved.far], 1)[good]
-                owner[keep] = len(centres)
-                settled[keep[1:] if at == 0 else keep] = True
-                done.append(keep)
+        collected, left, centres = _Collected(self, len(images)), np.arange(len(images)), []
+        while left.size:
+            image = images[left[0]]
+            used = self.taken(image[None])[0]
+            fit, centre = locate(used, image) if locate else self._locate(used)
+            tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
+            done = [self._around(images, tried[at : at + _BATCH], fit, centre, collected, len(centres), at == 0)
+                    for at in range(0, tried.size, _BATCH)]  # fmt: skip
             centres.append(centre)
-            open_ = np.setdiff1d(open_, np.concatenate(done))
-        vertices = np.broadcast_to(self.arrangement.vertices, (count, *self.arrangement.vertices.shape)).copy()
-        vertices[:, self.model.free] = parameters[:, :first].reshape(count, -1, 2)
-        return Found(
-            vertices, parameters[:, first:-1], parameters[:, -1], squares[:, 0], squares[:, 1], owner, settled,
-            tuple(centres),
-        )  # fmt: skip
+            left = np.setdiff1d(left, np.concatenate(done))
+        return collected.found(tuple(centres))
+
+    def _locate(self, used: np.ndarray) -> tuple[Fit, Centre]:
+        fit = self.climb(used, self.start(used))
+        return fit, self.centre(fit)
+
+    def _around(self, images, part, fit, centre, collected, number, first) -> np.ndarray:
+        """Solve some images around a centre and collect those for which it holds: which they are."""
+        solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
+        good, settled = self._good(solved.left, centre), np.ones(part.size, bool)
+        if first:
+            good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
+        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.near[good], solved.far[good])
+        collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
+        return part[good]
 
     def _good(self, left: np.ndarray, centre: Centre) -> np.ndarray:
         """Where what is left out of an expansion moves no measured corner."""
-        place = np.searchsorted(self.model.free, self.arrangement.corners)
-        index = (2 * place[:, None] + [0, 1]).ravel()
+        index = self.index(self.arrangement.corners)
         sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
         return (left[:, index] < _VALID * sigma).all(1)
+
+
+class _Collected:
+    """What is found in n images, as it comes."""
+
+    def __init__(self, tool: ArrangementEstimator, count: int) -> None:
+        self.tool = tool
+        self.parameters = np.full((count, tool.model.count), np.nan)
+        self.squares = np.full((count, 2), np.nan)
+        self.owner, self.settled = np.zeros(count, int), np.zeros(count, bool)
+
+    def add(self, which: np.ndarray, parameters: np.ndarray, near: np.ndarray, far: np.ndarray) -> None:
+        self.parameters[which], self.squares[which] = parameters, np.stack([near, far], 1)
+
+    def found(self, centres: tuple[Centre, ...]) -> Found:
+        arrangement, free = self.tool.arrangement, self.tool.model.free
+        count, first = len(self.parameters), 2 * free.size
+        vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
+        vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
+        return Found(
+            vertices, self.parameters[:, first:-1], self.parameters[:, -1], *self.squares.T, self.owner, self.settled,
+            centres,
+        )  # fmt: skip
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

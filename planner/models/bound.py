@@ -14,7 +14,7 @@ import numpy as np
 from planner.features.measurand import Measurand, measurand, normals
 from planner.imaging.appearance import is_plain
 from planner.imaging.arrangement import arrangement_of, near_pixels, near_vertices
-from planner.imaging.blurred import BlurredModel
+from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.edge_bound import edge_bound
@@ -67,9 +67,12 @@ def information(pictures: Pictures, *, free_blur: bool = False, reach: float = R
     return Information(model, fisher(model, scene.noise, free_blur))
 
 
-def fisher(model: BlurredModel, noise: Noise, free_blur: bool) -> np.ndarray:
-    """Fisher matrix (q, q) at the expected state: the part of it that the variance's own change adds is left out."""
-    image, jacobian = model.evaluate(model.start())
+def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | None = None) -> np.ndarray:
+    """Fisher matrix (q, q) at a state, the expected one when not given.
+
+    What the change of the noise's variance tells of the levels is left out.
+    """
+    image, jacobian = model.evaluate(state or model.start())
     gain, variance = response(noise, image)
     weighted = jacobian * (gain / np.sqrt(variance))[:, None]
     if not free_blur:
