@@ -10,6 +10,7 @@ from measure.features.alignment import align
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout
 from measure.goodness import WORST, p_value
+from planner.features.locator import MIN_USABLE
 
 _FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
@@ -101,6 +102,7 @@ def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np
     arrangement, n = tool.arrangement, len(found.vertices)
     pieces = np.flatnonzero(np.isin(arrangement.pieces, tool.model.free).any(1))
     middle, state = np.zeros((n, len(layout.names))), np.full((n, len(layout.names)), status.OK, dtype=object)
+    shown = _shown(tool)
     for number, centre in enumerate(found.centres):
         which = found.centre == number
         first = 2 * tool.model.free.size
@@ -115,8 +117,20 @@ def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np
             turns = (values.max(1) > 0) & (values.min(1) < 0)
             weak = faint[:, own].any((1, 2))
             middle[which, e] = values.mean(1)
+            if not shown[e]:
+                state[which, e] = status.NOT_VISIBLE
+                continue
             state[which, e] = np.where(weak, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
     return middle, state.astype(str)
+
+
+def _shown(tool: ArrangementEstimator) -> np.ndarray:
+    """Whether enough of each required edge lies within the image, bool (E,)."""
+    arrangement, t = tool.arrangement, np.linspace(0, 1, 257)[:, None, None]
+    start, stop = arrangement.vertices[arrangement.required].swapaxes(0, 1)
+    places = arrangement.recorded(start + t * (stop - start))
+    inside = ((places >= 0) & (places <= np.array(tool.shape[::-1]) - 1)).all(-1)
+    return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
 
 
 def _states(tool, layout, found: Found, normals, probability, edge_status) -> np.ndarray:
