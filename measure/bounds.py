@@ -14,7 +14,7 @@ from measure.measurement import separation
 from planner import predict
 from planner.imaging.arrangement import near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
-from planner.models.bound import REACH, Information, fisher
+from planner.models.bound import REACH, Information, fisher, known
 from scenes import InvalidInput, Noise, Picture, Scene
 
 
@@ -72,6 +72,6 @@ def _corners(layout: Layout, state: State, noise: Noise) -> np.ndarray:
     arrangement = layout.arrangement
     y, x = near_pixels(arrangement, layout.optics.shape, REACH)
     model = BlurredModel(arrangement, x, y, near_vertices(arrangement, REACH + 6 * arrangement.blur_px))
-    told = Information(model, fisher(model, noise, False, state))
+    told = Information(model, fisher(model, noise, False, state) + np.diag(known(model)))
     index = (2 * arrangement.corners[:, None] + [0, 1]).ravel()
     return told.vertices()[np.ix_(index, index)]

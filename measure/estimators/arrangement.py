@@ -19,7 +19,7 @@ from measure.estimators.expansion import Expansion, Pieces
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.sensor import recorded
-from planner.models.bound import response
+from planner.models.bound import KNOWN_LEVELS, response
 from scenes import Noise
 
 REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
@@ -28,8 +28,7 @@ _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
-_UNTOLD = 1e4  # the same of a level or the blur
-_FOLLOWS = 0.3  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
+_FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _BLUR_KNOWN = 0.3  # of the blur: how well it is known before
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
@@ -144,7 +143,7 @@ class ArrangementEstimator:
         model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
         levels, mean = [], [self.arrangement.vertices[model.free].ravel()]
         for region in self.arrangement.regions:
-            levels.append(np.full(region.count, 1.0 if region.known else (1e4 * sigma) ** -2))
+            levels.append(np.full(region.count, (KNOWN_LEVELS if region.known else 1e4 * sigma) ** -2))
             mean.append(np.eye(region.count)[0] * region.known)
         blur, places = model.start().blur, self._held()
         precision = np.zeros((model.count, model.count))
@@ -249,11 +248,12 @@ class ArrangementEstimator:
         """Where free vertices' x and y stand among the parameters."""
         return (2 * np.searchsorted(self.model.free, vertices)[:, None] + [0, 1]).ravel()
 
-    def without_prior(self, centre: Centre) -> np.ndarray:
-        """Covariance of the parameters (q, q) as the image alone tells them; large where it does not."""
-        precision = self.prior[0]
-        least = np.where(np.arange(len(precision)) < 2 * self.model.free.size, _FREE, _UNTOLD)
-        return _inverse(_inverse(centre.expansion.inverse) - precision + np.diag(1 / least**2))
+    def wherever(self, centre: Centre) -> np.ndarray:
+        """Covariance of the parameters (q, q) if nothing is known of any vertex before; large where none is told."""
+        moves, places = slice(2 * self.model.free.size), np.zeros_like(self.prior[0])
+        places[moves, moves] = self.prior[0][moves, moves] - np.eye(2 * self.model.free.size) / _FREE**2
+        inverse, rest = _inverse(_inverse(centre.expansion.inverse) - places), self.prior[0] - places
+        return inverse - inverse @ rest @ inverse
 
     def derivative(self, centre: Centre) -> np.ndarray:
         """Derivative of the parameters by the pixels at a state, (q, P)."""

@@ -14,7 +14,7 @@ from planner.features.locator import MIN_USABLE
 
 _FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
-_HELD = 1.1  # variance without what was known before over that with it, above which the image does not tell
+_HELD = 1.1  # variance if nothing were known of other vertices over that of here, above which the image does not tell
 _BIAS = 0.3  # standard deviations of second-order bias above which the errors are not linear in the noise
 
 
@@ -153,7 +153,7 @@ def _told(tool: ArrangementEstimator, centre: Centre) -> str:
     rows = _directions(centre.state.vertices[tool.arrangement.corners])
     part = np.ix_(index, index)
     variance = np.einsum("ki,ij,kj->k", rows, centre.covariance[part], rows)
-    alone = np.einsum("ki,ij,kj->k", rows, tool.without_prior(centre)[part], rows)
+    alone = np.einsum("ki,ij,kj->k", rows, tool.wherever(centre)[part], rows)
     bias = np.abs(rows @ centre.bias[index])
     fine = (alone <= _HELD * variance).all() and (bias <= _BIAS * np.sqrt(np.maximum(variance, 0))).all()
     return status.OK if fine and np.isfinite(variance).all() else status.ILL_CONDITIONED

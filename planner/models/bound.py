@@ -2,7 +2,8 @@
 
 Free are the image positions of all visible vertices near the required edges (faces stay polygons), a linear level on
 each face, the background and, on request, the blur. What is known of them is what the pixels near the required edges
-tell, each with its own noise.
+tell, each with its own noise; of the level and the slopes of a lit face besides that the light gives them, within their
+own size. This holds the levels of slivers, which else could be negative; elsewhere it changes nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from planner.models.errors import Errors
 from scenes import Centre, Noise
 
 REACH = 32.0  # px from a required edge up to which pixels count; levels are hardly better known from more
+KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
 _UNTOLD = 1e3  # px, or the size of a level: a standard deviation at which nothing is known
 _FURTHEST = 100.0  # px^2; what is known no better is not known, for the model is linear
 
@@ -42,11 +44,11 @@ class Information(NamedTuple):
     def covariance(self) -> np.ndarray:
         """Smallest covariance of all parameters (q, q); large where the data cannot tell."""
         told = np.diag(self.fisher)
-        known = told > 1e-12
-        scale = 1 / np.sqrt(np.where(known, told, 1.0))
-        weak = np.where(known, (scale / _UNTOLD) ** 2, 1.0)
+        some = told > 1e-12
+        scale = 1 / np.sqrt(np.where(some, told, 1.0))
+        weak = np.where(some, (scale / _UNTOLD) ** 2, 1.0)
         matrix = self.fisher * scale[:, None] * scale + np.diag(weak)
-        return np.linalg.inv(matrix) * scale[:, None] * scale * (known[:, None] & known)
+        return np.linalg.inv(matrix) * scale[:, None] * scale * (some[:, None] & some)
 
     def vertices(self) -> np.ndarray:
         """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free."""
@@ -57,14 +59,32 @@ class Information(NamedTuple):
         return whole
 
 
-def information(pictures: Pictures, *, free_blur: bool = False, reach: float = REACH) -> Information:
-    """What one picture tells of its arrangement."""
+def information(
+    pictures: Pictures, *, free_blur: bool = False, reach: float = REACH, known_levels: float = KNOWN_LEVELS
+) -> Information:
+    """What one picture tells of its arrangement.
+
+    Parameters
+    ----------
+    free_blur : bool
+        Whether the blur is unknown.
+    reach : float
+        How far from a required edge pixels count, px.
+    known_levels : float
+        Standard deviation of lit faces' levels before, in units of them; infinite where nothing is known.
+    """
     scene, arrangement = pictures.scene, arrangement_of(pictures)
     y, x = near_pixels(arrangement, (scene.camera.height, scene.camera.width), reach)
     model = BlurredModel(arrangement, x, y, near_vertices(arrangement, reach + 6 * arrangement.blur_px))
     if not x.size:
         return Information(model, np.zeros((model.count, model.count)))
-    return Information(model, fisher(model, scene.noise, free_blur))
+    return Information(model, fisher(model, scene.noise, free_blur) + np.diag(known(model, known_levels)))
+
+
+def known(model: BlurredModel, levels: float = KNOWN_LEVELS) -> np.ndarray:
+    """Precision of each parameter before, (q,), of lit faces' levels only."""
+    regions = [np.full(region.count, levels**-2 if region.known else 0.0) for region in model.arrangement.regions]
+    return np.concatenate([np.zeros(2 * model.free.size), *regions, [0.0]])
 
 
 def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | None = None) -> np.ndarray:
