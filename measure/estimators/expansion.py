@@ -19,8 +19,8 @@ _ROWS = ((0, 2), (1, 3), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many 
 _STARTS = np.cumsum([0, *(count for _, count in _ROWS)])
 ROWS = int(_STARTS[-1])
 _KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in zip(_STARTS, _STARTS[1:], strict=False))
-_ITERATIONS = 12
-_SETTLED = 1e-4  # of a standard deviation
+_ITERATIONS = 40
+_SETTLED = 3e-4  # of a standard deviation
 _STRIDE = 8.0  # standard deviations that one iteration may go
 
 
@@ -311,13 +311,15 @@ class Expansion:
             away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)
         ], 1)  # fmt: skip
         steps = np.zeros((len(used), self.inverse.shape[0]))
-        change = np.inf
+        change, open_ = np.zeros_like(steps), np.arange(len(steps))
         for _ in range(_ITERATIONS):
-            columns = self._columns(steps)
-            score = self._score(steps, told - columns @ self.gram) + (self.offset - steps) @ self.prior
-            change = np.clip(score @ self.inverse, -_STRIDE * self.scale, _STRIDE * self.scale)
-            steps = steps + change
-            if (np.abs(change) < _SETTLED * self.scale).all():
+            columns = self._columns(steps[open_])
+            score = self._score(steps[open_], told[open_] - columns @ self.gram)
+            score += (self.offset - steps[open_]) @ self.prior
+            change[open_] = np.clip(score @ self.inverse, -_STRIDE * self.scale, _STRIDE * self.scale)
+            steps[open_] += change[open_]
+            open_ = open_[(np.abs(change[open_]) > _SETTLED * self.scale).any(1)]
+            if not open_.size:
                 break
         columns, level = self._columns(steps), steps[:, -count:]
         squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
