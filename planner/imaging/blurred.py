@@ -270,7 +270,7 @@ class BlurredModel:
         """First side minus other side at each node, grey levels, (n,)."""
         arrangement, nodes = self.arrangement, self.nodes
         found = np.zeros(nodes.t.size)
-        for region, part in zip(range(len(arrangement.regions)), arrangement.level_slices, strict=True):
+        for region, part in enumerate(arrangement.level_slices):
             for side, sign in ((0, 1.0), (1, -1.0)):
                 here = arrangement.sides[nodes.piece, side] == region
                 if here.any():
@@ -292,7 +292,22 @@ class BlurredModel:
                 if vertex >= 0:
                     rows[2 * vertex] += along[piece, 1] * images[piece]
                     rows[2 * vertex + 1] -= along[piece, 0] * images[piece]
-        return rows, scatter.blur(weight, traced, kernels) * state.blur
+        leaning = nodes.weight * self._leaning(state, traced)
+        blur = scatter.blur(weight, traced, kernels) - scatter.at_all(leaning)
+        return rows, blur * state.blur
+
+    def _leaning(self, state: State, traced: Traced) -> np.ndarray:
+        """Slope of the contrast across the piece, times its tangent's length, at each node, (n,)."""
+        arrangement, nodes = self.arrangement, self.nodes
+        across = np.stack([traced.tangent[:, 1], -traced.tangent[:, 0]])
+        found = np.zeros(nodes.t.size)
+        for region, part in enumerate(arrangement.level_slices):
+            for side, sign in ((0, 1.0), (1, -1.0)):
+                here = arrangement.sides[nodes.piece, side] == region
+                if here.any():
+                    slope = arrangement.regions[region].slope(np.nan_to_num(traced.place[here]))
+                    found[here] += sign * np.einsum("b,bin,in->n", state.levels[part], slope, across[:, here])
+        return found
 
 
 def _first(count: int, value: float) -> np.ndarray:
@@ -333,6 +348,11 @@ class Scatter:
     def by_piece(self, weight: np.ndarray, count: int) -> np.ndarray:
         """Sum of weight (n,) times kernel for each piece, (count, P)."""
         return self.add(self.product * weight[:, None, None], count)
+
+    def at_all(self, weight: np.ndarray) -> np.ndarray:
+        """Sum of weight (n,) times kernel, (P,)."""
+        values = self.product * weight[:, None, None]
+        return np.bincount(self.slot.ravel(), values.ravel(), self.size + 1)[:-1]
 
     def add(self, values: np.ndarray, count: int) -> np.ndarray:
         """Sum of values (n, w, w) for each piece at each pixel, (count, P)."""
