@@ -271,11 +271,12 @@ def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, 
         return (blocker < 0) | (t >= 1)
 
     lit = tuple(_where(wanted, places, np.zeros(places.shape[:-1], int), at, free) for at in pictures.lights_at)
-    return signal(pictures, places, _UP, 1, lit, material=_floor_material(scene.floor), fall_off=fall_off)
+    return signal(pictures, places, _UP, 1, lit, material=floor_material(scene.floor), fall_off=fall_off)
 
 
 @lru_cache(maxsize=64)
-def _floor_material(floor: Floor) -> Material:
+def floor_material(floor: Floor) -> Material:
+    """The floor's surface: diffuse."""
     return Material(diffuse_reflectance=floor.reflectance)
 
 

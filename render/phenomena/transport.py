@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.imaging.appearance import floor_material, signal
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides
 from scenes import Scene, Solid
@@ -112,11 +113,8 @@ def _gain(scene: Scene) -> float:
 
 def _floor_levels(pictures: Pictures) -> np.ndarray:
     """Unshadowed level of the floor behind each edge point, shape (S, E, n); 0 where the floor is not seen."""
-    points = background(pictures, sides(pictures).points)
-    scene = pictures.scene
-    away = pictures.lights_at[0][:, None, None] - points
-    distance = np.linalg.norm(away, axis=-1)
-    level = scene.floor.reflectance * scene.camera.exposure * away[..., 2] * scene.light.distance**2 / distance**3
+    scene, points = pictures.scene, background(pictures, sides(pictures).points)
+    level = signal(pictures, points, np.array([0.0, 0.0, 1.0]), 2, material=floor_material(scene.floor))
     inside = (np.abs(points[..., :2]) <= scene.floor.half_side).all(-1)
     return np.where(inside, np.nan_to_num(level), 0.0)
 
