@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from measure import status
+from measure.estimators.registry import SYNONYMS
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
 from scenes import InvalidInput, Picture, Scene
@@ -25,11 +26,12 @@ class Measurement:
     Attributes
     ----------
     value_px : ndarray, shape (...)
-        Distance, px; NaN where `status` is neither ``ok`` nor ``clutter``.
+        Distance, px; NaN where `status` is neither ``ok`` nor ``clutter`` nor ``misfit``.
     variance_px2 : ndarray, shape (...)
         Its variance (not sigma), px^2, from the estimator's own linear response at the contrast measured in the image.
     status : ndarray of str, shape (...)
-        ``ok``, ``clutter``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or ``ill_conditioned``.
+        ``ok``, ``clutter``, ``misfit``, ``ambiguous``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or
+        ``ill_conditioned``.
     corners : ndarray, shape (..., 2, 2)
         Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
     covariance : ndarray, shape (..., 4, 4)
@@ -39,7 +41,10 @@ class Measurement:
     edge_contrast : ndarray, shape (..., E)
         Measured contrast at the middle of the edge, grey levels.
     used, rejected : ndarray of int, shape (..., E)
-        Number of edge points (pixels, for ``strip`` and ``polygon``).
+        Number of edge points (pixels, for ``strip`` and ``arrangement``).
+    p_value : ndarray, shape (...)
+        Goodness of fit: probability of a residual at least as unlikely, if the image is what the model says and the
+        noise the sensor's; NaN for estimators that have no model of the image.
     """
 
     value_px: np.ndarray
@@ -52,6 +57,7 @@ class Measurement:
     edge_contrast: np.ndarray
     used: np.ndarray
     rejected: np.ndarray
+    p_value: np.ndarray
 
 
 def distance(
@@ -73,8 +79,8 @@ def distance(
     sensor : Pose or pair of float
         Where the image was taken from; edges are sought where this pose projects them, up to 4 px and 2 degrees away.
     light : Pose or pair of float, optional
-        Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``polygon``.
-    estimator : {"gradient", "canny", "strip", "polygon"}
+        Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``arrangement``.
+    estimator : {"gradient", "canny", "strip", "arrangement"}
         ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, edge pixels
         above a gradient threshold, each moved to where the gradient across the edge is largest. ``strip``: maximum
         likelihood along each edge. ``polygon``: all edges of the face together, corners included; the most precise.
@@ -108,7 +114,8 @@ def distances(
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
+    batch = len(stack) if SYNONYMS.get(estimator, estimator) == "arrangement" else _BATCH
+    parts = [_measure(stack[i : i + batch], layout, estimator, threshold) for i in range(0, len(stack), batch)]
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
@@ -154,6 +161,7 @@ def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> di
         "edge_contrast": shape.edge_contrast,
         "used": shape.used,
         "rejected": shape.rejected,
+        "p_value": shape.p_value,
     }
 
 

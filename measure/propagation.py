@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from measure import status
+from measure.estimators.arrangement import ArrangementEstimator
+from measure.features import arranged
 from measure.features.corners import corner_response
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
@@ -69,8 +71,11 @@ def propagate(
         return _nothing(clean, str(found.status))
     layout = layout_of(picture)
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
-    response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
-    ends = response @ tool.respond(clean)
+    if isinstance(tool, ArrangementEstimator):
+        ends = arranged.corner_response(tool, layout, clean)
+    else:
+        response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
+        ends = response @ tool.respond(clean)
     _, gradient = separation(found.corners[None])
     g = gradient[0] @ ends
     if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is

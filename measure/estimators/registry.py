@@ -10,11 +10,11 @@ import numpy as np
 from scipy import sparse
 
 from measure import status
+from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.estimate import Estimate, Estimator, noisy
 from measure.estimators.gradient import GradientLocator
 from measure.estimators.likelihood import LikelihoodEstimator
-from measure.estimators.polygon import polygon_estimator
 from measure.estimators.profile import TRUNCATE
 from measure.estimators.strip import strip_estimator
 from measure.estimators.thinning import Thinned, Thinning
@@ -24,8 +24,9 @@ from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
 from scenes import InvalidInput
 
-ESTIMATORS = ("canny", "gradient", "strip", "polygon")
-CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
+ESTIMATORS = ("canny", "gradient", "strip", "arrangement")
+SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
+CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
 _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
@@ -33,13 +34,14 @@ _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is 
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
-def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
+def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator | ArrangementEstimator:
     """Prepare an estimator.
 
     Parameters
     ----------
     layout : Layout
-    name : {"canny", "gradient", "strip", "polygon"}
+    name : {"canny", "gradient", "strip", "arrangement"}
+        ``polygon`` is a synonym of ``arrangement``.
     threshold : float
         Gradient threshold of ``canny``, grey levels a pixel.
 
@@ -48,18 +50,17 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     InvalidInput
         If the name is unknown or the threshold not positive.
     """
+    name = SYNONYMS.get(name, name)
     if name not in ESTIMATORS:
         raise InvalidInput(f"estimator must be one of {', '.join(ESTIMATORS)}, got {name!r}")
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
     optics = layout.optics
     own_reach = CLEARANCE * edge_blur(optics.blur_px)  # a face less than twice as wide has no pixel of its own level
-    if name == "polygon":
-        whole = edge_calipers(layout, 0.0, 0.0, 2 * own_reach)
-        found = polygon_estimator(layout, whole, own_reach) if _all_measurable(whole) else None
-        if found is not None:
-            return found
-        name = "strip"  # no closed ring around one face: each edge by itself
+    if name == "arrangement":
+        if layout.arrangement is not None:
+            return ArrangementEstimator(layout.arrangement, optics.shape, optics.sensor)
+        name = "strip"  # things hide or shade each other: each edge by itself
     if name == "strip":
         calipers = edge_calipers(layout, own_reach, 0.0, 2 * own_reach)
         parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(calipers)]
@@ -97,10 +98,6 @@ def _thinned(caliper: Caliper, scale: float) -> Caliper:
 
 def _measurable(caliper: Caliper) -> bool:
     return caliper.status in status.MEASURED
-
-
-def _all_measurable(calipers: tuple[Caliper, ...]) -> bool:
-    return all(caliper.status != status.NOT_VISIBLE for caliper in calipers)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from skimage.draw import polygon2mask
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
 from planner.features.projected_edges import projected_edges, straight
+from planner.imaging.appearance import is_plain
+from planner.imaging.arrangement import Arrangement, arrangement_of, polygon_arrangement
 from planner.imaging.lens import signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
@@ -50,6 +52,8 @@ class Layout:
     optics : Optics
     defocus : ndarray, shape (E, 2)
         Signed radius of the circle of confusion at both ends of each edge, px; it changes linearly in between.
+    arrangement : Arrangement, optional
+        All that is seen around the edges; None where things hide or shade each other.
     """
 
     names: tuple[str, ...]
@@ -66,6 +70,7 @@ class Layout:
     shadings: tuple[Shading | None, ...]
     optics: Optics
     defocus: np.ndarray
+    arrangement: Arrangement | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -82,6 +87,7 @@ class Layout:
             apart=tuple(move(segments) for segments in self.apart),
             others=move(self.others),
             faces=tuple(move(face) for face in self.faces),
+            arrangement=self.arrangement and self.arrangement.moved(shift, turn, middle),
         )
 
     def shifted(self, offsets: np.ndarray) -> Layout:
@@ -186,6 +192,7 @@ def layout_of(picture: Picture) -> Layout:
         shadings=tuple(shadings[f] for f in order),
         optics=Optics.of(scene),
         defocus=_defocus(scene, pose, required),
+        arrangement=arrangement_of(pictures) if is_plain(scene) else None,
     )
 
 
@@ -216,6 +223,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         shadings=(Shading.uniform(corners),),
         optics=optics,
         defocus=np.zeros((count, 2)),
+        arrangement=polygon_arrangement(corners, optics.blur_px),
     )
 
 

@@ -2,60 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from measure import status
+from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
 from measure.estimators.registry import CAPTURE, estimator
 from measure.features.alignment import align
+from measure.features.arranged import find_arranged
 from measure.features.corners import corner_response, intersect, line_equations
+from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout
 
-_MIN_SINE = 0.02  # of the angle between the lines of a corner: about a degree
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
-@dataclass(frozen=True)
-class Shape:
-    """Lines and corners in n images.
-
-    Attributes
-    ----------
-    corners : ndarray, shape (n, C, 2)
-        (x, y), px; NaN where `status` is neither ``ok`` nor ``clutter``.
-    covariance : ndarray, shape (n, 2 C, 2 C)
-        Joint covariance of all corners' (x, y), px^2.
-    normals, points : ndarray, shape (n, E, 2)
-        Unit normal and one point of each line, px.
-    tilt_covariance : ndarray, shape (n, E, E)
-        Covariance of the lines' angles, rad^2.
-    status : ndarray of str, shape (n,)
-    edge_status : ndarray of str, shape (n, E)
-    edge_contrast : ndarray, shape (n, E)
-        Contrast at the middle of the edge, absolute, grey levels.
-    used, rejected : ndarray of int, shape (n, E)
-        Edge points, or pixels for the likelihood estimators.
-    """
-
-    corners: np.ndarray
-    covariance: np.ndarray
-    normals: np.ndarray
-    points: np.ndarray
-    tilt_covariance: np.ndarray
-    status: np.ndarray
-    edge_status: np.ndarray
-    edge_contrast: np.ndarray
-    used: np.ndarray
-    rejected: np.ndarray
-
-
 @lru_cache(maxsize=64)
-def prepared(layout: Layout, name: str, threshold: float) -> Estimator:
+def prepared(layout: Layout, name: str, threshold: float) -> Estimator | ArrangementEstimator:
     """The estimator of a layout, made once."""
     return estimator(layout, name, threshold)
 
@@ -76,6 +43,9 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     Each image is measured by itself: its result does not depend on the others of the stack. Where the edges are not
     within the estimator's capture of their expected place, the layout is moved there first.
     """
+    tool = prepared(layout, name, threshold)
+    if isinstance(tool, ArrangementEstimator):
+        return find_arranged(images, layout, tool)
     return _find(images, layout, name, threshold, _PASSES)
 
 
@@ -133,7 +103,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
     fixed = np.array([caliper.status for caliper in calipers])
     edge_status = np.where(fixed == status.OK, estimate.state, np.where(
         (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
-    joint = np.where(sines < _MIN_SINE, status.ILL_CONDITIONED, status.OK)
+    joint = np.where(sines < MIN_SINE, status.ILL_CONDITIONED, status.OK)
     state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
     measured = np.isin(state, status.MEASURED)
     covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
@@ -152,6 +122,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
         edge_contrast=np.abs(middle),
         used=estimate.used,
         rejected=estimate.rejected,
+        p_value=np.full(len(state), np.nan),
     )
 
 

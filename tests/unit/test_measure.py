@@ -260,7 +260,7 @@ def test_bad_image(task1, image, line):
 
 
 def test_bad_locator(task1):
-    with pytest.raises(InvalidInput, match="estimator must be one of canny, gradient, strip, polygon, got 'sobel'"):
+    with pytest.raises(InvalidInput, match="estimator must be one of canny, gradient, strip, arrangement, got 'sobel'"):
         measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="sobel")
     with pytest.raises(InvalidInput, match="threshold must be greater than 0, got -1"):
         measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="canny", threshold=-1)

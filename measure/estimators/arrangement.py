@@ -1,0 +1,340 @@
+"""Maximum likelihood of all visible faces around the required edges together.
+
+Unknown are the image positions of all vertices near the required edges, a level on each face, the background and the
+blur; `planner.imaging.blurred` says what image they make. From the expected place Fisher scoring climbs to the
+likelihood's maximum, with the model evaluated anew at each step. Other images of the same stack are solved around the
+place found for one of them, to where an expansion of fourth order holds (`measure.estimators.expansion`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from measure.estimators.expansion import Expansion, Pieces
+from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
+from planner.imaging.blurred import BlurredModel, State
+from planner.imaging.sensor import recorded
+from planner.models.bound import KNOWN_LEVELS, response
+from scenes import Noise
+
+REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
+_STEPS = 30
+_SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
+_LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum
+_STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
+_SETTLED = 1e-3  # of a standard deviation
+_ROUNDING = 1e-5  # of a chi-square: what is less is no difference
+_FREE = 1e3  # px: a standard deviation at which nothing is known
+_FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
+_BLUR_KNOWN = 0.3  # of the blur: how well it is known before
+_VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
+_BATCH = 40  # images at a time, so that they stay in the processor's cache
+_ROUNDS = 4  # expansions before each image is measured alone
+
+
+class Fit(NamedTuple):
+    """The likelihood's maximum in one image.
+
+    Attributes
+    ----------
+    state : State
+    inverse : ndarray, shape (q, q)
+        Of the information on the parameters.
+    cost : float
+        Chi-square and what the parameters' distance from what was known before adds.
+    settled : bool
+        Whether the steps ended.
+    """
+
+    state: State
+    inverse: np.ndarray
+    cost: float
+    settled: bool
+
+
+class Found(NamedTuple):
+    """Most likely parameters in n images.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, V, 2)
+    levels : ndarray, shape (n, L)
+    blur : ndarray, shape (n,)
+    near, far : ndarray, shape (n,)
+        Chi-square near the pieces and elsewhere.
+    centre : ndarray of int, shape (n,)
+        Which of ``centres`` was expanded about.
+    settled : ndarray of bool, shape (n,)
+    centres : tuple of Centre
+    """
+
+    vertices: np.ndarray
+    levels: np.ndarray
+    blur: np.ndarray
+    near: np.ndarray
+    far: np.ndarray
+    centre: np.ndarray
+    settled: np.ndarray
+    centres: tuple[Centre, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A state with what images near it need.
+
+    Attributes
+    ----------
+    state : State
+    expansion : Expansion
+    covariance : ndarray, shape (q, q)
+        Of the parameters' errors.
+    bias : ndarray, shape (q,)
+        Mean of the parameters' errors, second order.
+    freedom : tuple of float
+        Degrees of freedom near the pieces and elsewhere.
+    """
+
+    state: State
+    expansion: Expansion
+    covariance: np.ndarray
+    bias: np.ndarray
+    freedom: tuple[float, float]
+
+
+Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
+"""The maximum in one image, from its used pixels (P,) and the whole of it (height, width)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArrangementEstimator:
+    """Prepared for one expected arrangement in images of one shape.
+
+    Attributes
+    ----------
+    arrangement : Arrangement
+    shape : tuple of int
+        (height, width).
+    noise : Noise
+    """
+
+    arrangement: Arrangement
+    shape: tuple[int, int]
+    noise: Noise
+
+    @cached_property
+    def model(self) -> BlurredModel:
+        """The image at the pixels near the required edges."""
+        y, x = near_pixels(self.arrangement, self.shape, REACH)
+        return BlurredModel(
+            self.arrangement, x, y, near_vertices(self.arrangement, REACH + 6 * self.arrangement.blur_px)
+        )
+
+    @cached_property
+    def pixels(self) -> np.ndarray:
+        """Flat indices of the pixels that it looks at."""
+        return self.model.y * self.shape[1] + self.model.x
+
+    @cached_property
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Precision (q, q) and mean (q,) of what is known of (vertices, levels, blur) before."""
+        model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
+        levels, mean = [], [self.arrangement.vertices[model.free].ravel()]
+        for region in self.arrangement.regions:
+            levels.append(np.full(region.count, (KNOWN_LEVELS if region.known else 1e4 * sigma) ** -2))
+            mean.append(np.eye(region.count)[0] * region.known)
+        blur, places = model.start().blur, self._held()
+        precision = np.zeros((model.count, model.count))
+        precision[: len(places), : len(places)] = places
+        rest = np.arange(len(places), model.count)
+        precision[rest, rest] = np.concatenate([*levels, [(_BLUR_KNOWN * blur) ** -2]])
+        return precision, np.concatenate([*mean, [blur]])
+
+    def _held(self) -> np.ndarray:
+        """Precision of the free vertices' places before, (2 F, 2 F).
+
+        The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
+        """
+        free, places = self.model.free, self.arrangement.vertices[self.model.free]
+        required = np.isin(free, self.arrangement.required)
+        x, y = (places - places.mean(0)).T
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        motion = np.stack([np.stack([one, zero, x, -y], -1), np.stack([zero, one, y, x], -1)], 1)  # (F, 2, 4)
+        follow = motion[~required].reshape(-1, 4) @ np.linalg.pinv(motion[required].reshape(-1, 4))
+        apart = np.zeros((follow.shape[0], 2 * free.size))
+        apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
+        apart[:, np.repeat(required, 2)] = -follow
+        return apart.T @ apart / _FOLLOWS**2 + np.eye(2 * free.size) / _FREE**2
+
+    def parameters(self, state: State) -> np.ndarray:
+        """All parameters as one array (q,)."""
+        return np.concatenate([state.vertices[self.model.free].ravel(), state.levels, [state.blur]])
+
+    def taken(self, images: np.ndarray, order: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """The used pixels of images (n, height, width), (n, P)."""
+        return np.take(images.reshape(len(images), -1), self.pixels[order], 1).astype(float, copy=False)
+
+    def expected(self, state: State, derivatives: bool = True):
+        """Recorded level (P,), one over its noise's variance, its derivative by the signal, the signal's Jacobian."""
+        image, jacobian = self.model.evaluate(state, derivatives)
+        gain, variance = response(self.noise, image)
+        return recorded(self.noise, image + self.noise.dark_level).level, 1 / variance, gain, jacobian
+
+    def start(self, used: np.ndarray, vertices: np.ndarray | None = None) -> State:
+        """The expected place, or another, with the levels that fit one image (P,) best there."""
+        state = self.model.start()
+        state = state if vertices is None else state._replace(vertices=vertices)
+        _, weight, _, jacobian = self.expected(state)
+        first, last = 2 * self.model.free.size, -1
+        design, (precision, mean) = jacobian[:, first:last], self.prior
+        known = precision[first:last, first:last]
+        matrix = design.T @ (design * weight[:, None]) + known
+        told = design.T @ (weight * (used - self.noise.dark_level)) + known @ mean[first:last]
+        return state._replace(levels=np.linalg.solve(matrix, told))
+
+    def climb(self, used: np.ndarray, state: State) -> Fit:
+        """Fisher scoring from a state to the likelihood's maximum for one image (P,)."""
+        precision, mean = self.prior
+        cost, damping, settled = np.inf, 0.0, False
+        for number in range(_STEPS):
+            expected, weight, gain, jacobian = self.expected(state)
+            away, before = used - expected, mean - self.parameters(state)
+            weighted = jacobian * (gain * weight)[:, None]
+            fisher = weighted.T @ (jacobian * gain[:, None]) + precision
+            score = away @ weighted + precision @ before
+            cost = float(away @ (weight * away) + before @ precision @ before)
+            inverse = _inverse(fisher)
+            if settled:
+                break
+            matrix = fisher if number < _SCORED else self._newton(fisher, state, gain * weight * away)
+            state, settled, damping = self._step(used, state, matrix, score, cost, damping)
+        return Fit(state, inverse, cost, settled)
+
+    def _newton(self, fisher: np.ndarray, state: State, told: np.ndarray) -> np.ndarray:
+        """Second derivative of the cost (q, q) where it is positive: the residual ``told`` (P,) bends it in slivers."""
+        pieces, small = Pieces.of(self.model, state), 1e-4 * np.eye(self.model.count)
+        rows = np.stack([rows @ told[pixels] for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)])
+        rows = np.broadcast_to(rows, (len(small), *rows.shape))
+        bent = (pieces.gradient(pieces.displaced(small), rows) - pieces.gradient(pieces.displaced(-small), rows)) / 2e-4
+        matrix, scale = fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(fisher))
+        return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else fisher
+
+    def _step(self, used, state, fisher, score, cost, damping) -> tuple[State, bool, float]:
+        """The next state, shortened or damped until the likelihood grows; whether it hardly differs; the damping."""
+        precision, mean = self.prior
+        for _ in range(12):
+            step = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), score)
+            size = float(step @ fisher @ step)
+            step = step * min(1.0, _STRIDE / max(np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), 1e-12))
+            there = self.model.moved(state, step)
+            if size < _SETTLED**2:
+                return there if damping == 0 else state, True, 0.0
+            expected, weight, _, _ = self.expected(there, derivatives=False)
+            before = mean - self.parameters(there)
+            reached = float(weight @ (used - expected) ** 2 + before @ precision @ before)
+            if reached <= cost + _ROUNDING:
+                return there, False, damping / 10 if damping > 1e-3 else 0.0
+            damping = max(10 * damping, 1e-3)
+        return state, True, damping
+
+    def centre(self, fit: Fit) -> Centre:
+        """Prepare a state for a stack of images."""
+        precision, mean = self.prior
+        expected, weight, gain, jacobian = self.expected(fit.state)
+        first = 2 * self.model.free.size
+        expansion = Expansion.of(
+            Pieces.of(self.model, fit.state), expected, weight, gain, jacobian[:, first:],
+            fit.inverse, precision, mean - self.parameters(fit.state),
+        )  # fmt: skip
+        spread = fit.inverse - fit.inverse @ precision @ fit.inverse
+        taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
+        fitted = len(precision) - (precision * fit.inverse).sum() - taken
+        near, far = expansion.near, self.pixels.size - expansion.near
+        return Centre(fit.state, expansion, spread, expansion.bias(spread), (near - fitted, max(far - taken, 0.0)))
+
+    def index(self, vertices: np.ndarray) -> np.ndarray:
+        """Where free vertices' x and y stand among the parameters."""
+        return (2 * np.searchsorted(self.model.free, vertices)[:, None] + [0, 1]).ravel()
+
+    def wherever(self, centre: Centre) -> np.ndarray:
+        """Covariance of the parameters (q, q) if nothing is known of any vertex before; large where none is told."""
+        moves, places = slice(2 * self.model.free.size), np.zeros_like(self.prior[0])
+        places[moves, moves] = self.prior[0][moves, moves] - np.eye(2 * self.model.free.size) / _FREE**2
+        inverse, rest = _inverse(_inverse(centre.expansion.inverse) - places), self.prior[0] - places
+        return inverse - inverse @ rest @ inverse
+
+    def derivative(self, centre: Centre) -> np.ndarray:
+        """Derivative of the parameters by the pixels at a state, (q, P)."""
+        _, weight, gain, jacobian = self.expected(centre.state)
+        return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
+
+    def find(self, images: np.ndarray, locate: Locate | None = None) -> Found:
+        """Most likely parameters in images (n, height, width).
+
+        The first image is measured by itself; the others around it, as far as the expansion holds; the first that is
+        left by itself, and so on.
+        """
+        collected, left, centres = _Collected(self, len(images)), np.arange(len(images)), []
+        while left.size:
+            image = images[left[0]]
+            used = self.taken(image[None])[0]
+            fit, centre = locate(used, image) if locate else self._locate(used)
+            tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
+            done = [self._around(images, tried[at : at + _BATCH], fit, centre, collected, len(centres), at == 0)
+                    for at in range(0, tried.size, _BATCH)]  # fmt: skip
+            centres.append(centre)
+            left = np.setdiff1d(left, np.concatenate(done))
+        return collected.found(tuple(centres))
+
+    def _locate(self, used: np.ndarray) -> tuple[Fit, Centre]:
+        fit = self.climb(used, self.start(used))
+        return fit, self.centre(fit)
+
+    def _around(self, images, part, fit, centre, collected, number, first) -> np.ndarray:
+        """Solve some images around a centre and collect those for which it holds: which they are."""
+        solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
+        good, settled = self._good(solved.left, centre), np.ones(part.size, bool)
+        if first:
+            good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
+        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.near[good], solved.far[good])
+        collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
+        return part[good]
+
+    def _good(self, left: np.ndarray, centre: Centre) -> np.ndarray:
+        """Where what is left out of an expansion moves no measured corner."""
+        index = self.index(self.arrangement.corners)
+        sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
+        return (left[:, index] < _VALID * sigma).all(1)
+
+
+class _Collected:
+    """What is found in n images, as it comes."""
+
+    def __init__(self, tool: ArrangementEstimator, count: int) -> None:
+        self.tool = tool
+        self.parameters = np.full((count, tool.model.count), np.nan)
+        self.squares = np.full((count, 2), np.nan)
+        self.owner, self.settled = np.zeros(count, int), np.zeros(count, bool)
+
+    def add(self, which: np.ndarray, parameters: np.ndarray, near: np.ndarray, far: np.ndarray) -> None:
+        self.parameters[which], self.squares[which] = parameters, np.stack([near, far], 1)
+
+    def found(self, centres: tuple[Centre, ...]) -> Found:
+        arrangement, free = self.tool.arrangement, self.tool.model.free
+        count, first = len(self.parameters), 2 * free.size
+        vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
+        vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
+        return Found(
+            vertices, self.parameters[:, first:-1], self.parameters[:, -1], *self.squares.T, self.owner, self.settled,
+            centres,
+        )  # fmt: skip
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a positive matrix whose rows differ much in size."""
+    scale = 1 / np.sqrt(np.diag(matrix))
+    return np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale

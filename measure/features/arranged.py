@@ -1,0 +1,221 @@
+"""Lines and corners from the most likely arrangement: they are its vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from measure import status
+from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Found
+from measure.features.alignment import align
+from measure.features.found import MIN_SINE, Shape
+from measure.features.layout import Layout
+from measure.goodness import WORST, p_value
+from planner.features.locator import MIN_USABLE
+
+_FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
+_SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
+_HELD = 1.1  # variance if nothing were known of other vertices over that of here, above which the image does not tell
+_BIAS = 0.3  # standard deviations of second-order bias above which the errors are not linear in the noise
+
+
+def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
+    """Lines and corners in images (n, height, width)."""
+    if not layout.visible.all() or (tool.arrangement.required < 0).any() or not tool.pixels.size:
+        return _nothing(len(images), layout)
+    found = tool.find(images, lambda used, image: locate(tool, layout, used, image))
+    ends = found.vertices[:, tool.arrangement.required]
+    along = ends[:, :, 1] - ends[:, :, 0]
+    lengths = np.maximum(np.linalg.norm(along, axis=-1), 1e-12)
+    normals = np.stack([-along[..., 1], along[..., 0]], -1) / lengths[..., None]
+    corners = found.vertices[:, tool.arrangement.corners]
+    freedom = np.array([centre.freedom for centre in found.centres])[found.centre]
+    probability = p_value(np.stack([found.near, found.far], -1), freedom)
+    contrast, edge_status = _edges(tool, layout, found)
+    state = _states(tool, layout, found, normals, probability, edge_status)
+    measured = np.isin(state, status.MEASURED)
+    covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
+    tilts = np.stack([_tilts(tool, centre) for centre in found.centres])[found.centre]
+    count = np.full(edge_status.shape, tool.pixels.size)
+    return Shape(
+        corners=np.where(measured[:, None, None], corners, np.nan),
+        covariance=np.where(measured[:, None, None], covariance, np.nan),
+        normals=normals,
+        points=ends[:, :, 0],
+        tilt_covariance=tilts,
+        status=state,
+        edge_status=edge_status,
+        edge_contrast=np.abs(contrast),
+        used=count,
+        rejected=np.zeros_like(count),
+        p_value=probability,
+    )
+
+
+def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
+    """The likelihood's maximum in one image: from the expected place, or from where the layout is sought anew.
+
+    The second is tried only where the first does not explain the image; the more likely one is taken.
+    """
+    fit = tool.climb(used, tool.start(used))
+    centre = tool.centre(fit)
+    if fit.settled and _near(tool, fit) and _probability(centre, used) >= WORST:
+        return fit, centre
+    x, y, turn = align(image[None], layout)[0]
+    if x or y or turn:
+        moved = tool.arrangement.moved((x, y), turn, layout.ends.reshape(-1, 2).mean(0)).vertices
+        other = tool.climb(used, tool.start(used, moved))
+        if (other.settled, -other.cost) > (fit.settled, -fit.cost):
+            fit, centre = other, tool.centre(other)
+    return fit, centre
+
+
+def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
+    """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
+    _, centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
+    rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
+    rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]
+    return rows
+
+
+def _probability(centre: Centre, used: np.ndarray) -> float:
+    solved = centre.expansion.solve(used[None, centre.expansion.order])
+    squares = np.concatenate([solved.near, solved.far])
+    return float(p_value(squares[None], np.array(centre.freedom)[None])[0])
+
+
+def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
+    return bool(_moved(tool, fit.state.vertices[None])[0] < _FURTHEST)
+
+
+def _moved(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
+    """Farthest way that an end of a required edge is from its expected line, px, (n,)."""
+    required = tool.arrangement.required
+    expected = tool.arrangement.vertices[required]
+    along = expected[:, 1] - expected[:, 0]
+    normals = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1, keepdims=True)
+    away = np.einsum("neki,ei->nek", vertices[:, required] - expected, normals)
+    return np.nan_to_num(np.abs(away), nan=np.inf).max((1, 2))
+
+
+def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Contrast in the middle of each required edge and its status, both (n, E)."""
+    arrangement, n = tool.arrangement, len(found.vertices)
+    pieces = np.flatnonzero(np.isin(arrangement.pieces, tool.model.free).any(1))
+    middle, state = np.zeros((n, len(layout.names))), np.full((n, len(layout.names)), status.OK, dtype=object)
+    shown = _shown(tool)
+    for number, centre in enumerate(found.centres):
+        which = found.centre == number
+        first = 2 * tool.model.free.size
+        steps = centre.expansion.pieces.contrast[:, :, first:-1]
+        ends = np.stack([steps[:, 0], steps.sum(1)], 1)
+        contrast = np.einsum("nl,pkl->npk", found.levels[which], ends)
+        spread = np.einsum("pkl,lm,pkm->pk", ends, centre.covariance[first:-1, first:-1], ends)
+        faint = np.abs(contrast) < _SEEN * np.sqrt(np.maximum(spread, 0))
+        for e in range(len(layout.names)):
+            own = arrangement.edges[pieces] == e
+            values = contrast[:, own].reshape(which.sum(), -1)
+            turns = (values.max(1) > 0) & (values.min(1) < 0)
+            weak = faint[:, own].any((1, 2))
+            middle[which, e] = values.mean(1)
+            if not shown[e]:
+                state[which, e] = status.NOT_VISIBLE
+                continue
+            state[which, e] = np.where(weak, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
+    return middle, state.astype(str)
+
+
+def _shown(tool: ArrangementEstimator) -> np.ndarray:
+    """Whether enough of each required edge lies within the image, bool (E,)."""
+    arrangement, t = tool.arrangement, np.linspace(0, 1, 257)[:, None, None]
+    start, stop = arrangement.vertices[arrangement.required].swapaxes(0, 1)
+    places = arrangement.recorded(start + t * (stop - start))
+    inside = ((places >= 0) & (places <= np.array(tool.shape[::-1]) - 1)).all(-1)
+    return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
+
+
+def _states(tool, layout, found: Found, normals, probability, edge_status) -> np.ndarray:
+    """Status of each image."""
+    first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
+    sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+    joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
+    told = np.array([_told(tool, centre) for centre in found.centres])[found.centre]
+    turned = np.where(_inverted(tool, found.vertices), status.AMBIGUOUS, status.OK)
+    good = found.settled & (_moved(tool, found.vertices) < _FURTHEST) & (probability >= WORST)
+    fits = np.where(good, status.OK, status.MISFIT)
+    runs = np.where(_moved(tool, found.vertices) < _FURTHEST, status.OK, status.LOW_CONTRAST)
+    each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
+    return np.array([status.worst(*row) for row in each])
+
+
+def _told(tool: ArrangementEstimator, centre: Centre) -> str:
+    """Whether the image tells the corners, and their errors are linear in its noise."""
+    index = tool.index(tool.arrangement.corners)
+    rows = _directions(centre.state.vertices[tool.arrangement.corners])
+    part = np.ix_(index, index)
+    variance = np.einsum("ki,ij,kj->k", rows, centre.covariance[part], rows)
+    alone = np.einsum("ki,ij,kj->k", rows, tool.wherever(centre)[part], rows)
+    bias = np.abs(rows @ centre.bias[index])
+    fine = (alone <= _HELD * variance).all() and (bias <= _BIAS * np.sqrt(np.maximum(variance, 0))).all()
+    return status.OK if fine and np.isfinite(variance).all() else status.ILL_CONDITIONED
+
+
+def _directions(corners: np.ndarray) -> np.ndarray:
+    """What is asked of C corners: their distance if there are two, else all coordinates, (k, 2 C)."""
+    if len(corners) != 2:
+        return np.eye(2 * len(corners))
+    across = corners[1] - corners[0]
+    unit = across / max(float(np.linalg.norm(across)), 1e-12)
+    return np.concatenate([-unit, unit])[None]
+
+
+def _inverted(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
+    """Whether a face beside a required edge is turned inside out, (n,)."""
+    arrangement = tool.arrangement
+    beside = np.unique(arrangement.sides[arrangement.edges >= 0])
+    found = np.zeros(len(vertices), bool)
+    for region in beside[beside > 0]:
+        found |= _area(arrangement, region, vertices) <= 0
+    return found
+
+
+def _area(arrangement, region: int, vertices: np.ndarray) -> np.ndarray:
+    """Area of a region in the image, px^2, (n,)."""
+    sign = (arrangement.sides[:, 0] == region).astype(float) - (arrangement.sides[:, 1] == region)
+    a, b = (vertices[:, arrangement.pieces[:, end]] for end in (0, 1))
+    inside = sign != 0
+    return ((a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[:, inside] * sign[inside]).sum(1) / 2
+
+
+def _corners(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    index = tool.index(tool.arrangement.corners)
+    return centre.covariance[np.ix_(index, index)]
+
+
+def _tilts(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """Covariance of the required lines' angles, rad^2, (E, E)."""
+    rows = np.zeros((len(tool.arrangement.required), len(centre.covariance)))
+    for e, pair in enumerate(tool.arrangement.required):
+        along = np.diff(centre.state.vertices[pair], axis=0)[0]
+        normal = np.array([-along[1], along[0]]) / (along @ along)
+        for vertex, sign in zip(pair, (-1, 1), strict=True):
+            rows[e, tool.index(np.array([vertex]))] += sign * normal
+    return rows @ centre.covariance @ rows.T
+
+
+def _nothing(count: int, layout: Layout) -> Shape:
+    edges, corners = len(layout.names), len(layout.corners)
+    none = np.zeros((count, edges), int)
+    state = np.where(layout.visible, status.OK, status.NOT_VISIBLE)
+    return Shape(
+        corners=np.full((count, corners, 2), np.nan),
+        covariance=np.full((count, 2 * corners, 2 * corners), np.nan),
+        normals=np.full((count, edges, 2), np.nan),
+        points=np.full((count, edges, 2), np.nan),
+        tilt_covariance=np.full((count, edges, edges), np.nan),
+        status=np.full(count, status.NOT_VISIBLE),
+        edge_status=np.tile(state, (count, 1)),
+        edge_contrast=np.zeros((count, edges)),
+        used=none,
+        rejected=none,
+        p_value=np.full(count, np.nan),
+    )
