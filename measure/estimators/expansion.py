@@ -9,6 +9,7 @@ product, and the likelihood is maximised among a few numbers for each image.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from planner.imaging.blurred import BlurredModel, State
 _ROWS = ((0, 2), (1, 3), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
 _STARTS = np.cumsum([0, *(count for _, count in _ROWS)])
 ROWS = int(_STARTS[-1])
-_KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in zip(_STARTS, _STARTS[1:], strict=False))
+_KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in pairwise(_STARTS))
 _ITERATIONS = 40
 _SETTLED = 3e-4  # of a standard deviation
 _STRIDE = 8.0  # standard deviations that one iteration may go
@@ -173,7 +174,9 @@ def _integrals(model, state, moving, lengths, normal, direction):
     kernels = model.kernels(traced)
     slot = model.slots(kernels)
     contrast = model.contrasts(state, traced)
-    x, y = [[k, *(kernels.derivative(axis, order) for order in (1, 2, 3))] for axis, k in ((0, kernels.x), (1, kernels.y))]
+    x, y = [
+        [k, *(kernels.derivative(axis, order) for order in (1, 2, 3))] for axis, k in ((0, kernels.x), (1, kernels.y))
+    ]
     size = np.linalg.norm(traced.tangent, axis=1)
     found = []
     for n, piece in enumerate(moving):

@@ -50,7 +50,9 @@ class Optics:
         uneven = noise if noise.gain > 0 or noise.bits is not None else None
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
-        return cls(shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level)
+        return cls(
+            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level
+        )
 
     @property
     def sagitta(self) -> float:

@@ -147,7 +147,7 @@ class Arrangement:
 def arrangement_of(pictures: Pictures) -> Arrangement:
     """The arrangement of one picture; without lights the brightness of every face is free.
 
-    Faces on which no light falls are the background where darkness is behind the object, regions of their own elsewhere.
+    Faces on which no light falls are the background.
     """
     return pictures.once("arrangement", lambda: _arrangement(pictures))
 
@@ -251,7 +251,7 @@ def _spread(corners: np.ndarray) -> np.ndarray:
 
 def _degree(count: int) -> int:
     """Degree of a polynomial in two variables with so many terms."""
-    return int(round((np.sqrt(8 * count + 1) - 3) / 2))
+    return round((np.sqrt(8 * count + 1) - 3) / 2)
 
 
 def _powers(degree: int) -> list[tuple[int, int]]:

@@ -163,9 +163,9 @@ def _one(pictures: Pictures, index: tuple[int, ...], lead: tuple[int, ...]) -> t
 def line_rows(known: Measurand, required: np.ndarray, count: int) -> np.ndarray:
     """Derivative of each line's displacement at its first end and of its rotation by all vertices, (E, 2, 2 count)."""
     rows = np.zeros((len(required), 2, count, 2))
-    for e, (normal, length, (start, stop)) in enumerate(zip(normals(known.view), known.view.lengths, required, strict=True)):
+    for e, (normal, length, (start, stop)) in enumerate(
+        zip(normals(known.view), known.view.lengths, required, strict=True)
+    ):
         rows[e, 0, start] = normal
         rows[e, 1, stop], rows[e, 1, start] = normal / length, -normal / length
     return rows.reshape(len(required), 2, 2 * count)
-
-

@@ -75,7 +75,9 @@ def test_derivatives(task1, lens, aperture):
         assert np.abs(numeric - jacobian[:, k]).max() < (1e-3 if aperture else 5e-4) * size
 
 
-@pytest.mark.parametrize(("sensor", "light"), [((21, 16.1), (36.1, 36.4)), ((56, 222), (30, 200)), ((9, 23.6), (52, 54))])
+@pytest.mark.parametrize(
+    ("sensor", "light"), [((21, 16.1), (36.1, 36.4)), ((56, 222), (30, 200)), ((9, 23.6), (52, 54))]
+)
 def test_block_against_the_oracle(task1, sensor, light):
     """Faces with their own shading, slivers: the oracle's projection and shading are its own. 0.15 of 200 grey levels.
 
