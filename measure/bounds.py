@@ -72,6 +72,6 @@ def _corners(layout: Layout, state: State, noise: Noise) -> np.ndarray:
     arrangement = layout.arrangement
     y, x = near_pixels(arrangement, layout.optics.shape, REACH)
     model = BlurredModel(arrangement, x, y, near_vertices(arrangement, REACH + 6 * arrangement.blur_px))
-    told = Information(model, fisher(model, noise, False, state) + np.diag(known(model)))
+    told = Information(model, fisher(model, noise, False, state), known(model).precision)
     index = (2 * arrangement.corners[:, None] + [0, 1]).ravel()
     return told.vertices()[np.ix_(index, index)]

@@ -19,7 +19,7 @@ from measure.estimators.expansion import Expansion, Pieces
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.sensor import recorded
-from planner.models.bound import KNOWN_LEVELS, response
+from planner.models.bound import Known, known, response
 from scenes import Noise
 
 REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
@@ -30,8 +30,6 @@ _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
-_FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
-_BLUR_KNOWN = 0.3  # of the blur: how well it is known before
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
 _ROUNDS = 4  # expansions before each image is measured alone
@@ -93,8 +91,6 @@ class Centre:
     expansion : Expansion
     covariance : ndarray, shape (q, q)
         Of the parameters' errors.
-    bias : ndarray, shape (q,)
-        Mean of the parameters' errors, second order.
     freedom : tuple of float
         Degrees of freedom near the pieces and elsewhere.
     """
@@ -102,7 +98,6 @@ class Centre:
     state: State
     expansion: Expansion
     covariance: np.ndarray
-    bias: np.ndarray
     freedom: tuple[float, float]
 
 
@@ -140,35 +135,19 @@ class ArrangementEstimator:
         return self.model.y * self.shape[1] + self.model.x
 
     @cached_property
+    def known(self) -> Known:
+        """What is known of (vertices, levels, blur) before, shapes (q, q) and (q,)."""
+        return known(self.model)
+
+    @cached_property
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Precision (q, q) and mean (q,) of what is known of (vertices, levels, blur) before."""
+        """The same with next to nothing known of all else, so that everything has a most likely value."""
         model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
-        levels, mean = [], [self.arrangement.vertices[model.free].ravel()]
-        for region in self.arrangement.regions:
-            levels.append(np.full(region.count, (KNOWN_LEVELS if region.known else 1e4 * sigma) ** -2))
-            mean.append(np.eye(region.count)[0] * region.known)
-        blur, places = model.start().blur, self._held()
-        precision = np.zeros((model.count, model.count))
-        precision[: len(places), : len(places)] = places
-        rest = np.arange(len(places), model.count)
-        precision[rest, rest] = np.concatenate([*levels, [(_BLUR_KNOWN * blur) ** -2]])
-        return precision, np.concatenate([*mean, [blur]])
-
-    def _held(self) -> np.ndarray:
-        """Precision of the free vertices' places before, (2 F, 2 F).
-
-        The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
-        """
-        free, places = self.model.free, self.arrangement.vertices[self.model.free]
-        required = np.isin(free, self.arrangement.required)
-        x, y = (places - places.mean(0)).T
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        motion = np.stack([np.stack([one, zero, x, -y], -1), np.stack([zero, one, y, x], -1)], 1)  # (F, 2, 4)
-        follow = motion[~required].reshape(-1, 4) @ np.linalg.pinv(motion[required].reshape(-1, 4))
-        apart = np.zeros((follow.shape[0], 2 * free.size))
-        apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
-        apart[:, np.repeat(required, 2)] = -follow
-        return apart.T @ apart / _FOLLOWS**2 + np.eye(2 * free.size) / _FREE**2
+        levels = [
+            np.full(region.count, (1e4 * sigma) ** -2 * (not region.known)) for region in self.arrangement.regions
+        ]
+        weak = np.concatenate([np.full(2 * model.free.size, _FREE**-2), *levels, [0.0]])
+        return self.known.precision + np.diag(weak), self.known.mean
 
     def parameters(self, state: State) -> np.ndarray:
         """All parameters as one array (q,)."""
@@ -196,9 +175,35 @@ class ArrangementEstimator:
         told = design.T @ (weight * (used - self.noise.dark_level)) + known @ mean[first:last]
         return state._replace(levels=np.linalg.solve(matrix, told))
 
-    def climb(self, used: np.ndarray, state: State) -> Fit:
-        """Fisher scoring from a state to the likelihood's maximum for one image (P,)."""
-        precision, mean = self.prior
+    @property
+    def is_lit(self) -> bool:
+        """Whether the light says how bright each face is."""
+        return all(region.known for region in self.arrangement.regions[1:])
+
+    @cached_property
+    def reference(self) -> Centre:
+        """The expected state, where the light is known."""
+        state = self.model.start()
+        return self.centre(self.climb(self.expected(state, derivatives=False)[0], state))
+
+    def drawn(self, centre: Centre, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Errors of the parameters in ``count`` drawn images of a state, to first order and in full, both (n, q).
+
+        Always the same draws.
+        """
+        expected, weight, gain, jacobian = self.expected(centre.state)
+        half = np.random.default_rng(0).standard_normal((count // 2, len(expected)))
+        noise, truth = np.concatenate([half, -half]), self.parameters(centre.state)
+        linear = (noise * np.sqrt(weight) * gain) @ jacobian @ centre.expansion.inverse
+        fits = [self.climb(expected + part / np.sqrt(weight), centre.state, truth) for part in noise]
+        return linear, np.stack([self.parameters(fit.state) for fit in fits]) - truth
+
+    def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Fit:
+        """Fisher scoring from a state to the likelihood's maximum for one image (P,).
+
+        ``mean`` (q,) is what is known of the parameters before if not the expected state.
+        """
+        precision, mean = self.prior[0], self.prior[1] if mean is None else mean
         cost, damping, settled = np.inf, 0.0, False
         for number in range(_STEPS):
             expected, weight, gain, jacobian = self.expected(state)
@@ -211,7 +216,7 @@ class ArrangementEstimator:
             if settled:
                 break
             matrix = fisher if number < _SCORED else self._newton(fisher, state, gain * weight * away)
-            state, settled, damping = self._step(used, state, matrix, score, cost, damping)
+            state, settled, damping = self._step(used, state, matrix, score, cost, damping, mean)
         return Fit(state, inverse, cost, settled)
 
     def _newton(self, fisher: np.ndarray, state: State, told: np.ndarray) -> np.ndarray:
@@ -223,9 +228,9 @@ class ArrangementEstimator:
         matrix, scale = fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(fisher))
         return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else fisher
 
-    def _step(self, used, state, fisher, score, cost, damping) -> tuple[State, bool, float]:
+    def _step(self, used, state, fisher, score, cost, damping, mean) -> tuple[State, bool, float]:
         """The next state, shortened or damped until the likelihood grows; whether it hardly differs; the damping."""
-        precision, mean = self.prior
+        precision = self.prior[0]
         for _ in range(12):
             step = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), score)
             size = float(step @ fisher @ step)
@@ -250,11 +255,11 @@ class ArrangementEstimator:
             Pieces.of(self.model, fit.state), expected, weight, gain, jacobian[:, first:],
             fit.inverse, precision, mean - self.parameters(fit.state),
         )  # fmt: skip
-        spread = fit.inverse - fit.inverse @ precision @ fit.inverse
+        spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
         fitted = len(precision) - (precision * fit.inverse).sum() - taken
         near, far = expansion.near, self.pixels.size - expansion.near
-        return Centre(fit.state, expansion, spread, expansion.bias(spread), (near - fitted, max(far - taken, 0.0)))
+        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0)))
 
     def index(self, vertices: np.ndarray) -> np.ndarray:
         """Where free vertices' x and y stand among the parameters."""
@@ -262,9 +267,9 @@ class ArrangementEstimator:
 
     def wherever(self, centre: Centre) -> np.ndarray:
         """Covariance of the parameters (q, q) if nothing is known of any vertex before; large where none is told."""
-        moves, places = slice(2 * self.model.free.size), np.zeros_like(self.prior[0])
-        places[moves, moves] = self.prior[0][moves, moves] - np.eye(2 * self.model.free.size) / _FREE**2
-        inverse, rest = _inverse(_inverse(centre.expansion.inverse) - places), self.prior[0] - places
+        moves, places = slice(2 * self.model.free.size), np.zeros_like(self.known.precision)
+        places[moves, moves] = self.known.precision[moves, moves]
+        inverse, rest = _inverse(_inverse(centre.expansion.inverse) - places), self.known.precision - places
         return inverse - inverse @ rest @ inverse
 
     def derivative(self, centre: Centre) -> np.ndarray:

@@ -236,6 +236,14 @@ class Solved(NamedTuple):
     left: np.ndarray
 
 
+class Drawn(NamedTuple):
+    """Most likely steps in drawn images: to first order, fully, and how far off the latter may be, all (n, q)."""
+
+    linear: np.ndarray
+    steps: np.ndarray
+    left: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Expansion:
     """The model around one state, ready for a stack of images.
@@ -313,34 +321,45 @@ class Expansion:
         told = np.concatenate([away[:, :near] @ self.linear[:near] + far_told] + [
             away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)
         ], 1)  # fmt: skip
-        steps = np.zeros((len(used), self.inverse.shape[0]))
-        change, open_ = np.zeros_like(steps), np.arange(len(steps))
-        for _ in range(_ITERATIONS):
-            columns = self._columns(steps[open_])
-            score = self._score(steps[open_], told[open_] - columns @ self.gram)
-            score += (self.offset - steps[open_]) @ self.prior
-            change[open_] = np.clip(score @ self.inverse, -_STRIDE * self.scale, _STRIDE * self.scale)
-            steps[open_] += change[open_]
-            open_ = open_[(np.abs(change[open_]) > _SETTLED * self.scale).any(1)]
-            if not open_.size:
-                break
+        steps, change = self._climb(told, self.offset)
         columns, level = self._columns(steps), steps[:, -count:]
         squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
         far = squares[1] + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
         whole = sum(squares) + ((columns @ self.gram - 2 * told) * columns).sum(1)
         return Solved(steps, whole - far, far, np.abs(change) + np.abs(self._highest(steps)))
 
+    def _climb(self, told: np.ndarray, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Most likely steps (n, q) for what n images tell, and the last change of each."""
+        steps = np.zeros((len(told), self.inverse.shape[0]))
+        change, open_ = np.zeros_like(steps), np.arange(len(steps))
+        for _ in range(_ITERATIONS):
+            columns = self._columns(steps[open_])
+            score = self._score(steps[open_], told[open_] - columns @ self.gram)
+            score += (offset - steps[open_]) @ self.prior
+            change[open_] = np.clip(score @ self.inverse, -_STRIDE * self.scale, _STRIDE * self.scale)
+            steps[open_] += change[open_]
+            open_ = open_[(np.abs(change[open_]) > _SETTLED * self.scale).any(1)]
+            if not open_.size:
+                break
+        return steps, change
+
+    def drawn(self, count: int) -> Drawn:
+        """Most likely steps in ``count`` images of the state itself, each with noise of its own.
+
+        Images need not be made: all that they tell is normal with the covariance `gram`. Always the same draws.
+        """
+        values, vectors = np.linalg.eigh(self.gram)
+        half = np.random.default_rng(0).standard_normal((count // 2, len(values)))
+        told = np.concatenate([half, -half]) * np.sqrt(np.maximum(values, 0)) @ vectors.T
+        none = np.zeros((len(told), self.inverse.shape[0]))
+        linear = self._score(none, told) @ self.inverse
+        steps, change = self._climb(told, np.zeros(self.inverse.shape[0]))
+        return Drawn(linear, steps, np.abs(change) + np.abs(self._highest(steps)))
+
     @property
     def scale(self) -> np.ndarray:
         """Standard deviation of each parameter, (q,)."""
         return np.sqrt(np.diag(self.inverse))
-
-    def bias(self, covariance: np.ndarray) -> np.ndarray:
-        """Mean error of the most likely parameters (q,) when they scatter with a covariance (Box 1971)."""
-        values, vectors = np.linalg.eigh(covariance)
-        spread = (vectors * np.sqrt(np.maximum(values, 0))).T
-        curved = (self._columns(spread) + self._columns(-spread)).sum(0)[None] / 2
-        return self._effect(curved)[0]
 
     def _columns(self, steps: np.ndarray) -> np.ndarray:
         """What all columns are multiplied by, (n, l + N ROWS)."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from measure import status
@@ -9,13 +11,12 @@ from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Fo
 from measure.features.alignment import align
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout
+from measure.features.linearity import is_reliable
 from measure.goodness import WORST, p_value
 from planner.features.locator import MIN_USABLE
 
 _FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
-_HELD = 1.1  # variance if nothing were known of other vertices over that of here, above which the image does not tell
-_BIAS = 0.3  # standard deviations of second-order bias above which the errors are not linear in the noise
 
 
 def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
@@ -108,19 +109,20 @@ def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np
         first = 2 * tool.model.free.size
         steps = centre.expansion.pieces.contrast[:, :, first:-1]
         ends = np.stack([steps[:, 0], steps.sum(1)], 1)
-        contrast = np.einsum("nl,pkl->npk", found.levels[which], ends)
-        spread = np.einsum("pkl,lm,pkm->pk", ends, centre.covariance[first:-1, first:-1], ends)
-        faint = np.abs(contrast) < _SEEN * np.sqrt(np.maximum(spread, 0))
+        levels = found.levels[which]
         for e in range(len(layout.names)):
-            own = arrangement.edges[pieces] == e
-            values = contrast[:, own].reshape(which.sum(), -1)
-            turns = (values.max(1) > 0) & (values.min(1) < 0)
-            weak = faint[:, own].any((1, 2))
-            middle[which, e] = values.mean(1)
             if not shown[e]:
                 state[which, e] = status.NOT_VISIBLE
                 continue
-            state[which, e] = np.where(weak, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
+            rows = np.concatenate(
+                [ends[arrangement.edges[pieces] == e].mean((0, 1))[None], *ends[arrangement.edges[pieces] == e]]
+            )
+            contrast = levels @ rows.T
+            spread = np.sqrt(np.einsum("kl,lm,km->k", rows, centre.covariance[first:-1, first:-1], rows))
+            faint = np.abs(contrast[:, 0]) < _SEEN * spread[0]
+            turns = (contrast > 2 * spread).any(1) & (contrast < -2 * spread).any(1)
+            middle[which, e] = contrast[:, 0]
+            state[which, e] = np.where(faint, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
     return middle, state.astype(str)
 
 
@@ -138,7 +140,7 @@ def _states(tool, layout, found: Found, normals, probability, edge_status) -> np
     first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
     sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
     joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
-    told = np.array([_told(tool, centre) for centre in found.centres])[found.centre]
+    told = np.full(len(found.vertices), _reliable(tool, found))
     turned = np.where(_inverted(tool, found.vertices), status.AMBIGUOUS, status.OK)
     good = found.settled & (_moved(tool, found.vertices) < _FURTHEST) & (probability >= WORST)
     fits = np.where(good, status.OK, status.MISFIT)
@@ -147,25 +149,15 @@ def _states(tool, layout, found: Found, normals, probability, edge_status) -> np
     return np.array([status.worst(*row) for row in each])
 
 
-def _told(tool: ArrangementEstimator, centre: Centre) -> str:
-    """Whether the image tells the corners, and their errors are linear in its noise."""
-    index = tool.index(tool.arrangement.corners)
-    rows = _directions(centre.state.vertices[tool.arrangement.corners])
-    part = np.ix_(index, index)
-    variance = np.einsum("ki,ij,kj->k", rows, centre.covariance[part], rows)
-    alone = np.einsum("ki,ij,kj->k", rows, tool.wherever(centre)[part], rows)
-    bias = np.abs(rows @ centre.bias[index])
-    fine = (alone <= _HELD * variance).all() and (bias <= _BIAS * np.sqrt(np.maximum(variance, 0))).all()
-    return status.OK if fine and np.isfinite(variance).all() else status.ILL_CONDITIONED
+def _reliable(tool: ArrangementEstimator, found: Found) -> str:
+    """Judged where the light says the picture is, so that all images have one answer; else where the first one is."""
+    fine = _expected_reliable(tool) if tool.is_lit else is_reliable(tool, found.centres[0])
+    return status.OK if fine else status.ILL_CONDITIONED
 
 
-def _directions(corners: np.ndarray) -> np.ndarray:
-    """What is asked of C corners: their distance if there are two, else all coordinates, (k, 2 C)."""
-    if len(corners) != 2:
-        return np.eye(2 * len(corners))
-    across = corners[1] - corners[0]
-    unit = across / max(float(np.linalg.norm(across)), 1e-12)
-    return np.concatenate([-unit, unit])[None]
+@lru_cache(maxsize=64)
+def _expected_reliable(tool: ArrangementEstimator) -> bool:
+    return is_reliable(tool, tool.reference)
 
 
 def _inverted(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:

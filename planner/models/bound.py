@@ -1,9 +1,10 @@
 """The Cramer-Rao bound: the smallest variance that any unbiased estimator can have, given the whole picture.
 
 Free are the image positions of all visible vertices near the required edges (faces stay polygons), a linear level on
-each face, the background and, on request, the blur. What is known of them is what the pixels near the required edges
-tell, each with its own noise; of the level and the slopes of a lit face besides that the light gives them, within their
-own size. This holds the levels of slivers, which else could be negative; elsewhere it changes nothing.
+each face, the background and, on request, the blur; each pixel near the required edges counts with its own noise.
+Besides the image something is `known`: a lit face's level is that of the light within its own size, and other vertices
+move with the required ones within a pixel. That decides in slivers, whose levels and ends an image hardly tells;
+elsewhere it changes nothing (`information(..., with_knowledge=False)` is the bound of the image alone).
 """
 
 from __future__ import annotations
@@ -24,31 +25,50 @@ from scenes import Centre, Noise
 
 REACH = 32.0  # px from a required edge up to which pixels count; levels are hardly better known from more
 KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
+KNOWN_BLUR = 0.3  # of the blur: how well it is known
+FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _UNTOLD = 1e3  # px, or the size of a level: a standard deviation at which nothing is known
+_LEAST = 1e-12  # information that is none
 _FURTHEST = 100.0  # px^2; what is known no better is not known, for the model is linear
 
 
+class Known(NamedTuple):
+    """What is known of a model's parameters before its image is seen: precision (q, q) and mean (q,)."""
+
+    precision: np.ndarray
+    mean: np.ndarray
+
+
 class Information(NamedTuple):
-    """Fisher information on the parameters of a model at one state.
+    """What an image tells of the parameters of a model, and what is known of them without it.
 
     Attributes
     ----------
     model : BlurredModel
     fisher : ndarray, shape (q, q)
-        Of all parameters; a row and column of zeros where one is held.
+        Fisher information of the image; a row and column of zeros where a parameter is held.
+    known : ndarray, shape (q, q)
+        Precision of what is known before.
     """
 
     model: BlurredModel
     fisher: np.ndarray
+    known: np.ndarray
 
     def covariance(self) -> np.ndarray:
-        """Smallest covariance of all parameters (q, q); large where the data cannot tell."""
-        told = np.diag(self.fisher)
-        some = told > 1e-12
+        """Smallest covariance of all parameters (q, q) over repeated images; large where nothing tells them.
+
+        That of the most likely parameters given image and knowledge, to first order: knowledge does not scatter.
+        """
+        held = np.diag(self.fisher) == 0
+        whole = self.fisher + np.where(held[:, None] | held, 0.0, self.known)
+        told = np.diag(whole)
+        some = told > _LEAST
         scale = 1 / np.sqrt(np.where(some, told, 1.0))
         weak = np.where(some, (scale / _UNTOLD) ** 2, 1.0)
-        matrix = self.fisher * scale[:, None] * scale + np.diag(weak)
-        return np.linalg.inv(matrix) * scale[:, None] * scale * (some[:, None] & some)
+        inverse = np.linalg.inv(whole * scale[:, None] * scale + np.diag(weak))
+        inverse = inverse * scale[:, None] * scale * (some[:, None] & some)
+        return inverse - inverse @ (whole - self.fisher) @ inverse
 
     def vertices(self) -> np.ndarray:
         """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free."""
@@ -60,7 +80,7 @@ class Information(NamedTuple):
 
 
 def information(
-    pictures: Pictures, *, free_blur: bool = False, reach: float = REACH, known_levels: float = KNOWN_LEVELS
+    pictures: Pictures, *, free_blur: bool = False, reach: float = REACH, with_knowledge: bool = True
 ) -> Information:
     """What one picture tells of its arrangement.
 
@@ -70,21 +90,47 @@ def information(
         Whether the blur is unknown.
     reach : float
         How far from a required edge pixels count, px.
-    known_levels : float
-        Standard deviation of lit faces' levels before, in units of them; infinite where nothing is known.
+    with_knowledge : bool
+        Whether `known` counts; the Cramer-Rao bound of the image alone if not.
     """
     scene, arrangement = pictures.scene, arrangement_of(pictures)
     y, x = near_pixels(arrangement, (scene.camera.height, scene.camera.width), reach)
     model = BlurredModel(arrangement, x, y, near_vertices(arrangement, reach + 6 * arrangement.blur_px))
-    if not x.size:
-        return Information(model, np.zeros((model.count, model.count)))
-    return Information(model, fisher(model, scene.noise, free_blur) + np.diag(known(model, known_levels)))
+    nothing = np.zeros((model.count, model.count))
+    told = fisher(model, scene.noise, free_blur) if x.size else nothing
+    return Information(model, told, known(model).precision if with_knowledge else nothing)
 
 
-def known(model: BlurredModel, levels: float = KNOWN_LEVELS) -> np.ndarray:
-    """Precision of each parameter before, (q,), of lit faces' levels only."""
-    regions = [np.full(region.count, levels**-2 if region.known else 0.0) for region in model.arrangement.regions]
-    return np.concatenate([np.zeros(2 * model.free.size), *regions, [0.0]])
+def known(model: BlurredModel) -> Known:
+    """What light and pose tell of the parameters without the image.
+
+    Levels of lit faces, and their slopes, to `KNOWN_LEVELS` of the level; vertices that end no required edge to
+    `FOLLOWS` px beside the required ones, which may be anywhere; the blur to `KNOWN_BLUR` of it.
+    """
+    arrangement, start = model.arrangement, model.start()
+    levels = [np.full(region.count, region.known / KNOWN_LEVELS**2) for region in arrangement.regions]
+    mean = [np.eye(region.count)[0] * region.known for region in arrangement.regions]
+    places = _following(model)
+    precision = np.diag(np.concatenate([np.zeros(len(places)), *levels, [(KNOWN_BLUR * start.blur) ** -2]]))
+    precision[: len(places), : len(places)] = places
+    return Known(precision, np.concatenate([arrangement.vertices[model.free].ravel(), *mean, [start.blur]]))
+
+
+def _following(model: BlurredModel) -> np.ndarray:
+    """Precision of the free vertices' places before, (2 F, 2 F), px^-2.
+
+    The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
+    """
+    free, places = model.free, model.arrangement.vertices[model.free]
+    required = np.isin(free, model.arrangement.required)
+    x, y = (places - places.mean(0)).T if free.size else places.T
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    motion = np.stack([np.stack([one, zero, x, -y], -1), np.stack([zero, one, y, x], -1)], 1)  # (F, 2, 4)
+    follow = motion[~required].reshape(-1, 4) @ np.linalg.pinv(motion[required].reshape(-1, 4))
+    apart = np.zeros((follow.shape[0], 2 * free.size))
+    apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
+    apart[:, np.repeat(required, 2)] = -follow
+    return apart.T @ apart / FOLLOWS**2
 
 
 def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | None = None) -> np.ndarray:

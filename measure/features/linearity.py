@@ -1,0 +1,58 @@
+"""Are the errors of an arrangement's corners linear in the noise, as their covariance says?
+
+Drawn images answer it: their most likely corners beside those that the linear response gives. Where the expansion holds
+they are cheap; where it does not, a few are measured in full.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from measure.estimators.arrangement import ArrangementEstimator, Centre
+
+_CHEAP, _FULL = 256, 24  # drawn images
+_BEYOND = 0.05  # part of them that may leave the expansion's range
+_OFF = 0.1  # standard deviations by which they have left it
+_BIAS = 0.2  # standard deviations: a larger mean error is no linear effect of the noise
+_APART = 0.3  # standard deviations between full and linear errors, root mean square
+HELD = 1.1  # ratio of variances above which they differ
+
+
+def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
+    """Whether an image tells what is measured, and the errors are linear in its noise.
+
+    What is measured is the distance of two corners, or all coordinates of any other number of them. Knowledge of where
+    the other vertices are must not decide: without it the variance may be `HELD` times as large.
+    """
+    index = tool.index(tool.arrangement.corners)
+    rows = _directions(centre.state.vertices[tool.arrangement.corners])
+    here, wherever = (
+        np.einsum("ki,ij,kj->k", rows, whole[np.ix_(index, index)], rows)
+        for whole in (centre.covariance, tool.wherever(centre))
+    )
+    if not np.isfinite(here).all() or (wherever > HELD * here).any():
+        return False
+    linear, full = _drawn(tool, centre, index, rows)
+    spread, apart = linear.std(0), full - linear
+    unbiased = np.abs(apart.mean(0)) <= _BIAS * spread
+    near = np.sqrt((apart**2).mean(0)) <= _APART * spread
+    alike = np.abs(np.log(full.var(0) / linear.var(0))) <= np.log(HELD)
+    return bool((unbiased & near & alike).all())
+
+
+def _drawn(tool, centre: Centre, index: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Errors in drawn images to first order and in full, (n, k)."""
+    drawn = centre.expansion.drawn(_CHEAP)
+    spread = (drawn.linear[:, index] @ rows.T).std(0)
+    beyond = drawn.left[:, index] @ np.abs(rows).T > _OFF * spread
+    linear, full = (drawn.linear, drawn.steps) if beyond.any(1).mean() <= _BEYOND else tool.drawn(centre, _FULL)
+    return linear[:, index] @ rows.T, full[:, index] @ rows.T
+
+
+def _directions(corners: np.ndarray) -> np.ndarray:
+    """What is asked of C corners: their distance if there are two, else all coordinates, (k, 2 C)."""
+    if len(corners) != 2:
+        return np.eye(2 * len(corners))
+    across = corners[1] - corners[0]
+    unit = across / max(float(np.linalg.norm(across)), 1e-12)
+    return np.concatenate([-unit, unit])[None]
