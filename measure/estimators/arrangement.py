@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from measure.estimators.expansion import Expansion, Pieces
+from measure.estimators.expansion import Expansion, Pieces, Solved
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.sensor import recorded
@@ -31,6 +31,7 @@ _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
+_AROUND = 0.3  # of the blur: how far an end of a required edge may be from an expansion's centre
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
 _ROUNDS = 4  # expansions before each image is measured alone
 
@@ -302,18 +303,19 @@ class ArrangementEstimator:
     def _around(self, images, part, fit, centre, collected, number, first) -> np.ndarray:
         """Solve some images around a centre and collect those for which it holds: which they are."""
         solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
-        good, settled = self._good(solved.left, centre), np.ones(part.size, bool)
+        good, settled = self._good(solved, centre), np.ones(part.size, bool)
         if first:
             good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
         collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.near[good], solved.far[good])
         collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
         return part[good]
 
-    def _good(self, left: np.ndarray, centre: Centre) -> np.ndarray:
-        """Where what is left out of an expansion moves no measured corner."""
-        index = self.index(self.arrangement.corners)
+    def _good(self, solved: Solved, centre: Centre) -> np.ndarray:
+        """Where an expansion holds: required edges hardly move, and what is left out moves no measured corner."""
+        index, ends = self.index(self.arrangement.corners), self.index(np.unique(self.arrangement.required))
         sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
-        return (left[:, index] < _VALID * sigma).all(1)
+        near = np.abs(solved.steps[:, ends]) < _AROUND * np.hypot(centre.state.blur, np.sqrt(1 / 12))
+        return near.all(1) & (solved.left[:, index] < _VALID * sigma).all(1)
 
 
 class _Collected:

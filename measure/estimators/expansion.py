@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.imaging.blurred import BlurredModel, State
 
-_ROWS = ((0, 2), (1, 3), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
+_ROWS = ((0, 2), (1, 4), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
 _STARTS = np.cumsum([0, *(count for _, count in _ROWS)])
 ROWS = int(_STARTS[-1])
 _KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in pairwise(_STARTS))
@@ -26,9 +26,9 @@ _STRIDE = 8.0  # standard deviations that one iteration may go
 
 
 class Displaced(NamedTuple):
-    """Displacements of N pieces in n images, each a polynomial in t; (n, N, 2) but for the blur, (n,).
+    """Displacements of N pieces in n images, each a polynomial in t.
 
-    ``across`` and ``along`` in px, ``contrast`` the change of the contrast in grey levels.
+    ``across`` and ``along`` in px, (n, N, 2); ``contrast``, its change in grey levels, (n, N, 3); ``blur``, px, (n,).
     """
 
     across: np.ndarray
@@ -50,7 +50,7 @@ class Pieces:
     lengths : ndarray, shape (N,)
     across, along : ndarray, shape (N, 2, q)
         From a step of the parameters to the displacements' coefficients.
-    contrast : ndarray, shape (N, 2, q)
+    contrast : ndarray, shape (N, 3, q)
     blur : float
     """
 
@@ -79,7 +79,7 @@ class Pieces:
             lengths,
             np.einsum("ni,nkiq->nkq", normal, steps),
             np.einsum("ni,nkiq->nkq", direction, steps),
-            _contrast_steps(model, moving, arrangement.recorded(ends)),
+            _contrast_steps(model, moving, ends),
             state.blur,
         )
 
@@ -117,7 +117,7 @@ class Pieces:
         by_a = by_a + _moment(_product(square, a), across3) / 6 + self.blur * by.blur[:, None, None] * across2[..., :2]
         by_a = -length * by_a - swept / 3 * across[..., :2] - turned * np.stack([b[..., 1], -b[..., 0]], -1)
         by_b = -length / 2 * _moment(a, told[..., _ALONG]) - turned * np.stack([-a[..., 1], a[..., 0]], -1)
-        by_contrast = -length * _moment(a, told[..., _CONTRAST])
+        by_contrast = -length * _moment(a, told[..., _CONTRAST], 3)
         found = sum(
             np.tensordot(values, part, ((1, 2), (0, 1)))
             for values, part in ((by_a, self.across), (by_b, self.along), (by_contrast, self.contrast))
@@ -134,10 +134,10 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return found
 
 
-def _moment(a: np.ndarray, told: np.ndarray) -> np.ndarray:
-    """Derivative of sum_ij a_i x_j told_(i+j) by the two x_j."""
+def _moment(a: np.ndarray, told: np.ndarray, terms: int = 2) -> np.ndarray:
+    """Derivative of sum_ij a_i x_j told_(i+j) by each of so many x_j."""
     count = a.shape[-1]
-    return np.stack([(a * told[..., j : j + count]).sum(-1) for j in (0, 1)], -1)
+    return np.stack([(a * told[..., j : j + count]).sum(-1) for j in range(terms)], -1)
 
 
 def _vertex_steps(model: BlurredModel, moving: np.ndarray) -> np.ndarray:
@@ -156,15 +156,15 @@ def _vertex_steps(model: BlurredModel, moving: np.ndarray) -> np.ndarray:
 
 
 def _contrast_steps(model: BlurredModel, moving: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """From the parameters to the contrast at each piece's first end and what it is more at the other, (N, 2, q)."""
-    arrangement, steps = model.arrangement, np.zeros((moving.size, 2, model.count))
-    first = 2 * model.free.size
-    for n, (piece, places) in enumerate(zip(moving, ends, strict=True)):
+    """From the parameters to the contrast along each piece, a parabola in t through ends and middle, (N, 3, q)."""
+    arrangement, steps = model.arrangement, np.zeros((moving.size, 3, model.count))
+    first, parabola = 2 * model.free.size, np.linalg.inv(np.vander([0.0, 0.5, 1.0], 3, increasing=True))
+    for n, (piece, (start, stop)) in enumerate(zip(moving, ends, strict=True)):
+        places = arrangement.recorded(np.stack([start, (start + stop) / 2, stop]))
         for region, sign in zip(arrangement.sides[piece], (1.0, -1.0), strict=True):
             part = arrangement.level_slices[region]
             basis = sign * arrangement.regions[region].basis(places)
-            steps[n, 0, first + part.start : first + part.stop] += basis[:, 0]
-            steps[n, 1, first + part.start : first + part.stop] += basis[:, 1] - basis[:, 0]
+            steps[n, :, first + part.start : first + part.stop] += parabola @ basis.T
     return steps
 
 

@@ -218,7 +218,7 @@ def _order(corners: np.ndarray) -> int:
 def _region(pictures: Pictures, solid: Solid, face: int) -> Region | None:
     """Brightness of a face, None where it is as dark as the background."""
     camera = pictures.scene.camera
-    points = _spread(solid.vertices[list(solid.faces[face])])
+    points = spread(solid.vertices[list(solid.faces[face])])
     places = recorded(project_ideal(points, pictures.sensors, camera), camera)
     good = np.isfinite(places).all(1)
     if not good.any():
@@ -242,11 +242,14 @@ def _sides(solid: Solid, edge: Edge, image: np.ndarray, place: dict[int, int]) -
     return sides[0], sides[1]
 
 
-def _spread(corners: np.ndarray) -> np.ndarray:
-    """Points spread over a convex polygon (k, 3): each triangle of a fan, on a grid."""
-    u, v = (part.ravel() for part in np.meshgrid(_GRID, _GRID))
-    first, u, v = corners[0], u[:, None], v[:, None]
-    return np.concatenate([first + u * ((1 - v) * (a - first) + v * (b - first)) for a, b in pairwise(corners[1:])])
+def spread(corners: np.ndarray) -> np.ndarray:
+    """Points spread over a convex polygon (k, 3), (k * 49, 3): each triangle of a fan about its middle, on a grid.
+
+    Whichever corner comes first, and whichever way round they go, they are the same points.
+    """
+    u, v = (part.ravel()[:, None] for part in np.meshgrid(_GRID, _GRID))
+    middle, pairs = corners.mean(0), pairwise([*corners, corners[0]])
+    return np.concatenate([middle + u * ((1 - v) * (a - middle) + v * (b - middle)) for a, b in pairs])
 
 
 def _degree(count: int) -> int:
