@@ -36,24 +36,49 @@ _BATCH = 40  # images at a time, so that they stay in the processor's cache
 _ROUNDS = 4  # expansions before each image is measured alone
 
 
-class Fit(NamedTuple):
-    """The likelihood's maximum in one image.
+class Point(NamedTuple):
+    """The likelihood at one state for one image.
 
     Attributes
     ----------
     state : State
-    inverse : ndarray, shape (q, q)
-        Of the information on the parameters.
+    expected, weight, gain : ndarray, shape (P,)
+        Recorded level, one over the variance of its noise, its derivative by the signal.
+    jacobian : ndarray, shape (P, q)
+        Derivative of the signal by the parameters.
+    told : ndarray, shape (P,)
+        Derivative of the log likelihood by the signal.
+    fisher, score : ndarray, shape (q, q) and (q,)
+        Information and derivative of the log likelihood, what was known before included.
     cost : float
-        Chi-square and what the parameters' distance from what was known before adds.
-    settled : bool
-        Whether the steps ended.
+        Chi-square, and what the parameters' distance from what was known before adds.
     """
 
     state: State
-    inverse: np.ndarray
+    expected: np.ndarray
+    weight: np.ndarray
+    gain: np.ndarray
+    jacobian: np.ndarray
+    told: np.ndarray
+    fisher: np.ndarray
+    score: np.ndarray
     cost: float
+
+
+class Fit(NamedTuple):
+    """The likelihood's maximum in one image, the inverse of the information there (q, q), whether the steps ended."""
+
+    point: Point
+    inverse: np.ndarray
     settled: bool
+
+    @property
+    def state(self) -> State:
+        return self.point.state
+
+    @property
+    def cost(self) -> float:
+        return self.point.cost
 
 
 class Found(NamedTuple):
@@ -168,9 +193,9 @@ class ArrangementEstimator:
         """The expected place, or another, with the levels that fit one image (P,) best there."""
         state = self.model.start()
         state = state if vertices is None else state._replace(vertices=vertices)
-        _, weight, _, jacobian = self.expected(state)
+        design, (precision, mean) = self.model.design(state).T, self.prior
+        weight = 1 / response(self.noise, np.maximum(used - self.noise.dark_level, 0))[1]
         first, last = 2 * self.model.free.size, -1
-        design, (precision, mean) = jacobian[:, first:last], self.prior
         known = precision[first:last, first:last]
         matrix = design.T @ (design * weight[:, None]) + known
         told = design.T @ (weight * (used - self.noise.dark_level)) + known @ mean[first:last]
@@ -204,56 +229,57 @@ class ArrangementEstimator:
 
         ``mean`` (q,) is what is known of the parameters before if not the expected state.
         """
-        precision, mean = self.prior[0], self.prior[1] if mean is None else mean
-        cost, damping, settled = np.inf, 0.0, False
+        mean = self.prior[1] if mean is None else mean
+        point, damping, settled = self._point(used, state, mean), 0.0, False
         for number in range(_STEPS):
-            expected, weight, gain, jacobian = self.expected(state)
-            away, before = used - expected, mean - self.parameters(state)
-            weighted = jacobian * (gain * weight)[:, None]
-            fisher = weighted.T @ (jacobian * gain[:, None]) + precision
-            score = away @ weighted + precision @ before
-            cost = float(away @ (weight * away) + before @ precision @ before)
-            inverse = _inverse(fisher)
+            matrix = point.fisher if number < _SCORED else self._newton(point)
+            point, settled, damping = self._step(used, point, matrix, damping, mean)
             if settled:
                 break
-            matrix = fisher if number < _SCORED else self._newton(fisher, state, gain * weight * away)
-            state, settled, damping = self._step(used, state, matrix, score, cost, damping, mean)
-        return Fit(state, inverse, cost, settled)
+        return Fit(point, _inverse(point.fisher), settled)
 
-    def _newton(self, fisher: np.ndarray, state: State, told: np.ndarray) -> np.ndarray:
-        """Second derivative of the cost (q, q) where it is positive: the residual ``told`` (P,) bends it in slivers."""
-        pieces, small = Pieces.of(self.model, state), 1e-4 * np.eye(self.model.count)
-        rows = np.stack([rows @ told[pixels] for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)])
+    def _point(self, used: np.ndarray, state: State, mean: np.ndarray) -> Point:
+        """The likelihood and its derivatives at a state."""
+        precision, before = self.prior[0], mean - self.parameters(state)
+        expected, weight, gain, jacobian = self.expected(state)
+        away, weighted = used - expected, jacobian * (gain * weight)[:, None]
+        return Point(
+            state, expected, weight, gain, jacobian,
+            told=gain * weight * away,
+            fisher=weighted.T @ (jacobian * gain[:, None]) + precision,
+            score=away @ weighted + precision @ before,
+            cost=float(away @ (weight * away) + before @ precision @ before),
+        )  # fmt: skip
+
+    def _newton(self, point: Point) -> np.ndarray:
+        """Second derivative of the cost (q, q) where it is positive: the residual bends it in slivers."""
+        pieces, small = Pieces.of(self.model, point.state), 1e-4 * np.eye(self.model.count)
+        rows = np.stack([rows @ point.told[pixels] for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)])
         rows = np.broadcast_to(rows, (len(small), *rows.shape))
         bent = (pieces.gradient(pieces.displaced(small), rows) - pieces.gradient(pieces.displaced(-small), rows)) / 2e-4
-        matrix, scale = fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(fisher))
-        return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else fisher
+        matrix, scale = point.fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(point.fisher))
+        return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else point.fisher
 
-    def _step(self, used, state, fisher, score, cost, damping, mean) -> tuple[State, bool, float]:
-        """The next state, shortened or damped until the likelihood grows; whether it hardly differs; the damping."""
-        precision = self.prior[0]
+    def _step(self, used, point: Point, matrix, damping, mean) -> tuple[Point, bool, float]:
+        """The next point, by a step damped until the likelihood grows; whether there is none; the damping."""
         for _ in range(12):
-            step = np.linalg.solve(fisher + damping * np.diag(np.diag(fisher)), score)
-            size = float(step @ fisher @ step)
+            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), point.score)
+            size = float(step @ matrix @ step)
             step = step * min(1.0, _STRIDE / max(np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), 1e-12))
-            there = self.model.moved(state, step)
             if size < _SETTLED**2:
-                return there if damping == 0 else state, True, 0.0
-            expected, weight, _, _ = self.expected(there, derivatives=False)
-            before = mean - self.parameters(there)
-            reached = float(weight @ (used - expected) ** 2 + before @ precision @ before)
-            if reached <= cost + _ROUNDING:
+                return point, True, 0.0
+            there = self._point(used, self.model.moved(point.state, step), mean)
+            if there.cost <= point.cost + _ROUNDING:
                 return there, False, damping / 10 if damping > 1e-3 else 0.0
             damping = max(10 * damping, 1e-3)
-        return state, True, damping
+        return point, True, damping
 
     def centre(self, fit: Fit) -> Centre:
         """Prepare a state for a stack of images."""
-        precision, mean = self.prior
-        expected, weight, gain, jacobian = self.expected(fit.state)
+        (precision, mean), point = self.prior, fit.point
         first = 2 * self.model.free.size
         expansion = Expansion.of(
-            Pieces.of(self.model, fit.state), expected, weight, gain, jacobian[:, first:],
+            Pieces.of(self.model, fit.state), point.expected, point.weight, point.gain, point.jacobian[:, first:],
             fit.inverse, precision, mean - self.parameters(fit.state),
         )  # fmt: skip
         spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse

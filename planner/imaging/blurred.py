@@ -207,6 +207,12 @@ class BlurredModel:
         """Expected grey levels above darkness, shape (P,)."""
         return self.evaluate(state, derivatives=False)[0]
 
+    def design(self, state: State) -> np.ndarray:
+        """Derivative of the image by the level coefficients, (levels, P): the image is linear in them."""
+        traced = self.trace(state)
+        kernels = self.kernels(traced)
+        return self._design(traced, kernels, Scatter.of(self, kernels))
+
     def evaluate(self, state: State, derivatives: bool = True) -> tuple[np.ndarray, np.ndarray | None]:
         """The image (P,) and its derivative by all parameters (P, count)."""
         traced = self.trace(state)
@@ -220,7 +226,7 @@ class BlurredModel:
         return image, np.concatenate([geometry, design, blur[None]]).T
 
     def _design(self, traced: Traced, kernels: Kernels, scatter: Scatter) -> np.ndarray:
-        """Derivative of the image by the level coefficients, (levels, P): the image is linear in them.
+        """What `design` gives.
 
         A level that is linear across the kernel adds its slope times the kernel's variance times the coverage's slope.
         """
@@ -246,7 +252,7 @@ class BlurredModel:
         K itself does not end to the left of a node, but K(u) - K(u - 1) does: its sum from the right is K.
         """
         arrangement, (left, top, width, height) = self.arrangement, self._window
-        reach = (kernels.x.shape[1] - 1) // 2
+        reach, size = (kernels.x.shape[1] - 1) // 2, height * width + 1
         s = traced.blur[:, None]
         u = kernels.place[:, :1] - kernels.column[:, None] + 1.5 - np.arange(2 * reach + 4)
         edge = _ramp(u / s) * s
@@ -255,16 +261,16 @@ class BlurredModel:
         row = kernels.row[:, None] - top + np.arange(2 * reach + 1)
         value = (kernels.y * (self.nodes.weight * traced.tangent[:, 1])[:, None])[:, :, None] * rise[:, None]
         inside = ((row >= 0) & (row < height))[:, :, None] & (column >= 0)[:, None, :]
-        place = np.where(inside, row[:, :, None] * width + column[:, None, :], width * height)
-        covered = np.zeros((len(arrangement.regions), height * width + 1))
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            region = arrangement.sides[self.nodes.piece, side]
-            keep = region != BACKGROUND
-            index = (region[keep, None, None] * (height * width + 1) + place[keep]).ravel()
-            covered += sign * np.bincount(index, value[keep].ravel(), covered.size).reshape(covered.shape)
-        covered = covered[:, :-1].reshape(-1, height, width)[:, :, ::-1].cumsum(2)[:, :, ::-1]
+        place = np.where(inside, row[:, :, None] * width + column[:, None, :], size - 1)
+        covered = np.empty((len(arrangement.regions), self.x.size))
+        slot, sides = (self.y - top) * width + self.x - left, arrangement.sides[self.nodes.piece]
+        for region in range(1, len(arrangement.regions)):
+            beside = (sides == region).any(1)
+            sign = np.where(sides[beside, :1] == region, 1.0, -1.0)[:, :, None]
+            found = np.bincount(place[beside].ravel(), (sign * value[beside]).ravel(), size)[:-1].reshape(height, width)
+            covered[region] = found[:, ::-1].cumsum(1)[:, ::-1].ravel()[slot]
         covered[BACKGROUND] = 1 - covered[1:].sum(0)
-        return covered[:, self.y - top, self.x - left]
+        return covered
 
     def contrasts(self, state: State, traced: Traced) -> np.ndarray:
         """First side minus other side at each node, grey levels, (n,)."""
