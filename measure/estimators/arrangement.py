@@ -89,8 +89,8 @@ class Found(NamedTuple):
     vertices : ndarray, shape (n, V, 2)
     levels : ndarray, shape (n, L)
     blur : ndarray, shape (n,)
-    near, far : ndarray, shape (n,)
-        Chi-square near the pieces and elsewhere.
+    squares : ndarray, shape (n, 3)
+        Chi-square near the pieces, elsewhere, and of bows in the pieces.
     centre : ndarray of int, shape (n,)
         Which of ``centres`` was expanded about.
     settled : ndarray of bool, shape (n,)
@@ -100,8 +100,7 @@ class Found(NamedTuple):
     vertices: np.ndarray
     levels: np.ndarray
     blur: np.ndarray
-    near: np.ndarray
-    far: np.ndarray
+    squares: np.ndarray
     centre: np.ndarray
     settled: np.ndarray
     centres: tuple[Centre, ...]
@@ -118,13 +117,13 @@ class Centre:
     covariance : ndarray, shape (q, q)
         Of the parameters' errors.
     freedom : tuple of float
-        Degrees of freedom near the pieces and elsewhere.
+        Degrees of freedom of each chi-square.
     """
 
     state: State
     expansion: Expansion
     covariance: np.ndarray
-    freedom: tuple[float, float]
+    freedom: tuple[float, float, float]
 
 
 Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
@@ -285,8 +284,8 @@ class ArrangementEstimator:
         spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
         fitted = len(precision) - (precision * fit.inverse).sum() - taken
-        near, far = expansion.near, self.pixels.size - expansion.near
-        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0)))
+        near, far, bows = expansion.near, self.pixels.size - expansion.near, float(len(expansion.bows[1]))
+        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0), bows))
 
     def index(self, vertices: np.ndarray) -> np.ndarray:
         """Where free vertices' x and y stand among the parameters."""
@@ -332,7 +331,7 @@ class ArrangementEstimator:
         good, settled = self._good(solved, centre), np.ones(part.size, bool)
         if first:
             good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
-        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.near[good], solved.far[good])
+        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.squares[good])
         collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
         return part[good]
 
@@ -350,11 +349,11 @@ class _Collected:
     def __init__(self, tool: ArrangementEstimator, count: int) -> None:
         self.tool = tool
         self.parameters = np.full((count, tool.model.count), np.nan)
-        self.squares = np.full((count, 2), np.nan)
+        self.squares = np.full((count, 3), np.nan)
         self.owner, self.settled = np.zeros(count, int), np.zeros(count, bool)
 
-    def add(self, which: np.ndarray, parameters: np.ndarray, near: np.ndarray, far: np.ndarray) -> None:
-        self.parameters[which], self.squares[which] = parameters, np.stack([near, far], 1)
+    def add(self, which: np.ndarray, parameters: np.ndarray, squares: np.ndarray) -> None:
+        self.parameters[which], self.squares[which] = parameters, squares
 
     def found(self, centres: tuple[Centre, ...]) -> Found:
         arrangement, free = self.tool.arrangement, self.tool.model.free
@@ -362,7 +361,7 @@ class _Collected:
         vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
         vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
         return Found(
-            vertices, self.parameters[:, first:-1], self.parameters[:, -1], *self.squares.T, self.owner, self.settled,
+            vertices, self.parameters[:, first:-1], self.parameters[:, -1], self.squares, self.owner, self.settled,
             centres,
         )  # fmt: skip
 

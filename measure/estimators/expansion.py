@@ -9,6 +9,7 @@ product, and the likelihood is maximised among a few numbers for each image.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -16,12 +17,13 @@ import numpy as np
 
 from planner.imaging.blurred import BlurredModel, State
 
-_ROWS = ((0, 2), (1, 4), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
+_ROWS = ((0, 3), (1, 4), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
 _STARTS = np.cumsum([0, *(count for _, count in _ROWS)])
 ROWS = int(_STARTS[-1])
 _KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in pairwise(_STARTS))
 _ITERATIONS = 40
 _SETTLED = 3e-4  # of a standard deviation
+_BOW_SEEN = 1.0  # px: bows that an image tells no better are left out
 _STRIDE = 8.0  # standard deviations that one iteration may go
 
 
@@ -94,7 +96,7 @@ class Pieces:
         swept = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[..., None]
         square = _product(a, a)
         found = np.zeros((*a.shape[:2], ROWS))
-        found[..., _KERNEL] = -length * a
+        found[..., _KERNEL][..., :2] = -length * a
         found[..., :1] -= swept / 2
         found[..., _CONTRAST] = -length * _product(by.contrast, a)
         found[..., _ACROSS] = -length / 2 * square
@@ -112,7 +114,7 @@ class Pieces:
         swept = (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[..., None]
         across, across2, across3 = told[..., _ACROSS], told[..., _ACROSS2], told[..., _ACROSS3]
         turned = told[..., :1] / 2 + (a * across[..., :2]).sum(-1, keepdims=True) / 3
-        by_a = told[..., _KERNEL] + _moment(by.contrast, told[..., _CONTRAST]) + _moment(a, across)
+        by_a = told[..., _KERNEL][..., :2] + _moment(by.contrast, told[..., _CONTRAST]) + _moment(a, across)
         by_a = by_a + _moment(b, told[..., _ALONG]) / 2 + _moment(square, across2) / 2
         by_a = by_a + _moment(_product(square, a), across3) / 6 + self.blur * by.blur[:, None, None] * across2[..., :2]
         by_a = -length * by_a - swept / 3 * across[..., :2] - turned * np.stack([b[..., 1], -b[..., 0]], -1)
@@ -223,16 +225,15 @@ class Solved(NamedTuple):
     Attributes
     ----------
     steps : ndarray, shape (n, q)
-    near, far : ndarray, shape (n,)
-        Chi-square of the pixels near the pieces, and of the others.
+    squares : ndarray, shape (n, 3)
+        Chi-square of the pixels near the pieces, of the others, and of a bow in each piece (score test).
     left : ndarray, shape (n, q)
         How far the steps may be from the likelihood's maximum: what the last iteration changed, and the effect of the
         highest order, which is more than that of all that are left out.
     """
 
     steps: np.ndarray
-    near: np.ndarray
-    far: np.ndarray
+    squares: np.ndarray
     left: np.ndarray
 
 
@@ -325,8 +326,29 @@ class Expansion:
         columns, level = self._columns(steps), steps[:, -count:]
         squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
         far = squares[1] + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
-        whole = sum(squares) + ((columns @ self.gram - 2 * told) * columns).sum(1)
-        return Solved(steps, whole - far, far, np.abs(change) + np.abs(self._highest(steps)))
+        explained = columns @ self.gram
+        whole = sum(squares) + ((explained - 2 * told) * columns).sum(1)
+        bows, information = self.bows
+        scores = (told - explained) @ bows
+        bowed = np.einsum("ni,ij,nj->n", scores, np.linalg.pinv(information, hermitian=True), scores)
+        squares = np.stack([whole - far, far, bowed], 1)
+        return Solved(steps, squares, np.abs(change) + np.abs(self._highest(steps)))
+
+    @cached_property
+    def bows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bows 4 t (1 - t) px of B pieces as columns (l + N ROWS, B), and their information beside the parameters'.
+
+        A straight edge that is none shows here long before the sum of all squares tells.
+        """
+        count, pieces = self.linear.shape[1], len(self.pieces.rows)
+        bows = np.zeros((count + pieces * ROWS, pieces))
+        first = count + np.arange(pieces) * ROWS
+        bows[first + 1, np.arange(pieces)] = 4 * self.pieces.lengths
+        bows[first + 2, np.arange(pieces)] = -4 * self.pieces.lengths
+        shared = self._score(np.zeros((pieces, len(self.inverse))), bows.T @ self.gram)
+        information = bows.T @ self.gram @ bows - shared @ self.inverse @ shared.T
+        seen = np.diag(information) > _BOW_SEEN**-2
+        return bows[:, seen], information[np.ix_(seen, seen)]
 
     def _climb(self, told: np.ndarray, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Most likely steps (n, q) for what n images tell, and the last change of each."""

@@ -30,7 +30,7 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     normals = np.stack([-along[..., 1], along[..., 0]], -1) / lengths[..., None]
     corners = found.vertices[:, tool.arrangement.corners]
     freedom = np.array([centre.freedom for centre in found.centres])[found.centre]
-    probability = p_value(np.stack([found.near, found.far], -1), freedom)
+    probability = p_value(found.squares, freedom)
     contrast, edge_status = _edges(tool, layout, found)
     state = _states(tool, layout, found, normals, probability, edge_status)
     measured = np.isin(state, status.MEASURED)
@@ -80,8 +80,7 @@ def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarra
 
 def _probability(centre: Centre, used: np.ndarray) -> float:
     solved = centre.expansion.solve(used[None, centre.expansion.order])
-    squares = np.concatenate([solved.near, solved.far])
-    return float(p_value(squares[None], np.array(centre.freedom)[None])[0])
+    return float(p_value(solved.squares, np.array(centre.freedom)[None])[0])
 
 
 def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
