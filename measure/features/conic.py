@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from measure import status
-from measure.estimators.gradient import GradientLocator
+from measure.estimators.gradient import gradient_along
 from measure.features.calipers import MIN_POSITIONS
 from measure.features.optics import Optics
 from planner.features.locator import MIN_CONTRAST, edge_blur
@@ -116,7 +116,7 @@ def find_ellipse(
     angles, places, normals = _positions(expected, optics, spacing)
     if len(angles) < max(MIN_POSITIONS, 5):
         return _nothing(images.shape[:-2], status.NOT_VISIBLE)
-    locator = GradientLocator.along_curve(optics, angles, places, normals)
+    locator = gradient_along(optics, angles, places, normals)
     found = locator.locate(stack)
     seen = (found.valid.mean(1) >= _MIN_FOUND) & (found.contrast > MIN_CONTRAST * np.sqrt(optics.noise_variance))
     # on a curve the zero crossing lies inside the edge by half the curvature times the variance of the smoothed profile
