@@ -13,6 +13,7 @@ from scipy import sparse
 
 from measure.features.lines import trapezoid, trend_along
 from measure.features.points import EdgePoints, UnitNoise
+from planner.features.locator import MIN_CONTRAST
 
 STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends
@@ -40,6 +41,8 @@ class CrossingLocator:
         Ideal px across the edge for a recorded px.
     basis, level : ndarray, shapes (m, k) and (k, len(pixels))
         Their product is what all places of a position have in common; k may be 0.
+    least_contrast : float
+        Contrast / noise below which an edge point's error is no longer linear in the noise.
     """
 
     positions: np.ndarray
@@ -50,6 +53,7 @@ class CrossingLocator:
     gain: np.ndarray
     basis: np.ndarray
     level: np.ndarray
+    least_contrast: float = MIN_CONTRAST
 
     def locate(self, images: np.ndarray) -> EdgePoints:
         """Edge points in a stack of images, shape (n, height, width)."""
@@ -105,9 +109,7 @@ class CrossingLocator:
         return sparse.csr_array(self.basis @ self.level)
 
 
-def places_across(
-    places: np.ndarray, normals: np.ndarray, window: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def places_across(places: np.ndarray, normals: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Offsets (T,) within the window, px, and the places (m T, 2) at them from ``places`` with their normals."""
     half = int(np.ceil(window / STEP))
     offsets = STEP * np.arange(-half, half + 1)
@@ -115,9 +117,7 @@ def places_across(
     return offsets, across, np.repeat(normals, offsets.size, 0)
 
 
-def gaussian_rows(
-    places: np.ndarray, scale: float, shape: tuple[int, int], weigh=None
-) -> sparse.csr_array:
+def gaussian_rows(places: np.ndarray, scale: float, shape: tuple[int, int], weigh=None) -> sparse.csr_array:
     """Rows that smooth an image at places (M, 2), px, by a sampled Gaussian whose sum is exactly 1.
 
     ``weigh(gauss, dx, dy)``, arrays (M, k, k), makes other kernels of the Gaussian and the pixels' distances, px.

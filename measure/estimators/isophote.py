@@ -1,8 +1,9 @@
 """Edge points where the smoothed image takes the mean of the levels on both sides: an isophote at sub-pixel precision.
 
-The levels are those of the pixels beside the edge, a straight line along it on each side. They are linear in the image,
-as the smoothed image is, and so what changes sign at the isophote is one linear function of it: the levels' own noise is
-in its response, and no level needs to be known. Along the edge it is the line that contours of the smoothed image give.
+Each side's level is a straight line along the edge through the pixels beside it (times the face's shading, where the
+light is known). Smoothed image and levels are linear in the pixels, and so is their difference, whose change of sign is
+the edge point: the levels' own noise is in its response. Through the points of an edge goes the line that the contour
+of the smoothed image at that level gives (`skimage.measure.find_contours`), for a whole stack of images at once.
 """
 
 from __future__ import annotations
@@ -15,67 +16,64 @@ from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_a
 from measure.estimators.strip import pixels_beside
 from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import Layout
-from measure.features.optics import Optics
-from planner.features.locator import CLEARANCE, edge_blur
+from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 
+TRIM = 3.0  # standard deviations of the smoothed edge left out at a corner: a contour there is 0.1 % of them off
 _BAND = 3.0  # how far a side's level reaches from the edge, in units of where it starts
 _QUIETEST = 0.7  # a crowded side shows its level no farther from all edges than so much of the farthest that there is
 _FEWEST = 8  # pixels that tell a level
 
 
 def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[CrossingLocator, str]:
-    """Prepare the locator of one straight edge of a layout; `status.CLUTTER` where a side has no level of its own."""
+    """Prepare the locator of one edge of a layout; with it ``clutter`` where a side has no level of its own, or ``ok``.
+
+    The function that crosses zero is the level less the smoothed image.
+    """
     optics = caliper.optics
     places, normals, gain = caliper.curve()
-    basis, sides, state = [], [], status.OK
-    for side, sign in enumerate((1, -1)):
-        pixels, rows, clear = _side(layout, index, caliper, layout.sides[index, side], sign)
-        shade = layout.shade(layout.sides[index, side], caliper.at(caliper.positions, np.zeros(1)))
-        basis.append(np.stack([shade, shade * (caliper.positions - _middle(caliper))], 1) / 2)
-        sides.append((pixels, rows))
-        state = state if clear else status.CLUTTER
-    blur = caliper.blur(caliper.positions)
-    return _locator(optics, caliper.positions, places, normals, gain, blur, np.concatenate(basis, 1), sides), state
-
-
-def _locator(optics: Optics, positions, places, normals, gain, blur, basis, sides) -> CrossingLocator:
-    """The level less the smoothed image: falls through zero where an edge brightens along the normal."""
     offsets, across, _ = places_across(places, normals, optics.window_px)
     kernel = -gaussian_rows(across, optics.scale_px, optics.shape)
-    pixels = np.unique(np.concatenate([kernel.indices, *(side for side, _ in sides)]))
-    level, done = np.zeros((basis.shape[1], pixels.size)), 0
-    for side, rows in sides:
-        level[done : done + len(rows), np.searchsorted(pixels, side)] = rows
-        done += len(rows)
-    total = np.hypot(optics.scale_px, edge_blur(blur)) * np.ones(len(places))
+    sides = [_side(layout, index, caliper, sign) for sign in (1, -1)]
+    pixels = np.unique(np.concatenate([kernel.indices, *(used for used, *_ in sides)]))
+    level = np.zeros((4, pixels.size))
+    for k, (used, rows, *_) in enumerate(sides):
+        level[2 * k : 2 * k + 2, np.searchsorted(pixels, used)] = rows / 2
+    blur = caliper.blur(caliper.positions) * np.ones(len(places))
+    least = MIN_CONTRAST * np.sqrt(isophote_kappa2(optics.scale_px, blur) / kappa2(optics.scale_px, blur))
     return CrossingLocator(
-        positions, offsets, pixels, sparse.csr_array(kernel[:, pixels]), np.sqrt(2 * np.pi) * total,
-        gain * np.ones(len(places)), basis, level,
-    )  # fmt: skip
+        positions=caliper.positions,
+        offsets=offsets,
+        pixels=pixels,
+        kernel=sparse.csr_array(kernel[:, pixels]),
+        slope_to_contrast=np.sqrt(2 * np.pi) * np.hypot(optics.scale_px, edge_blur(blur)),
+        gain=gain * np.ones(len(places)),
+        basis=np.concatenate([basis for _, _, basis, _ in sides], 1),
+        level=level,
+        least_contrast=float(least.mean()),
+    ), status.OK if all(clear for *_, clear in sides) else status.CLUTTER
 
 
-def _side(
-    layout: Layout, index: int, caliper: Caliper, face: int, sign: int
-) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Pixels (P,) that show one side's level, rows (2, P) that take the level at the edge's middle and its change per
-    px from them (relative to the face's shading), and whether they are clear of all edges."""
+def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """The level on one side of an edge: pixels (P,) and rows (2, P) that take its mean and its change along the edge
+    from them, the basis (m, 2) that takes it to the positions, and whether the pixels are clear of all edges."""
+    face, middle = layout.sides[index, (1 - sign) // 2], caliper.positions.mean()
     start = CLEARANCE * edge_blur(layout.optics.blur_px)
-    flat, points, along, across = (part for part in pixels_beside(caliper, _BAND * start))
+    flat, points, along, across = pixels_beside(caliper, _BAND * start)
     clearance = sign * across
     for segment in (*layout.ends[layout.visible], *layout.others):
         if not np.array_equal(segment, layout.ends[index]):
             clearance = np.minimum(clearance, distance_to_segment(points, *segment))
     own = (layout.labels().flat[flat] == face) & (clearance > 0)
     if own.sum() < _FEWEST:
-        own = clearance > 0
+        own = clearance > 0  # a face too thin for pixels of its own: what is seen beyond it
     limit = min(start, _QUIETEST * clearance[own].max(initial=0.0))
     own &= clearance >= limit
-    shade, lever = layout.shade(face, points[own]), along[own] - _middle(caliper)
-    design = np.stack([shade, shade * lever], 1)
-    if np.ptp(lever) < np.ptp(caliper.positions) / 2:
-        design[:, 1] = 0.0  # too short a piece to tell a change along the edge
-    return flat[own], np.linalg.pinv(design), bool(limit >= start)
 
+    def design(places: np.ndarray, lever: np.ndarray) -> np.ndarray:
+        return layout.shade(face, places)[:, None] * np.stack([np.ones_like(lever), lever], 1)
 
-def _middle(caliper: Caliper) -> float:
-    return float(caliper.positions.mean())
+    columns = design(points[own], along[own] - middle)
+    if not own.any() or np.ptp(along[own]) < np.ptp(caliper.positions) / 2:
+        columns[:, 1] = 0.0  # too short a piece to tell a change along the edge
+    basis = design(caliper.at(caliper.positions, np.zeros(1)), caliper.positions - middle)
+    return flat[own], np.linalg.pinv(columns), basis, bool(limit >= start and own.sum() >= _FEWEST)

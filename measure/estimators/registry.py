@@ -14,7 +14,7 @@ from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.estimate import Estimate, Estimator, noisy
 from measure.estimators.gradient import gradient_locator
-from measure.estimators.isophote import isophote_locator
+from measure.estimators.isophote import TRIM, isophote_locator
 from measure.estimators.likelihood import LikelihoodEstimator
 from measure.estimators.polygon import polygon_estimator
 from measure.estimators.profile import TRUNCATE
@@ -23,7 +23,7 @@ from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
-from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
+from planner.features.locator import CLEARANCE, edge_blur, reach
 from scenes import InvalidInput
 
 ESTIMATORS = ("canny", "gradient", "isophote", "strip", "polygon")
@@ -71,12 +71,13 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
         )
         return LikelihoodEstimator.joined(calipers, parts)
     kernel = (TRUNCATE if name == "canny" else 4) * optics.scale_px
-    calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1)
+    beside, margin = reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1
+    if name == "isophote":
+        return _isophotes(layout, edge_calipers(layout, TRIM / CLEARANCE * beside, margin, beside))
+    calipers = edge_calipers(layout, beside, margin)
     if name == "gradient":
         calipers = tuple(_thinned(caliper, optics.scale_px) for caliper in calipers)
         return SeparateEstimator(calipers, _by_points(optics, calipers, partial(gradient_locator, optics)))
-    if name == "isophote":
-        return _isophotes(layout, calipers)
     looks = iter(thinnings(optics, [caliper for caliper in calipers if _measurable(caliper)], threshold))
     parts = _by_points(optics, calipers, lambda caliper: CannyLocator.of(optics, caliper, threshold, next(looks)))
     different = {part.locator.thinning for part in parts if part}
@@ -86,12 +87,12 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
 def _isophotes(layout: Layout, calipers: tuple[Caliper, ...]) -> SeparateEstimator:
     """Each edge by its isophote; `clutter` where one of its sides has no level of its own."""
     parts, found = [], []
-    for index, caliper in enumerate(_thinned(caliper, layout.optics.scale_px) for caliper in calipers):
+    for index, caliper in enumerate(calipers):
         part = None
         if _measurable(caliper):
-            locator, state = isophote_locator(layout, index, caliper)
-            caliper = replace(caliper, status=status.worst(caliper.status, state))
-            part = PointEstimator(caliper, locator)
+            locator, state = isophote_locator(layout, index, _thinned(caliper, layout.optics.scale_px))
+            part = PointEstimator(replace(caliper, positions=locator.positions), locator)
+            caliper = replace(part.caliper, status=status.worst(caliper.status, state))
         found.append(caliper)
         parts.append(part)
     return SeparateEstimator(tuple(found), tuple(parts))
@@ -142,7 +143,7 @@ class PointEstimator:
         lines = fit_lines(points, points.weights)
         slope = np.tan(lines.tilt)
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
-        clear = points.contrast > MIN_CONTRAST * np.sqrt(noise_variance)
+        clear = points.contrast > self.locator.least_contrast * np.sqrt(noise_variance)
         edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
         state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
         columns = (
