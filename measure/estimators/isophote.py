@@ -69,11 +69,21 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.n
     limit = min(start, _QUIETEST * clearance[own].max(initial=0.0))
     own &= clearance >= limit
 
-    def design(places: np.ndarray, lever: np.ndarray) -> np.ndarray:
-        return layout.shade(face, places)[:, None] * np.stack([np.ones_like(lever), lever], 1)
-
-    columns = design(points[own], along[own] - middle)
-    if not own.any() or np.ptp(along[own]) < np.ptp(caliper.positions) / 2:
+    lever = along[own] - middle
+    columns = layout.shade(face, points[own])[:, None] * np.stack([np.ones_like(lever), lever], 1)
+    if not own.any() or np.ptp(lever) < np.ptp(caliper.positions) / 2:
         columns[:, 1] = 0.0  # too short a piece to tell a change along the edge
-    basis = design(caliper.at(caliper.positions, np.zeros(1)), caliper.positions - middle)
+    lever = caliper.positions - middle
+    basis = _smoothed(layout, face, caliper, sign)[:, None] * np.stack([np.ones_like(lever), lever], 1)
     return flat[own], np.linalg.pinv(columns), basis, bool(limit >= start and own.sum() >= _FEWEST)
+
+
+def _smoothed(layout: Layout, face: int, caliper: Caliper, sign: int) -> np.ndarray:
+    """Twice what a face of mean level 1 on one side adds to the smoothed image at the expected edge's positions, (m,).
+
+    A level P + g u at the distance u within the face gives half of P + g sigma sqrt(2 / pi) on the edge itself.
+    """
+    optics, none = caliper.optics, np.zeros(1)
+    width = np.hypot(optics.scale_px, edge_blur(caliper.blur(caliper.positions)))
+    there, inside, outside = (layout.shade(face, caliper.at(caliper.positions, none + u)) for u in (0, sign, -sign))
+    return there + np.sqrt(2 / np.pi) * width * (inside - outside) / 2
