@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
 from measure.estimators.estimate import noisy
 from measure.features.blurred_ellipse import LEAST_BLUR, ellipse_image, from_symmetric, relative
@@ -16,15 +17,19 @@ _SETTLED = 0.1  # px: after a smaller step the model, linear at where it began, 
 _WIDEST = 4.0  # times the expected blur
 _BAND = 3.0  # how far from the outline pixels are used, in units of where an edge's blur has ended
 _SINGULAR = 1e12
+_ALLOWED = 1.1  # times the noise's variance, which may itself be an estimate
+_RARE = 1e-6  # chance that noise alone leaves a residual as large as one that is refused
 
 
 @dataclass(frozen=True)
 class EllipseFit:
-    """Parameters (x, y, a, b, angle in rad) (5,), their covariance (5, 5), and the contrast, grey levels."""
+    """Parameters (x, y, a, b, angle in rad) (5,), their covariance (5, 5), the contrast, grey levels, and whether noise
+    explains what the picture has beside the model."""
 
     parameters: np.ndarray
     covariance: np.ndarray
     contrast: float
+    fits: bool
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ def likeliest_ellipse(
             return None
         if max(np.abs(change).max(), abs(wider)) < _SETTLED:
             found = _with_axes(shape, free @ model.covariance(optics, image) @ free.T, circle)
-            return EllipseFit(*found, contrast=abs(float(model.change[-2])))
+            return EllipseFit(*found, abs(float(model.change[-2])), model.fits(optics, image))
     return None
 
 
@@ -115,12 +120,15 @@ class _Linear:
         Of the Fisher matrix for unit noise.
     change : ndarray, shape (k,)
         From the least squares: what to add to shape and blur, then contrast and background themselves.
+    residual : ndarray, shape (P,)
+        What is left of the picture, grey levels.
     """
 
     pixels: np.ndarray
     design: np.ndarray
     inverse: np.ndarray
     change: np.ndarray
+    residual: np.ndarray
 
     @classmethod
     def at(cls, image, shape, blur: float, optics: Optics, free, seen: Seen) -> _Linear | None:
@@ -138,7 +146,7 @@ class _Linear:
             return None
         inverse = np.linalg.inv(gram)
         change = inverse @ target
-        contrast = change[-2]
+        contrast, residual = change[-2], used - design @ change
         if contrast == 0 or not np.isfinite(contrast):
             return None
         change[: count + 1] /= contrast
@@ -146,7 +154,7 @@ class _Linear:
         inverse[: count + 1] /= contrast
         inverse[:, : count + 1] /= contrast
         y, x = np.divmod(flat, len(columns))
-        return cls((rows[0] + y) * optics.shape[1] + columns[0] + x, design, inverse, change)
+        return cls((rows[0] + y) * optics.shape[1] + columns[0] + x, design, inverse, change, residual)
 
     def covariance(self, optics: Optics, image: np.ndarray) -> np.ndarray:
         """Of the shape's free parameters."""
@@ -155,6 +163,13 @@ class _Linear:
             return optics.noise_variance * self.inverse[:count, :count]
         found = noisy(self.inverse[:count] @ self.design.T, optics, image[None], self.pixels)
         return found.reshape(count, count)
+
+    def fits(self, optics: Optics, image: np.ndarray) -> bool:
+        """Whether the residual is noise, by its chi-square."""
+        variance = optics.noise_at(image.ravel()[self.pixels])
+        variance = optics.noise_variance if variance is None else variance
+        freedom = self.design.shape[0] - self.design.shape[1]
+        return bool((self.residual**2 / variance).sum() / _ALLOWED < chdtri(freedom, _RARE))
 
 
 def _near(shape: np.ndarray, optics: Optics, seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

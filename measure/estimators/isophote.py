@@ -1,9 +1,10 @@
 """Edge points where the smoothed image takes the mean of the levels on both sides: an isophote at sub-pixel precision.
 
-Each side's level is a straight line along the edge through the pixels beside it (times the face's shading, where the
-light is known). Smoothed image and levels are linear in the pixels, and so is their difference, whose change of sign is
-the edge point: the levels' own noise is in its response. Through the points of an edge goes the line that the contour
-of the smoothed image at that level gives (`skimage.measure.find_contours`), for a whole stack of images at once.
+Each side's level is a straight line along the edge through the pixels beside it, times the face's shading; where that
+is unknown, because the light is, a slope across the edge is fitted too, from a wider band. Smoothed image and levels
+are linear in the pixels, and so is their difference, whose change of sign is the edge point: the levels' own noise is
+in its response. Through the points of an edge goes the line that the contour of the smoothed image at that level gives
+(`skimage.measure.find_contours`), for a whole stack of images at once.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from scipy import sparse
 
 from measure import status
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across
-from measure.estimators.strip import pixels_beside
+from measure.estimators.strip import HALF_WIDTH, pixels_beside
 from measure.features.calipers import Caliper, distance_to_segment
-from measure.features.layout import Layout
+from measure.features.layout import BACKGROUND, Layout
 from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 
 TRIM = 3.0  # standard deviations of the smoothed edge left out at a corner: a contour there is 0.1 % of them off
@@ -35,9 +36,9 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
     kernel = -gaussian_rows(across, optics.scale_px, optics.shape)
     sides = [_side(layout, index, caliper, sign) for sign in (1, -1)]
     pixels = np.unique(np.concatenate([kernel.indices, *(used for used, *_ in sides)]))
-    level = np.zeros((4, pixels.size))
+    level = np.zeros((6, pixels.size))
     for k, (used, rows, *_) in enumerate(sides):
-        level[2 * k : 2 * k + 2, np.searchsorted(pixels, used)] = rows / 2
+        level[3 * k : 3 * k + 3, np.searchsorted(pixels, used)] = rows / 2
     blur = caliper.blur(caliper.positions) * np.ones(len(places))
     least = MIN_CONTRAST * np.sqrt(isophote_kappa2(optics.scale_px, blur) / kappa2(optics.scale_px, blur))
     return CrossingLocator(
@@ -54,11 +55,12 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
 
 
 def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """The level on one side of an edge: pixels (P,) and rows (2, P) that take its mean and its change along the edge
-    from them, the basis (m, 2) that takes it to the positions, and whether the pixels are clear of all edges."""
-    face, middle = layout.sides[index, (1 - sign) // 2], caliper.positions.mean()
+    """The level on one side of an edge: pixels (P,) and rows (3, P) that take its mean, its change along and across the
+    edge from them, the basis (m, 3) that takes it to the positions, and whether the pixels are clear of all edges."""
+    face = int(layout.sides[index, (1 - sign) // 2])
     start = CLEARANCE * edge_blur(layout.optics.blur_px)
-    flat, points, along, across = pixels_beside(caliper, _BAND * start)
+    even = face == BACKGROUND or layout.shadings[face] is not None
+    flat, points, along, across = pixels_beside(caliper, _BAND * start if even else max(HALF_WIDTH, _BAND * start))
     clearance = sign * across
     for segment in (*layout.ends[layout.visible], *layout.others):
         if not np.array_equal(segment, layout.ends[index]):
@@ -68,22 +70,26 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.n
         own = clearance > 0  # a face too thin for pixels of its own: what is seen beyond it
     limit = min(start, _QUIETEST * clearance[own].max(initial=0.0))
     own &= clearance >= limit
+    lever, away, middle = along[own], sign * across[own], caliper.positions.mean()
+    columns = np.stack([np.ones_like(lever), lever - middle, away], 1)
+    told = [True, _extent(lever) > np.ptp(caliper.positions) / 2, not even and _extent(away) > start]
+    rows = np.linalg.pinv(layout.shade(face, points[own])[:, None] * columns * told)
+    return flat[own], rows, _smoothed(layout, face, caliper, sign), bool(limit >= start and own.sum() >= _FEWEST)
 
-    lever = along[own] - middle
-    columns = layout.shade(face, points[own])[:, None] * np.stack([np.ones_like(lever), lever], 1)
-    if not own.any() or np.ptp(lever) < np.ptp(caliper.positions) / 2:
-        columns[:, 1] = 0.0  # too short a piece to tell a change along the edge
-    lever = caliper.positions - middle
-    basis = _smoothed(layout, face, caliper, sign)[:, None] * np.stack([np.ones_like(lever), lever], 1)
-    return flat[own], np.linalg.pinv(columns), basis, bool(limit >= start and own.sum() >= _FEWEST)
+
+def _extent(places: np.ndarray) -> float:
+    return float(np.ptp(places)) if places.size else 0.0
 
 
 def _smoothed(layout: Layout, face: int, caliper: Caliper, sign: int) -> np.ndarray:
-    """Twice what a face of mean level 1 on one side adds to the smoothed image at the expected edge's positions, (m,).
+    """Twice what one side's face adds to the smoothed image on the expected edge, by the terms of its level, (m, 3).
 
     A level P + g u at the distance u within the face gives half of P + g sigma sqrt(2 / pi) on the edge itself.
     """
-    optics, none = caliper.optics, np.zeros(1)
-    width = np.hypot(optics.scale_px, edge_blur(caliper.blur(caliper.positions)))
-    there, inside, outside = (layout.shade(face, caliper.at(caliper.positions, none + u)) for u in (0, sign, -sign))
-    return there + np.sqrt(2 / np.pi) * width * (inside - outside) / 2
+    width = np.hypot(caliper.optics.scale_px, edge_blur(caliper.blur(caliper.positions)))
+    inward = np.sqrt(2 / np.pi) * width * np.ones(caliper.positions.size)
+    there, inside, outside = (
+        layout.shade(face, caliper.at(caliper.positions, np.full(1, float(u)))) for u in (0, sign, -sign)
+    )
+    mean = there + inward * (inside - outside) / 2
+    return np.stack([mean, mean * (caliper.positions - caliper.positions.mean()), there * inward], 1)

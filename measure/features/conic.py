@@ -26,7 +26,8 @@ class Ellipse:
     covariance : ndarray, shape (..., 5, 5)
         Of the parameters. For a circle a and b are the same number, and the angle has no error.
     status : ndarray of str, shape (...)
-        ``ok``, ``low_contrast``, ``not_visible`` or ``ill_conditioned``; parameters are NaN unless ``ok``.
+        ``ok``, ``clutter``, ``low_contrast``, ``not_visible`` or ``ill_conditioned``; parameters are NaN unless it is
+        one of the first two.
     """
 
     parameters: np.ndarray

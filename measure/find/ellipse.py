@@ -46,7 +46,8 @@ def find_ellipse(
     -------
     Ellipse
         The covariance is that of the likelihood's maximum, at each image's own contrast and blur. Where the axes are
-        equal the angle has no meaning, and its variance is infinite.
+        equal the angle has no meaning, and its variance is infinite. The status is ``clutter`` where the picture has
+        more beside the ellipse than the noise explains: the parameters may be biased.
     """
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     start = to_symmetric(np.asarray(expected, float) / UNITS)
@@ -59,6 +60,7 @@ def find_ellipse(
     inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature(start, angles)
     offset = found.offset + np.minimum(inward, _MOST_INWARD)
     starts, good = _start(places + offset[..., None] * normals, found.valid, start, circle)
+    clean = np.ones(len(stack), bool)
     parameters, covariance = np.full((len(stack), 5), np.nan), np.full((len(stack), 5, 5), np.nan)
     least = _LEAST_CONTRAST * np.sqrt(optics.noise_variance)
     for k in np.flatnonzero(seen & good):
@@ -66,8 +68,9 @@ def find_ellipse(
         good[k] = fit is not None
         seen[k] = found.contrast[k] > MIN_CONTRAST / _LEAST_CONTRAST * least if fit is None else fit.contrast > least
         if good[k] and seen[k]:
-            parameters[k], covariance[k] = fit.parameters, fit.covariance
-    state = np.where(seen, np.where(good, status.OK, status.ILL_CONDITIONED), status.LOW_CONTRAST)
+            parameters[k], covariance[k], clean[k] = fit.parameters, fit.covariance, fit.fits
+    measured = np.where(clean, status.OK, status.CLUTTER)
+    state = np.where(seen, np.where(good, measured, status.ILL_CONDITIONED), status.LOW_CONTRAST)
     return Ellipse(
         parameters.reshape(*lead, 5) * UNITS,
         covariance.reshape(*lead, 5, 5) * np.outer(UNITS, UNITS),
