@@ -17,10 +17,10 @@ from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_a
 from measure.estimators.strip import HALF_WIDTH, pixels_beside
 from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import BACKGROUND, Layout
-from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
+from planner.features.locator import MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 
-TRIM = 3.0  # standard deviations of the smoothed edge left out at a corner: a contour there is 0.1 % of them off
-_BAND = 3.0  # how far a side's level reaches from the edge, in units of where it starts
+TRIM = 3.0  # standard deviations of an edge from which 0.1 % of its contrast is left: where corners and levels begin
+_BAND = 3.5  # how far a side's level reaches from the edge, in units of where it starts
 _QUIETEST = 0.7  # a crowded side shows its level no farther from all edges than so much of the farthest that there is
 _FEWEST = 8  # pixels that tell a level
 
@@ -58,7 +58,7 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.n
     """The level on one side of an edge: pixels (P,) and rows (3, P) that take its mean, its change along and across the
     edge from them, the basis (m, 3) that takes it to the positions, and whether the pixels are clear of all edges."""
     face = int(layout.sides[index, (1 - sign) // 2])
-    start = CLEARANCE * edge_blur(layout.optics.blur_px)
+    start = TRIM * edge_blur(layout.optics.blur_px)
     even = face == BACKGROUND or layout.shadings[face] is not None
     flat, points, along, across = pixels_beside(caliper, _BAND * start if even else max(HALF_WIDTH, _BAND * start))
     clearance = sign * across
