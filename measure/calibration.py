@@ -146,9 +146,7 @@ def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float]
     for part in tool.parts:
         found = part.locator.locate(noisy)
         span = part.caliper.positions[-1] - part.caliper.positions[0]
-        if found.valid.sum(1).mean() < 0.98 * (
-            part.caliper.positions.size if name != "canny" else span / np.sqrt(2)
-        ):
+        if found.valid.sum(1).mean() < 0.98 * (part.caliper.positions.size if name != "canny" else span / np.sqrt(2)):
             return None
         weight = found.valid / found.valid.sum(1, keepdims=True)
         mean = (weight * found.offset).sum(1)

@@ -62,11 +62,11 @@ def find_ellipse(
     starts, good = _start(places + offset[..., None] * normals, found.valid, start, circle)
     clean = np.ones(len(stack), bool)
     parameters, covariance = np.full((len(stack), 5), np.nan), np.full((len(stack), 5, 5), np.nan)
-    least = _LEAST_CONTRAST * np.sqrt(optics.noise_variance)
+    noise = np.sqrt(optics.noise_variance)
     for k in np.flatnonzero(seen & good):
         fit = likeliest_ellipse(stack[k], starts[k], optics, circle, Seen(angles, found.valid[k]))
         good[k] = fit is not None
-        seen[k] = found.contrast[k] > MIN_CONTRAST / _LEAST_CONTRAST * least if fit is None else fit.contrast > least
+        seen[k] = found.contrast[k] > MIN_CONTRAST * noise if fit is None else fit.contrast > _LEAST_CONTRAST * noise
         if good[k] and seen[k]:
             parameters[k], covariance[k], clean[k] = fit.parameters, fit.covariance, fit.fits
     measured = np.where(clean, status.OK, status.CLUTTER)
