@@ -63,7 +63,7 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
     ----------
     image : array_like, shape (height, width)
         Grey levels.
-    estimator : {"arrangement", "strip", "gradient", "canny"}
+    estimator : {"strip", "arrangement", "isophote", "gradient", "canny"}
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
     lens : Lens, optional
         Intrinsics and distortion.

@@ -129,6 +129,6 @@ def test_calibrate_agrees_with_the_closed_form(tmp_path):
     curves = {curve["name"]: curve for curve in document["curves"]}
     assert curves["gradient"]["kappa2"] == pytest.approx(document["closed_kappa2"], rel=0.1)
     assert curves["gradient"]["correlation_px"] == pytest.approx(document["closed_correlation_px"], rel=0.15)
-    assert 0.85 < curves["polygon"]["efficiency"] < 1.1
-    assert curves["canny"]["efficiency"] < curves["polygon"]["efficiency"]
+    assert 0.85 < curves["arrangement"]["efficiency"] < 1.1
+    assert curves["canny"]["efficiency"] < curves["arrangement"]["efficiency"]
     assert (tmp_path / "c.png").stat().st_size > 10000

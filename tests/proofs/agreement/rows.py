@@ -20,7 +20,7 @@ from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 
 KINDS = "calibrated", "propagated", "reported"
-ESTIMATORS = "gradient", "canny", "strip", "polygon"
+ESTIMATORS = "gradient", "canny", "isophote", "strip", "arrangement"
 _BATCH = 50  # pictures held in memory at a time
 _STRAY = 0.01  # part of the noisy pictures that may be refused where a setting is ok
 
