@@ -158,7 +158,9 @@ def _shapes() -> list[Case]:
         found += [_polygon(f"side of {pixels} px", corners, e, True) for e in ("gradient", "strip", "arrangement")]
     for degrees, right in ((30.0, True), (0.01, False)):
         corners = _quadrilateral(70.0, 40.0, degrees)
-        found += [_polygon(f"corner of {degrees:g} deg", corners, e, right) for e in ("gradient", "strip", "arrangement")]
+        found += [
+            _polygon(f"corner of {degrees:g} deg", corners, e, right) for e in ("gradient", "strip", "arrangement")
+        ]
     blunt = _blunt(179.99)
     found += [_polygon("corner of 179.99 deg", blunt, e, False) for e in ("gradient", "strip", "arrangement")]
     return found
