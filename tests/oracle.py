@@ -6,7 +6,7 @@ Projection and shading are written out here: nothing is shared with the model of
 import numpy as np
 from scipy.special import ndtr
 
-from validation.hard.polygon import _scan_lines, _spans, polygon_image
+from validation.hard.polygon import polygon_image, scan_lines, spans
 
 __all__ = ["axes", "block_image", "pinhole", "polygon_image", "shaded_image"]
 
@@ -29,8 +29,8 @@ def shaded_image(faces, shape, blur):
     picture = np.zeros(shape)
     for corners, shade in faces:
         corners = np.asarray(corners, float)
-        lines, weights = _scan_lines(np.unique(corners[:, 1]))
-        left, right = _spans(corners, lines)
+        lines, weights = scan_lines(corners)
+        left, right = spans(corners, lines)
         panels = max(int(np.ceil(2 * np.max(right - left))), 1)
         t = (np.arange(panels)[:, None] + (1 + _FEW) / 2).ravel() / panels
         x = left[:, None] + (right - left)[:, None] * t

@@ -13,10 +13,12 @@ import numpy as np
 
 from planner.features.locator import edge_blur
 from planner.features.measurand import corner_response, measurand, normals
-from planner.imaging.blurred_segment import Segments, second_and_third
-from planner.imaging.boundaries import Boundaries, Places, boundaries_near
+from planner.features.sampling import sampled_line
+from planner.imaging.blurred_segment import second_and_third
+from planner.imaging.boundaries import Places, boundaries_near
 from planner.imaging.clipped_step import clipped
 from planner.imaging.lens import lens_jacobian
+from planner.imaging.lens import recorded as recorded_at
 from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
@@ -79,6 +81,8 @@ def _bias(pictures: Pictures) -> Bias:
     offset, steepness = _crossings(pictures, nodes, normals(known.view))
     mean = offset @ NODE_WEIGHTS / 2
     turn = 6 / nodes.length[..., 0] ** 2 * ((offset * nodes.t[..., 1:-1]) @ NODE_WEIGHTS)
+    by_pixels = _sampled(pictures, nodes)
+    mean, turn = mean + by_pixels[0], turn + by_pixels[1]
     start = mean - turn * nodes.middle[..., 0]
     shares = known.offset * start + known.tilt * turn
     lines = np.stack([start, start + turn * known.view.lengths], -1)
@@ -98,6 +102,21 @@ def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
             end = [scene.solid.edge(name).ends.index(vertex) for name in feature.edges]
             found[:, k] = np.einsum("nij,nj->ni", corner_response(normals(view)[:, index]), lines[:, index, end])
     return found
+
+
+def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
+    """Mean shift, ideal px, and turn of each line by the sampling, (N, E); a bent edge is taken as its tangent."""
+    scene, view = pictures.scene, measurand(pictures).view
+    fraction = nodes.middle / view.lengths[..., None]
+    middle = view.ends[..., 0, :] + fraction * view.along
+    along = np.einsum("...ij,...j->...i", lens_jacobian(middle, scene.camera), view.along)
+    size = np.linalg.norm(along, axis=-1)
+    length = nodes.length[..., 0] * size / view.lengths
+    mean, turn = sampled_line(
+        recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px, scene.locator.scale_px
+    )
+    across = np.broadcast_to(nodes.across, nodes.t.shape).mean(-1)
+    return mean * across, turn * across * size / view.lengths
 
 
 def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
