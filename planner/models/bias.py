@@ -22,12 +22,15 @@ from planner.imaging.lens import recorded as recorded_at
 from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from planner.models.calibrated import calibrated
 from scenes import Corner, Scene
 
 _BLOCK = 256  # pictures at a time, so that their places stay in the processor's cache
 _FAR = 6.0  # standard deviations of the smoothed edge beyond which a boundary is not felt
 _STEPS = 5  # of Newton's method
 _LONGEST = 0.5  # px a step
+NEGLIGIBLE = 0.3  # standard deviations of the measurand
+_STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Bias:
         What each edge adds to ``value``.
     steepness : ndarray, shape (..., E)
         Slope of the second derivative at the crossing over that of the lone step: the place along the edge where it is
-        farthest from 1. Errors by noise are divided by it.
+        farthest from 1. Errors by noise are divided by it. NaN where something is near that the model does not know.
     """
 
     value: np.ndarray
@@ -56,10 +59,29 @@ class Bias:
     shares: np.ndarray
     steepness: np.ndarray
 
+    @property
+    def disturbed(self) -> np.ndarray:
+        """Edges whose crossings something shares, so that neither bias nor variance are to be trusted, (..., E)."""
+        return ~(np.abs(self.steepness - 1) <= _STEEPER)
+
 
 def bias(pictures: Pictures) -> Bias:
     """Bias of the ``gradient`` locator (and nearly that of ``canny``), found once for each set of pictures."""
     return pictures.once("bias", lambda: _in_blocks(pictures))
+
+
+def cluttered(pictures: Pictures) -> np.ndarray:
+    """Which edges have the status ``clutter``, bool, shape (..., E): the one rule of planner and measurement.
+
+    What lies around the edge disturbs its crossings, or the measurand's bias is above `NEGLIGIBLE` and the edge's share
+    in it is no less than an equal one.
+    """
+    found = bias(pictures)
+    limit = NEGLIGIBLE * np.sqrt(calibrated(pictures).variance)
+    with np.errstate(invalid="ignore"):
+        biased = np.abs(found.value) > limit
+        large = np.abs(found.shares) >= limit[..., None] / max(found.shares.shape[-1], 1)
+    return found.disturbed | (biased[..., None] & large)
 
 
 def _in_blocks(pictures: Pictures) -> Bias:
@@ -88,8 +110,10 @@ def _bias(pictures: Pictures) -> Bias:
     lines = np.stack([start, start + turn * known.view.lengths], -1)
     worst = np.take_along_axis(steepness, np.abs(steepness - 1).argmax(-1)[..., None], -1)[..., 0]
     corners = _corners(pictures.scene, known.view, lines)
-    lines_alone = all(isinstance(feature, Corner) for feature in pictures.scene.task.corners)
-    return Bias(shares.sum(-1) if lines_alone else np.full(len(shares), np.nan), lines, corners, shares, worst)
+    value = shares.sum(-1)
+    if pictures.scene.task.kind == "distance":
+        value = np.linalg.norm(np.diff(known.points + corners, axis=-2)[..., 0, :], axis=-1) - known.value
+    return Bias(value, lines, corners, shares, worst)
 
 
 def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
