@@ -57,6 +57,8 @@ class Boundaries:
     sides, kinks : ndarray, shape (P, 2)
         Levels at the place nearest to it and their derivatives along n, on the side opposite to the segment's normal
         and on the normal's; grey levels and grey levels a px.
+    unknown : ndarray of bool, shape (N * E * n,)
+        Places near an edge of an obstacle, whose levels are not asked for.
     """
 
     place: np.ndarray
@@ -64,6 +66,7 @@ class Boundaries:
     segments: Segments
     sides: np.ndarray
     kinks: np.ndarray
+    unknown: np.ndarray
 
 
 def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundaries:
@@ -72,7 +75,7 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
     In a plain scene a side's level is its face's, or darkness; else it is what `side_signals` says at the nearest point
     of the edge. Edges of obstacles, and of shadows on other faces or the floor, are not among them.
     """
-    solid = pictures.scene.solid
+    solid, bodies = pictures.scene.solid, pictures.scene.bodies
     start, along = _seen_from(pictures, places)
     length = np.linalg.norm(along, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -80,8 +83,9 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
         foot = -(start * unit).sum(-1)
         apart = unit[..., 0] * start[..., 1] - unit[..., 1] * start[..., 0]
         distance = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0))
-    seen = facing(solid, pictures.sensor_at)[:, [edge.faces for edge in solid.edges]].any(-1)
-    index = np.nonzero((distance < far) & seen[:, None, None])
+    seen = facing(bodies, pictures.sensor_at)[:, [edge.faces for edge in bodies.edges]].any(-1)
+    near, ours = (distance < far) & seen[:, None, None], np.arange(len(bodies.edges)) < len(solid.edges)
+    index = np.nonzero(near & ours)
     unit, foot, apart, length = unit[index], foot[index], apart[index], length[index]
     sides, gradients = _sides(pictures, places, index, np.clip(foot / length, 0, 1))
     jump = gradients[:, 1] - gradients[:, 0]
@@ -93,12 +97,15 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
         level = level - slope * (np.clip(foot, 0, length) - foot)
     segments = Segments(-foot, length - foot, apart, unit[:, 0], unit[:, 1], level, slope, jump[:, 1])
     own = np.array([solid.edges.index(solid.edge(name)) for name in places.names])[index[1]] == index[3]
-    return Boundaries(np.ravel_multi_index(index[:3], distance.shape[:3]), own, segments, sides, gradients[..., 1])
+    return Boundaries(
+        np.ravel_multi_index(index[:3], distance.shape[:3]), own, segments, sides, gradients[..., 1],
+        (near & ~ours).any(-1).ravel(),
+    )  # fmt: skip
 
 
 def _seen_from(pictures: Pictures, places: Places) -> tuple[np.ndarray, np.ndarray]:
-    """First end of each edge of the object and the way to its other end, (N, E, n, J, 2), in the places' axes, px."""
-    scene, solid = pictures.scene, pictures.scene.solid
+    """First end of each edge of the bodies and the way to its other end, (N, E, n, J, 2), in the places' axes, px."""
+    scene, solid = pictures.scene, pictures.scene.bodies
     images = from_axis(solid.vertices, pictures.sensors, scene.camera)
     first, last = (images[:, [solid.edge(name).ends[k] for name in places.names], None] for k in (0, 1))
     here = first + places.fractions[..., None] * (last - first)

@@ -162,10 +162,10 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
         if cut_off is not None:
             value, slope = (a + b for a, b in zip((value, slope), cut_off(moved), strict=True))
         moved = moved - np.clip(value / slope, -_LONGEST, _LONGEST)
-    lone = -step / (np.sqrt(2 * np.pi) * width**3)
-    wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(slope / lone > 0)
+    steepness = np.where(near.unknown, np.nan, -slope / step * (np.sqrt(2 * np.pi) * width**3))
+    wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
     across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
-    return np.where(wrong, np.nan, moved).reshape(shape) * across, (slope / lone).reshape(shape)
+    return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
 
 
 def _places(pictures: Pictures, fractions: np.ndarray, normal: np.ndarray) -> Places:
