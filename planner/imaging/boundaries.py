@@ -16,6 +16,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, edge_points, facing, frame, from_axis
 from scenes import Solid
 
+_MAGNIFIED = 2.0  # by a lens that bends, at most, where boundaries are looked for
 _STEP = 0.01  # px; levels are differentiated forwards
 _SUPPORT = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2  # fractions of an edge's image at which levels are computed
 
@@ -76,18 +77,23 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
     of the edge. Edges of obstacles, and of shadows on other faces or the floor, are not among them.
     """
     solid, bodies = pictures.scene.solid, pictures.scene.bodies
-    start, along = _seen_from(pictures, places)
+    pairs = _pairs(pictures, places, far)
+    start, along = _seen_from(pictures, places, pairs)
     length = np.linalg.norm(along, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = along / length[..., None]
         foot = -(start * unit).sum(-1)
         apart = unit[..., 0] * start[..., 1] - unit[..., 1] * start[..., 0]
-        distance = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0))
-    seen = facing(bodies, pictures.sensor_at)[:, [edge.faces for edge in bodies.edges]].any(-1)
-    near, ours = (distance < far) & seen[:, None, None], np.arange(len(bodies.edges)) < len(solid.edges)
-    index = np.nonzero(near & ours)
-    unit, foot, apart, length = unit[index], foot[index], apart[index], length[index]
-    sides, gradients = _sides(pictures, places, index, np.clip(foot / length, 0, 1))
+        near = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0)) < far
+    picture, edge, other = pairs
+    place = np.ravel_multi_index((picture, edge), places.fractions.shape[:2])[:, None] * near.shape[1] + np.arange(near.shape[1])
+    ours = other < len(solid.edges)
+    unknown = np.zeros(places.fractions.size, bool)
+    unknown[place[near & ~ours[:, None]]] = True
+    pair, which = np.nonzero(near & ours[:, None])
+    unit, foot, apart, length = unit[pair, which], foot[pair, which], apart[pair, which], length[pair, which]
+    at = picture[pair], edge[pair], which
+    sides, gradients = _sides(pictures, places, at, other[pair], np.clip(foot / length, 0, 1))
     jump = gradients[:, 1] - gradients[:, 0]
     slope = (unit * jump).sum(-1)
     level = sides[:, 1] - sides[:, 0]
@@ -96,41 +102,97 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
     else:
         level = level - slope * (np.clip(foot, 0, length) - foot)
     segments = Segments(-foot, length - foot, apart, unit[:, 0], unit[:, 1], level, slope, jump[:, 1])
-    own = np.array([solid.edges.index(solid.edge(name)) for name in places.names])[index[1]] == index[3]
-    return Boundaries(
-        np.ravel_multi_index(index[:3], distance.shape[:3]), own, segments, sides, gradients[..., 1],
-        (near & ~ours).any(-1).ravel(),
-    )  # fmt: skip
+    own = np.array([solid.edges.index(solid.edge(name)) for name in places.names])[edge] == other
+    return Boundaries(place[pair, which], own[pair], segments, sides, gradients[..., 1], unknown)
 
 
-def _seen_from(pictures: Pictures, places: Places) -> tuple[np.ndarray, np.ndarray]:
-    """First end of each edge of the bodies and the way to its other end, (N, E, n, J, 2), in the places' axes, px."""
-    scene, solid = pictures.scene, pictures.scene.bodies
-    images = from_axis(solid.vertices, pictures.sensors, scene.camera)
+def _pairs(pictures: Pictures, places: Places, far: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(picture, edge with places, visible edge of the bodies that may be near it), each (K,): some are not near."""
+    solid, bodies = pictures.scene.solid, pictures.scene.bodies
+    far = far * (_MAGNIFIED if pictures.scene.camera.lens.bends else 1)
+    images = from_axis(bodies.vertices, pictures.sensors, pictures.scene.camera)
     first, last = (images[:, [solid.edge(name).ends[k] for name in places.names], None] for k in (0, 1))
-    here = first + places.fractions[..., None] * (last - first)
-    ends = images[:, [edge.ends for edge in solid.edges]]
-    away = np.einsum(
-        "neaij,neajk,neavlk->neavli", places.axes, places.lens, ends[:, None, None] - here[:, :, :, None, None]
+    ends = [images[:, None, [edge.ends[k] for edge in bodies.edges]] - first for k in (0, 1)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (last - first) / np.linalg.norm(last - first, axis=-1, keepdims=True)
+    lengths = ((last - first) * t).sum(-1)
+    along = [end[..., 0] * t[..., 0] + end[..., 1] * t[..., 1] for end in ends]
+    across = [end[..., 1] * t[..., 0] - end[..., 0] * t[..., 1] for end in ends]
+    seen = facing(bodies, pictures.sensor_at)[:, [edge.faces for edge in bodies.edges]].any(-1)[:, None]
+    beside = (np.minimum(*across) < far) & (np.maximum(*across) > -far)
+    reached = (np.maximum(*along) > places.fractions.min(-1)[..., None] * lengths - far) & (
+        np.minimum(*along) < places.fractions.max(-1)[..., None] * lengths + far
     )
-    return away[..., 0, :], away[..., 1, :] - away[..., 0, :]
+    return np.nonzero(seen & beside & reached)
 
 
-def _sides(pictures: Pictures, places: Places, index: tuple[np.ndarray, ...], nearest: np.ndarray):
-    """Levels (P, 2) on both sides of edges ``index[3]`` and their gradients (P, 2, 2) in the places' axes."""
-    solid = pictures.scene.solid
-    seen = facing(solid, pictures.sensor_at)
-    shown, face_of = np.unique(np.array([_sided(solid)]), return_inverse=True)
-    face_of = face_of.reshape(-1, 2)[index[3]]
-    fields = _face_fields(pictures, places, shown)
-    found = fields[(*(i[:, None] for i in index[:3]), face_of)]
-    found = np.where(seen[index[0][:, None], shown[face_of], None], found, 0.0)
-    back = np.linalg.inv(places.lens[index[:3]]) if pictures.scene.camera.lens.bends else places.lens[index[:3]]
-    gradients = np.einsum("pij,pkj,pak->pai", places.axes[index[:3]], np.swapaxes(back, -1, -2), found[..., 1:])
+def _seen_from(pictures: Pictures, places: Places, pairs) -> tuple[np.ndarray, np.ndarray]:
+    """First end of each pair's other edge and the way to its other end, (K, n, 2), in the places' axes, px."""
+    picture, edge, other = pairs
+    solid, bodies = pictures.scene.solid, pictures.scene.bodies
+    images = from_axis(bodies.vertices, pictures.sensors, pictures.scene.camera)
+    own = np.array([solid.edge(name).ends for name in places.names])[edge]
+    ends = np.array([edge.ends for edge in bodies.edges])[other]
+    first, last, start, stop = (images[picture, end][:, None] for end in (*own.T, *ends.T))
+    here = first + places.fractions[picture, edge][..., None] * (last - first)
+    turn = places.axes @ places.lens
+    start, along = ((turn[picture, edge] @ v[..., None])[..., 0] for v in (start - here, stop - start + 0 * here))
+    return start, along
+
+
+def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other: np.ndarray, nearest: np.ndarray):
+    """Levels (P, 2) on both sides of edges ``other`` and their gradients (P, 2, 2) in the axes of the places ``at``."""
+    solid, (picture, edge, which) = pictures.scene.solid, at
+    faces = _sided(solid)[other]
+    seen = facing(solid, pictures.sensor_at)[picture[:, None], faces]
+    found = np.zeros((*faces.shape, 3))
+    for side in (0, 1):
+        rows = seen[:, side]
+        found[rows, side] = _of_face(pictures, places, picture[rows], edge[rows], which[rows], faces[rows, side])
+    turn = places.axes[at]
+    if pictures.scene.camera.lens.bends:
+        turn = turn @ np.swapaxes(np.linalg.inv(places.lens[at]), -1, -2)
+    gradients = (turn[:, None] @ found[..., 1:, None])[..., 0]
     if is_plain(pictures.scene):
         return found[..., 0], gradients
-    levels = _looked_at(pictures, index, nearest)
+    levels = _looked_at(pictures, picture, other, nearest)
     return levels, np.where((levels > 0)[..., None], gradients, 0.0)
+
+
+def _of_face(pictures: Pictures, places: Places, picture, edge, which, face) -> np.ndarray:
+    """Signal of faces (P,) at places, and its derivatives by x and y, (P, 3): a cubic along each edge."""
+    faces = len(pictures.scene.solid.faces)
+    asked, back = np.unique((picture * len(places.names) + edge) * faces + face, return_inverse=True)
+    of_edge, of_face = np.divmod(asked, faces)
+    fields = _face_fields(pictures, places.names, *np.divmod(of_edge, len(places.names)), of_face)
+    weights = _interpolation(places.fractions[picture, edge, which])
+    return (weights[:, None] @ fields[back])[:, 0]
+
+
+def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face) -> np.ndarray:
+    """Signal of faces (T,) where rays through edges meet their planes, and its derivatives by x and y (ideal px).
+
+    Shape (T, support, 3); whether the face is seen does not matter.
+    """
+    scene, solid, camera = pictures.scene, pictures.scene.solid, pictures.scene.camera
+    of_each = Pictures(scene, *_of_each(pictures, picture))
+    at, axes = of_each.sensor_at[:, None], frame(of_each.sensors)
+    ends = np.array([solid.edge(name).ends for name in names])
+    near, far = (
+        depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1)
+    )
+    spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))
+    start, stop = (solid.vertices[ends[edge, k]][:, None] for k in (0, 1))
+    points = start + spatial[..., None] * (stop - start)
+    pixel = (near + spatial * (far - near))[..., None] / camera.focal_px
+    steps = np.stack([0 * points, *(_STEP * pixel * axis[:, None] for axis in (axes.right, axes.down))], -2)
+    rays = points[..., None, :] + steps - at[..., None, :]
+    normal = solid.normals[face][:, None, None]
+    heights = solid.offsets[face] - (of_each.sensor_at * normal[:, 0, 0]).sum(-1)
+    with np.errstate(all="ignore"):
+        met = at[..., None, :] + (heights[:, None, None] / (rays * normal).sum(-1))[..., None] * rays
+        values = np.nan_to_num(signal(of_each, met, normal, 2), posinf=0.0, neginf=0.0)
+    return np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
 
 
 def _sided(solid: Solid) -> np.ndarray:
@@ -147,30 +209,6 @@ def _sided(solid: Solid) -> np.ndarray:
     return np.where(left[:, None], faces, faces[:, ::-1])
 
 
-def _face_fields(pictures: Pictures, places: Places, faces: np.ndarray) -> np.ndarray:
-    """Signal of faces where the rays through the places meet their planes, and its derivatives by x and y (ideal px).
-
-    Shape (N, E, n, F, 3); whether the face is seen does not matter. A cubic in the fraction of the edge's length.
-    """
-    scene, solid, camera = pictures.scene, pictures.scene.solid, pictures.scene.camera
-    at, axes = pictures.sensor_at[:, None, None, None], frame(pictures.sensors)
-    ends = solid.vertices[[solid.edge(name).ends for name in places.names]]
-    near, far = (depth(ends[:, k], pictures.sensors, camera)[..., None] for k in (0, 1))
-    spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))
-    points = edge_points(solid, places.names, spatial)
-    pixel = (near + spatial * (far - near))[..., None] / camera.focal_px
-    steps = [0 * points, *(_STEP * pixel * axis[:, None, None] for axis in (axes.right, axes.down))]
-    rays = (points[..., None, :] + np.stack(steps, -2))[..., None, :] - at[..., None, :]
-    heights = solid.offsets[faces] - pictures.sensor_at @ solid.normals[faces].T
-    with np.errstate(all="ignore"):
-        reach = heights[:, None, None, None] / (rays[..., 0, :] @ solid.normals[faces].T)
-        met = at[..., None, :] + reach[..., None] * rays
-        values = np.nan_to_num(signal(pictures, met, solid.normals[faces], 4), posinf=0.0, neginf=0.0)
-    values = np.moveaxis(values, -2, -1)  # (N, E, support, F, 3)
-    fields = np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
-    return np.einsum("neas,nesfc->neafc", _interpolation(places.fractions), fields)
-
-
 def _interpolation(fractions: np.ndarray) -> np.ndarray:
     """Lagrange's weights of the values at `_SUPPORT`, one more axis."""
     apart = fractions[..., None] - _SUPPORT
@@ -180,16 +218,15 @@ def _interpolation(fractions: np.ndarray) -> np.ndarray:
     )
 
 
-def _looked_at(pictures: Pictures, index: tuple[np.ndarray, ...], nearest: np.ndarray) -> np.ndarray:
-    """Levels (P, 2) beside edges ``index[3]`` at fractions of their images, as the sensor sees them."""
+def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Levels (P, 2) beside edges ``other`` at fractions of their images, as the sensor sees them."""
     scene, solid = pictures.scene, pictures.scene.solid
-    sided, levels = _sided(solid), np.empty((index[0].size, 2))
-    for which in np.unique(index[3]):
-        edge, rows = solid.edges[which], np.flatnonzero(index[3] == which)
-        picture = index[0][rows]
-        near, far = (depth(solid.vertices[[end]], pictures.sensors, scene.camera)[picture, 0] for end in edge.ends)
+    sided, levels = _sided(solid), np.empty((other.size, 2))
+    for which in np.unique(other):
+        edge, rows = solid.edges[which], np.flatnonzero(other == which)
+        near, far = (depth(solid.vertices[[end]], pictures.sensors, scene.camera)[picture[rows], 0] for end in edge.ends)
         spatial = nearest[rows] * near / (far + nearest[rows] * (near - far))
-        alone = Pictures(scene, *_of_each(pictures, picture))
+        alone = Pictures(scene, *_of_each(pictures, picture[rows]))
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
         levels[rows] = found if sided[which, 0] == edge.faces[0] else found[:, ::-1]
     return levels

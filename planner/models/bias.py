@@ -29,7 +29,9 @@ _BLOCK = 256  # pictures at a time, so that their places stay in the processor's
 _FAR = 6.0  # standard deviations of the smoothed edge beyond which a boundary is not felt
 _STEPS = 5  # of Newton's method
 _LONGEST = 0.5  # px a step
+_SETTLED = 1e-6  # px
 NEGLIGIBLE = 0.3  # standard deviations of the measurand
+_FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
 
@@ -48,21 +50,16 @@ class Bias:
         Shift of start and end corner (x, y), ideal px; NaN for what is no corner.
     shares : ndarray, shape (..., E)
         What each edge adds to ``value``.
-    steepness : ndarray, shape (..., E)
-        Slope of the second derivative at the crossing over that of the lone step: the place along the edge where it is
-        farthest from 1. Errors by noise are divided by it. NaN where something is near that the model does not know.
+    disturbed : ndarray of bool, shape (..., E)
+        Edges of which neither bias nor variance are to be trusted: somewhere along them the crossing is far off, or
+        flatter or steeper than a lone step's, for errors by noise are divided by its slope; or an obstacle is near.
     """
 
     value: np.ndarray
     lines: np.ndarray
     corners: np.ndarray
     shares: np.ndarray
-    steepness: np.ndarray
-
-    @property
-    def disturbed(self) -> np.ndarray:
-        """Edges whose crossings something shares, so that neither bias nor variance are to be trusted, (..., E)."""
-        return ~(np.abs(self.steepness - 1) <= _STEEPER)
+    disturbed: np.ndarray
 
 
 def bias(pictures: Pictures) -> Bias:
@@ -108,12 +105,12 @@ def _bias(pictures: Pictures) -> Bias:
     start = mean - turn * nodes.middle[..., 0]
     shares = known.offset * start + known.tilt * turn
     lines = np.stack([start, start + turn * known.view.lengths], -1)
-    worst = np.take_along_axis(steepness, np.abs(steepness - 1).argmax(-1)[..., None], -1)[..., 0]
+    disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(offset) <= _FARTHEST)).all(-1)
     corners = _corners(pictures.scene, known.view, lines)
     value = shares.sum(-1)
     if pictures.scene.task.kind == "distance":
         value = np.linalg.norm(np.diff(known.points + corners, axis=-2)[..., 0, :], axis=-1) - known.value
-    return Bias(value, lines, corners, shares, worst)
+    return Bias(value, lines, corners, shares, disturbed)
 
 
 def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
@@ -151,9 +148,9 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
     blur = np.broadcast_to(edge_blur(nodes.blur), nodes.t.shape)[..., 1:-1].ravel()
     width = np.hypot(blur, scale)
     near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * float(width.max()))
-    step = np.zeros(width.size)
+    contrast = np.zeros(width.size)
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
-    step[near.place[near.own]] = levels[:, 1] - levels[:, 0]
+    contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
     cut_off = clipped(scene.noise, near, blur, scale)
     moved, slope = np.zeros(width.size), np.zeros(width.size)
     for _ in range(_STEPS):
@@ -161,8 +158,11 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
         value, slope = (np.bincount(near.place, part, width.size) for part in parts)
         if cut_off is not None:
             value, slope = (a + b for a, b in zip((value, slope), cut_off(moved), strict=True))
-        moved = moved - np.clip(value / slope, -_LONGEST, _LONGEST)
-    steepness = np.where(near.unknown, np.nan, -slope / step * (np.sqrt(2 * np.pi) * width**3))
+        step = np.clip(value / slope, -_LONGEST, _LONGEST)
+        moved = moved - step
+        if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
+            break
+    steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
     wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
     across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
     return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
