@@ -12,6 +12,8 @@ from measure.features.corners import corner_response
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, distance, separation
+from planner.features.measurand import measurand
+from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from scenes import Picture, Scene
 
@@ -24,6 +26,8 @@ class Propagated:
     ----------
     value_px : float
         Distance measured in the noise-free image, px.
+    bias_px : float
+        That less the model's distance, px.
     variance_px2 : float
         Variance of the distance, px^2; infinite where `status` says it cannot be measured.
     covariance : ndarray, shape (4, 4)
@@ -34,6 +38,7 @@ class Propagated:
     """
 
     value_px: float
+    bias_px: float
     variance_px2: float
     covariance: np.ndarray
     response: np.ndarray
@@ -77,6 +82,7 @@ def propagate(
         return _nothing(clean, status.ILL_CONDITIONED)
     return Propagated(
         float(found.value_px),
+        float(found.value_px - measurand(Pictures.of(picture)).value),
         float(noise @ (g * g)),
         (noise * ends) @ ends.T,
         g.reshape(clean.shape),
@@ -85,4 +91,4 @@ def propagate(
 
 
 def _nothing(clean: np.ndarray, state: str) -> Propagated:
-    return Propagated(float("nan"), float("inf"), np.full((4, 4), np.inf), np.zeros(clean.shape), state)
+    return Propagated(float("nan"), float("nan"), float("inf"), np.full((4, 4), np.inf), np.zeros(clean.shape), state)

@@ -68,8 +68,8 @@ class Prediction:
     edges : tuple of EdgePrediction
         The straight edges.
     status : str
-        ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias is
-        above 0.3 standard deviations, or another edge is too near for it to be trusted; not said of the ``bound``.
+        ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
+        is above 0.3 standard deviations, or something too near for it to be trusted; not said of the ``bound``.
     """
 
     model: str
@@ -179,7 +179,11 @@ def predict(
     biased, off, clutter = _of_locator(pictures, model)
     edges = tuple(
         EdgePrediction(
-            name, float(length), float(step), _edge_status(noise, seen, whole, usable, step, crowded), tuple(line.tolist())
+            name,
+            float(length),
+            float(step),
+            _edge_status(noise, seen, whole, usable, step, crowded),
+            tuple(line.tolist()),
         )
         for name, length, whole, usable, step, noise, seen, crowded, line in zip(
             known.view.names,
@@ -210,7 +214,7 @@ def predict(
 
 
 def _of_locator(pictures: Pictures, model: str) -> tuple[float, np.ndarray, np.ndarray]:
-    """Bias of the measurand and of the lines (E, 2), and which edges are cluttered (E,), as far as the model has any."""
+    """Bias of the measurand and of the lines (E, 2), and which edges are cluttered (E,)."""
     if model == "bound":
         edges = len(measurand(pictures).view.names)
         return 0.0, np.zeros((edges, 2)), np.zeros(edges, bool)

@@ -46,8 +46,8 @@ def sampled_line(middle, tangent, length, blur_px: float, scale: float) -> tuple
 def _amplitudes(blur_px: float, scale: float) -> np.ndarray:
     """Largest shift, px, of the crossing by one of `_ORDERS` for the cosines of `_TABLE`; its sine goes with the phase.
 
-    The step's spectrum is 1 / (i w) times that of the lens' blur and of the pixel's box; the locator's is -(k . n)^2 exp(-s^2
-    k^2 / 2) at k = w n + 2 pi m. The pole at w = 0 is left out evenly on both sides.
+    The step's spectrum is 1 / (i w) times that of the lens' blur and of the pixel's box; the locator's, at
+    k = w n + 2 pi m, is -(k . n)^2 exp(-s^2 k^2 / 2). The pole at w = 0 is left out evenly on both sides.
     """
     spacing = 0.2 / max(scale, 1.0)
     w = spacing * (np.arange(int((2 * np.pi + 8 / scale) / spacing)) + 0.5)

@@ -76,7 +76,7 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
     In a plain scene a side's level is its face's, or darkness; else it is what `side_signals` says at the nearest point
     of the edge. Edges of obstacles, and of shadows on other faces or the floor, are not among them.
     """
-    solid, bodies = pictures.scene.solid, pictures.scene.bodies
+    solid = pictures.scene.solid
     pairs = _pairs(pictures, places, far)
     start, along = _seen_from(pictures, places, pairs)
     length = np.linalg.norm(along, axis=-1)
@@ -86,7 +86,9 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
         apart = unit[..., 0] * start[..., 1] - unit[..., 1] * start[..., 0]
         near = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0)) < far
     picture, edge, other = pairs
-    place = np.ravel_multi_index((picture, edge), places.fractions.shape[:2])[:, None] * near.shape[1] + np.arange(near.shape[1])
+    place = np.ravel_multi_index((picture, edge), places.fractions.shape[:2])[:, None] * near.shape[1] + np.arange(
+        near.shape[1]
+    )
     ours = other < len(solid.edges)
     unknown = np.zeros(places.fractions.size, bool)
     unknown[place[near & ~ours[:, None]]] = True
@@ -178,9 +180,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     of_each = Pictures(scene, *_of_each(pictures, picture))
     at, axes = of_each.sensor_at[:, None], frame(of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
-    near, far = (
-        depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1)
-    )
+    near, far = (depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
     spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))
     start, stop = (solid.vertices[ends[edge, k]][:, None] for k in (0, 1))
     points = start + spatial[..., None] * (stop - start)
@@ -213,9 +213,7 @@ def _interpolation(fractions: np.ndarray) -> np.ndarray:
     """Lagrange's weights of the values at `_SUPPORT`, one more axis."""
     apart = fractions[..., None] - _SUPPORT
     others = ~np.eye(_SUPPORT.size, dtype=bool)
-    return np.stack(
-        [(apart[..., o] / (s - _SUPPORT[o])).prod(-1) for s, o in zip(_SUPPORT, others, strict=True)], -1
-    )
+    return np.stack([(apart[..., o] / (s - _SUPPORT[o])).prod(-1) for s, o in zip(_SUPPORT, others, strict=True)], -1)
 
 
 def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
@@ -224,7 +222,9 @@ def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, neare
     sided, levels = _sided(solid), np.empty((other.size, 2))
     for which in np.unique(other):
         edge, rows = solid.edges[which], np.flatnonzero(other == which)
-        near, far = (depth(solid.vertices[[end]], pictures.sensors, scene.camera)[picture[rows], 0] for end in edge.ends)
+        near, far = (
+            depth(solid.vertices[[end]], pictures.sensors, scene.camera)[picture[rows], 0] for end in edge.ends
+        )
         spatial = nearest[rows] * near / (far + nearest[rows] * (near - far))
         alone = Pictures(scene, *_of_each(pictures, picture[rows]))
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
