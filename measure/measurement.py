@@ -16,7 +16,7 @@ from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
 
 DEFAULT_ESTIMATOR = "gradient"
-_PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
+PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
@@ -109,8 +109,8 @@ def distance(
 def _check_known(picture: Picture, estimator: str) -> None:
     if not picture.lights:
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
-    if estimator not in _PREDICTED:
-        raise InvalidInput(f"estimator must be one of {', '.join(_PREDICTED)} to correct the bias, got {estimator!r}")
+    if estimator not in PREDICTED:
+        raise InvalidInput(f"estimator must be one of {', '.join(PREDICTED)} to correct the bias, got {estimator!r}")
 
 
 def _corrected(found: Measurement, picture: Picture) -> Measurement:

@@ -137,9 +137,14 @@ def _seen_from(pictures: Pictures, places: Places, pairs) -> tuple[np.ndarray, n
     ends = np.array([edge.ends for edge in bodies.edges])[other]
     first, last, start, stop = (images[picture, end][:, None] for end in (*own.T, *ends.T))
     here = first + places.fractions[picture, edge][..., None] * (last - first)
-    turn = places.axes @ places.lens
-    start, along = ((turn[picture, edge] @ v[..., None])[..., 0] for v in (start - here, stop - start + 0 * here))
-    return start, along
+    turn = (places.axes @ places.lens)[picture, edge]
+    return _turned(turn, start - here), _turned(turn, stop - start)
+
+
+def _turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Products of (..., 2, 2) and (..., 2)."""
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([matrices[..., i, 0] * x + matrices[..., i, 1] * y for i in (0, 1)], -1)
 
 
 def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other: np.ndarray, nearest: np.ndarray):
@@ -154,7 +159,7 @@ def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other
     turn = places.axes[at]
     if pictures.scene.camera.lens.bends:
         turn = turn @ np.swapaxes(np.linalg.inv(places.lens[at]), -1, -2)
-    gradients = (turn[:, None] @ found[..., 1:, None])[..., 0]
+    gradients = _turned(turn[:, None], found[..., 1:])
     if is_plain(pictures.scene):
         return found[..., 0], gradients
     levels = _looked_at(pictures, picture, other, nearest)

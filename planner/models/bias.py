@@ -14,7 +14,7 @@ import numpy as np
 from planner.features.locator import edge_blur
 from planner.features.measurand import corner_response, measurand, normals
 from planner.features.sampling import sampled_line
-from planner.imaging.blurred_segment import second_and_third
+from planner.imaging.blurred_segment import Segments, second_and_third
 from planner.imaging.boundaries import Places, boundaries_near
 from planner.imaging.clipped_step import clipped
 from planner.imaging.lens import lens_jacobian
@@ -29,8 +29,9 @@ _BLOCK = 256  # pictures at a time, so that their places stay in the processor's
 _FAR = 6.0  # standard deviations of the smoothed edge beyond which a boundary is not felt
 _STEPS = 5  # of Newton's method
 _LONGEST = 0.5  # px a step
-_SETTLED = 1e-6  # px
-NEGLIGIBLE = 0.3  # standard deviations of the measurand
+_SETTLED = 1e-4  # px: the next step would be its square
+MOST = 0.3  # standard deviations of the measurand: the largest bias of what is `ok`
+_NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
 _FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
@@ -70,11 +71,11 @@ def bias(pictures: Pictures) -> Bias:
 def cluttered(pictures: Pictures) -> np.ndarray:
     """Which edges have the status ``clutter``, bool, shape (..., E): the one rule of planner and measurement.
 
-    What lies around the edge disturbs its crossings, or the measurand's bias is above `NEGLIGIBLE` and the edge's share
-    in it is no less than an equal one.
+    What lies around the edge disturbs its crossings, or the measurand's bias is above a quarter of its standard
+    deviation and the edge's share in it is no less than an equal one.
     """
     found = bias(pictures)
-    limit = NEGLIGIBLE * np.sqrt(calibrated(pictures).variance)
+    limit = _NEGLIGIBLE * np.sqrt(calibrated(pictures).variance)
     with np.errstate(invalid="ignore"):
         biased = np.abs(found.value) > limit
         large = np.abs(found.shares) >= limit[..., None] / max(found.shares.shape[-1], 1)
@@ -152,15 +153,19 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
     contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
     cut_off = clipped(scene.noise, near, blur, scale)
-    moved, slope = np.zeros(width.size), np.zeros(width.size)
+    moved, slope, live = np.zeros(width.size), np.zeros(width.size), np.ones(width.size, bool)
     for _ in range(_STEPS):
-        parts = second_and_third(near.segments, moved[near.place], width[near.place])
-        value, slope = (np.bincount(near.place, part, width.size) for part in parts)
+        rows = np.flatnonzero(live[near.place])
+        place = near.place[rows]
+        parts = second_and_third(Segments(*(part[rows] for part in near.segments)), moved[place], width[place])
+        value, steep = (np.bincount(place, part, width.size) for part in parts)
         if cut_off is not None:
-            value, slope = (a + b for a, b in zip((value, slope), cut_off(moved), strict=True))
-        step = np.clip(value / slope, -_LONGEST, _LONGEST)
+            value, steep = (a + b for a, b in zip((value, steep), cut_off(moved), strict=True))
+        slope[live] = steep[live]
+        step = np.where(live, np.clip(value / steep, -_LONGEST, _LONGEST), 0.0)
         moved = moved - step
-        if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
+        live = np.abs(step) > _SETTLED
+        if not live.any():
             break
     steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
     wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)

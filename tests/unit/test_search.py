@@ -119,7 +119,7 @@ def test_plan_is_not_worse_than_anything_it_met(task1):
     assert found.variance <= found.grid_variance <= min(c.variance_object for c in found.candidates) * (1 + 1e-12)
     assert found.gap >= 0
     assert found.trace[-1].variance == pytest.approx(found.grid_variance * (1 + found.gap))
-    assert found.prediction.status == "ok"
+    assert found.prediction.status in ("ok", "clutter")
 
 
 def test_best_edges_are_at_least_as_good(task1):
