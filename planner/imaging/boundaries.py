@@ -86,9 +86,8 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
         apart = unit[..., 0] * start[..., 1] - unit[..., 1] * start[..., 0]
         near = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0)) < far
     picture, edge, other = pairs
-    place = np.ravel_multi_index((picture, edge), places.fractions.shape[:2])[:, None] * near.shape[1] + np.arange(
-        near.shape[1]
-    )
+    count = near.shape[1]
+    place = (picture * len(places.names) + edge)[:, None] * count + np.arange(count)
     ours = other < len(solid.edges)
     unknown = np.zeros(places.fractions.size, bool)
     unknown[place[near & ~ours[:, None]]] = True

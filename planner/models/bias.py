@@ -7,6 +7,7 @@ and with it the line through the crossings and the measurand.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -15,7 +16,7 @@ from planner.features.locator import edge_blur
 from planner.features.measurand import corner_response, measurand, normals
 from planner.features.sampling import sampled_line
 from planner.imaging.blurred_segment import Segments, second_and_third
-from planner.imaging.boundaries import Places, boundaries_near
+from planner.imaging.boundaries import Boundaries, Places, boundaries_near
 from planner.imaging.clipped_step import clipped
 from planner.imaging.lens import lens_jacobian
 from planner.imaging.lens import recorded as recorded_at
@@ -148,11 +149,19 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
     shape, scale = fractions.shape, scene.locator.scale_px
     blur = np.broadcast_to(edge_blur(nodes.blur), nodes.t.shape)[..., 1:-1].ravel()
     width = np.hypot(blur, scale)
-    near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * float(width.max()))
+    near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * float(np.nanmax(width, initial=0.0)))
     contrast = np.zeros(width.size)
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
     contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
-    cut_off = clipped(scene.noise, near, blur, scale)
+    moved, slope = _zero(near, width, clipped(scene.noise, near, blur, scale))
+    steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
+    wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
+    across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
+    return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
+
+
+def _zero(near: Boundaries, width: np.ndarray, cut_off: Callable | None) -> tuple[np.ndarray, np.ndarray]:
+    """By Newton's method the move (M,), px, at which each place's second derivative is 0, and its slope there."""
     moved, slope, live = np.zeros(width.size), np.zeros(width.size), np.ones(width.size, bool)
     for _ in range(_STEPS):
         rows = np.flatnonzero(live[near.place])
@@ -167,10 +176,7 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
         live = np.abs(step) > _SETTLED
         if not live.any():
             break
-    steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
-    wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
-    across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
-    return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
+    return moved, slope
 
 
 def _places(pictures: Pictures, fractions: np.ndarray, normal: np.ndarray) -> Places:
