@@ -14,7 +14,8 @@ from planner.imaging.appearance import is_plain, side_signals, signal
 from planner.imaging.blurred_segment import Segments
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, edge_points, facing, frame, from_axis
-from scenes import Solid
+from planner.imaging.visibility import seen as visible_at
+from scenes import Edge, Solid
 
 _MAGNIFIED = 2.0  # by a lens that bends, at most, where boundaries are looked for
 _STEP = 0.01  # px; levels are differentiated forwards
@@ -70,8 +71,10 @@ class Boundaries:
     unknown: np.ndarray
 
 
-def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundaries:
+def boundaries_near(pictures: Pictures, places: Places, far: float, close: float) -> Boundaries:
     """The visible edges of the object within ``far`` px of places, in pictures with one leading axis.
+
+    Edges of obstacles make a place ``unknown`` where they are within ``close`` px.
 
     In a plain scene a side's level is its face's, or darkness; else it is what `side_signals` says at the nearest point
     of the edge. Edges of obstacles, and of shadows on other faces or the floor, are not among them.
@@ -84,14 +87,16 @@ def boundaries_near(pictures: Pictures, places: Places, far: float) -> Boundarie
         unit = along / length[..., None]
         foot = -(start * unit).sum(-1)
         apart = unit[..., 0] * start[..., 1] - unit[..., 1] * start[..., 0]
-        near = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0)) < far
+        distance = np.hypot(apart, np.maximum(np.maximum(-foot, foot - length), 0.0))
     picture, edge, other = pairs
-    count = near.shape[1]
+    count = distance.shape[1]
     place = (picture * len(places.names) + edge)[:, None] * count + np.arange(count)
     ours = other < len(solid.edges)
     unknown = np.zeros(places.fractions.size, bool)
-    unknown[place[near & ~ours[:, None]]] = True
-    pair, which = np.nonzero(near & ours[:, None])
+    pair, which = np.nonzero((distance < close) & ~ours[:, None])
+    nearest = np.clip(foot[pair, which] / length[pair, which], 0, 1)
+    unknown[place[pair, which][_shown(pictures, picture[pair], other[pair], nearest)]] = True
+    pair, which = np.nonzero((distance < far) & ours[:, None])
     unit, foot, apart, length = unit[pair, which], foot[pair, which], apart[pair, which], length[pair, which]
     at = picture[pair], edge[pair], which
     sides, gradients = _sides(pictures, places, at, other[pair], np.clip(foot / length, 0, 1))
@@ -226,14 +231,27 @@ def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, neare
     sided, levels = _sided(solid), np.empty((other.size, 2))
     for which in np.unique(other):
         edge, rows = solid.edges[which], np.flatnonzero(other == which)
-        near, far = (
-            depth(solid.vertices[[end]], pictures.sensors, scene.camera)[picture[rows], 0] for end in edge.ends
-        )
-        spatial = nearest[rows] * near / (far + nearest[rows] * (near - far))
+        spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
         alone = Pictures(scene, *_of_each(pictures, picture[rows]))
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
         levels[rows] = found if sided[which, 0] == edge.faces[0] else found[:, ::-1]
     return levels
+
+
+def _shown(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees edges ``other`` of the bodies at fractions of their images, bool (P,)."""
+    bodies, found = pictures.scene.bodies, np.zeros(other.size, bool)
+    for which in np.unique(other):
+        edge, rows = bodies.edges[which], np.flatnonzero(other == which)
+        spatial = _in_space(pictures, bodies, edge, picture[rows], nearest[rows])
+        found[rows] = visible_at(bodies, edge, pictures.sensor_at[picture[rows]], spatial[:, None])[:, 0]
+    return found
+
+
+def _in_space(pictures: Pictures, solid: Solid, edge: Edge, picture: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """Fractions (P,) of an edge's length in space from those of its image's."""
+    near, far = (depth(solid.vertices[[end]], pictures.sensors, pictures.scene.camera)[picture, 0] for end in edge.ends)
+    return fractions * near / (far + fractions * (near - far))
 
 
 def _of_each(pictures: Pictures, picture: np.ndarray):

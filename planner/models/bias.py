@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from planner.features.locator import edge_blur
+from planner.features.locator import CLEARANCE, edge_blur
 from planner.features.measurand import corner_response, measurand, normals
 from planner.features.sampling import sampled_line
 from planner.imaging.blurred_segment import Segments, second_and_third
@@ -149,7 +149,8 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
     shape, scale = fractions.shape, scene.locator.scale_px
     blur = np.broadcast_to(edge_blur(nodes.blur), nodes.t.shape)[..., 1:-1].ravel()
     width = np.hypot(blur, scale)
-    near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * float(np.nanmax(width, initial=0.0)))
+    widest = float(np.nanmax(width, initial=0.0))
+    near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * widest, CLEARANCE * widest)
     contrast = np.zeros(width.size)
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
     contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
