@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,12 @@ from measure import status
 from measure.estimators.registry import SYNONYMS
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
+from planner.imaging.pictures import Pictures
+from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
 
 DEFAULT_ESTIMATOR = "gradient"
+PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
@@ -32,6 +35,8 @@ class Measurement:
     status : ndarray of str, shape (...)
         ``ok``, ``clutter``, ``misfit``, ``ambiguous``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or
         ``ill_conditioned``.
+    bias_px : ndarray, shape (...)
+        Predicted bias that has been subtracted from the distance, px; 0 where none was asked for.
     corners : ndarray, shape (..., 2, 2)
         Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
     covariance : ndarray, shape (..., 4, 4)
@@ -50,6 +55,7 @@ class Measurement:
     value_px: np.ndarray
     variance_px2: np.ndarray
     status: np.ndarray
+    bias_px: np.ndarray
     corners: np.ndarray
     covariance: np.ndarray
     edge_names: tuple[str, ...]
@@ -67,6 +73,8 @@ def distance(
     light: Any = None,
     estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
+    *,
+    correct_bias: bool = False,
 ) -> Measurement:
     """Measure the task's distance.
 
@@ -88,14 +96,46 @@ def distance(
     threshold : float, optional
         Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given. ``low_contrast`` where
         noise decides whether more than a tenth of an edge passes it.
+    correct_bias : bool
+        Subtract the bias that the planner predicts from corners and distance (``gradient`` and ``canny``, the light
+        being known). What was ``clutter`` for its bias is then ``ok``; where the bias is not to be trusted nothing is
+        subtracted, and ``clutter`` stays.
 
     Raises
     ------
     InvalidInput
         If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
     """
-    (found,) = distances(image, Picture.of(scene, sensor, light), ((estimator, threshold),))
-    return found
+    picture = Picture.of(scene, sensor, light)
+    if correct_bias:
+        _check_known(picture, estimator)
+    (found,) = distances(image, picture, ((estimator, threshold),))
+    return _corrected(found, picture) if correct_bias else found
+
+
+def _check_known(picture: Picture, estimator: str) -> None:
+    if not picture.lights:
+        raise InvalidInput("light must be a pose to correct the bias, got nothing")
+    if estimator not in PREDICTED:
+        raise InvalidInput(f"estimator must be one of {', '.join(PREDICTED)} to correct the bias, got {estimator!r}")
+
+
+def _corrected(found: Measurement, picture: Picture) -> Measurement:
+    """With the predicted bias subtracted, unless it is not to be trusted."""
+    predicted = bias(Pictures.of(picture))
+    if predicted.disturbed.any():
+        return found
+    corners = found.corners - predicted.corners
+    value = separation(corners.reshape(-1, 2, 2))[0].reshape(found.value_px.shape)
+    value = np.where(np.isnan(found.value_px), np.nan, value)
+    return replace(
+        found,
+        value_px=value,
+        bias_px=np.nan_to_num(found.value_px - value),
+        corners=corners,
+        status=np.where(found.status == status.CLUTTER, status.OK, found.status),
+        edge_status=np.where(found.edge_status == status.CLUTTER, status.OK, found.edge_status),
+    )
 
 
 def distances(
@@ -156,6 +196,7 @@ def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> di
         "value_px": np.where(measured, value, np.nan),
         "variance_px2": variance,
         "status": shape.status,
+        "bias_px": np.zeros(len(value)),
         "corners": shape.corners,
         "covariance": shape.covariance,
         "edge_status": shape.edge_status,

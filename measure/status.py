@@ -1,7 +1,7 @@
 """What a measurement can say of itself. Only those in `MEASURED` come with a value."""
 
 OK = "ok"
-CLUTTER = "clutter"  # a second edge is too near: the value may be biased
+CLUTTER = "clutter"  # what lies around an edge (another edge, shading, the end of the scale) biases the value
 SHORT = "short"  # too little of an edge is left to fit a line
 LOW_CONTRAST = "low_contrast"  # too little of the edge stands out of the noise
 SIGN_CHANGE = "sign_change"  # the contrast changes sign along the edge

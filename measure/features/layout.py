@@ -16,6 +16,7 @@ from planner.imaging.arrangement import Arrangement, arrangement_of, polygon_arr
 from planner.imaging.lens import signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
+from planner.models.bias import cluttered
 from scenes import Corner, InvalidInput, Picture, Scene
 
 BACKGROUND = -1
@@ -54,6 +55,8 @@ class Layout:
         Signed radius of the circle of confusion at both ends of each edge, px; it changes linearly in between.
     arrangement : Arrangement, optional
         All that is seen around the edges; None where things hide or shade each other.
+    clutter : ndarray of bool, shape (E,), optional
+        Where the light is known, for which edges the planner predicts ``clutter`` of the classic locators.
     """
 
     names: tuple[str, ...]
@@ -71,6 +74,7 @@ class Layout:
     optics: Optics
     defocus: np.ndarray
     arrangement: Arrangement | None = None
+    clutter: np.ndarray | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -167,6 +171,7 @@ def layout_of(picture: Picture) -> Layout:
     points = project_ideal(solid.vertices, pose, scene.camera)
     seen = facing(solid, pictures.sensor_at)
     shadings = face_shadings(pictures) if picture.lights else [None] * len(solid.faces)
+    turned = [edge for edge in solid.edges if seen[list(edge.faces)].any()]  # trimmed for whatever the light may be
     if any(shadings):
         seen = seen & np.array([shading is not None for shading in shadings])
     required = [solid.edge(name) for name in view.names]
@@ -184,7 +189,7 @@ def layout_of(picture: Picture) -> Layout:
         shown=view.shown,
         corners=tuple(tuple(names.index(name) for name in corner.edges) for corner in scene.task.corners),
         joints=_joints([edge.ends for edge in required]),
-        beside=tuple(tuple(_away(points, edge, end, shown) for end in (0, 1)) for edge in required),
+        beside=tuple(tuple(_away(points, edge, end, turned) for end in (0, 1)) for edge in required),
         apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),
         others=_segments(points, [e for e in shown if e not in required]),
         faces=faces,
@@ -193,6 +198,7 @@ def layout_of(picture: Picture) -> Layout:
         optics=Optics.of(scene),
         defocus=_defocus(scene, pose, required),
         arrangement=arrangement_of(pictures) if is_plain(scene) else None,
+        clutter=cluttered(pictures) if picture.lights else None,
     )
 
 

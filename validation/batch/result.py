@@ -42,13 +42,15 @@ class Judged:
 class Row:
     """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
 
-    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
+    ``value_px`` is the model's distance and ``predicted_bias`` what the classic locators add to it without noise, px;
+    ``parameters`` are the values that a campaign gave to keys of the scene.
     """
 
     index: int
     scene: str
     parameters: dict[str, Any]
     value_px: float
+    predicted_bias: float
     sensor: tuple[float, float]
     light: tuple[float, float]
     paper_ice: float | None
@@ -165,6 +167,7 @@ def _row(case: Case, scale: float | None, store: RunFile) -> Row:
         scene=case.scene.name,
         parameters=case.parameters,
         value_px=model["value_px"],
+        predicted_bias=model["predicted_bias"],
         sensor=tuple(setting.sensor),
         light=tuple(setting.light),
         paper_ice=setting.paper_ice,
@@ -245,6 +248,7 @@ def _row_json(row: Row) -> dict[str, Any]:
         "paper_ice": row.paper_ice,
         "paper_real": row.paper_real,
         "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
+        "predicted_bias": row.predicted_bias,
         **main,
         "bound": row.bound,
         "classic": [asdict(judged) for judged in row.classic],

@@ -59,7 +59,7 @@ def _line(row: Row) -> dict[str, object]:
         "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
         "light_polar": row.light[0], "light_azimuth": row.light[1],
         "paper_ice": row.paper_ice, "paper_real_12": real[0], "paper_real_10": real[1],
-        "our_ice": row.paper, "calibrated": row.calibrated, "bound": row.bound,
+        "our_ice": row.paper, "calibrated": row.calibrated, "bound": row.bound, "predicted_bias_px": row.predicted_bias,
     }  # fmt: skip
     for judged in (row.main, *row.classic):
         line |= {f"{judged.method}_{key}": value for key, value in _judged(judged).items()}

@@ -13,7 +13,7 @@ from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.report import diagnostics, figures
-from validation.report.table import failed, far, names, number, ratio, small
+from validation.report.table import failed, far, names, number, ratio, shift, small
 
 _ROWS = 64  # rows of the table of settings without a result
 
@@ -97,11 +97,19 @@ def _key(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found)
-    columns = [*key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px", "status"]
+    columns = [
+        *key,
+        f"{rows[0].main.method}: measured / predicted [95 %]",
+        "images",
+        "failed",
+        "bias, px: predicted",
+        "measured",
+        "status",
+    ]
     lines = [
         [
             *cells[row.index], ratio(row.main), str(row.main.n), failed(row),
-            "-" if row.main.bias is None else f"{row.main.bias:+.4f}", row.main.status,
+            shift(row.predicted_bias), shift(row.main.bias), row.main.status,
         ]
         for row in rows
     ]  # fmt: skip
