@@ -69,7 +69,7 @@ class Prediction:
         The straight edges.
     status : str
         ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
-        is above 0.3 standard deviations, or something too near for it to be trusted; not said of the ``bound``.
+        is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
     """
 
     model: str

@@ -15,14 +15,15 @@ _BEYOND = 0.05  # part of them that may leave the expansion's range
 _OFF = 0.1  # standard deviations by which they have left it
 _BIAS = 0.2  # standard deviations: a larger mean error is no linear effect of the noise
 _APART = 0.3  # standard deviations between full and linear errors, root mean square
-HELD = 1.1  # ratio of variances above which they differ
+_ALIKE = 1.1  # ratio of variances, full and to first order, up to which they are alike
+_KNOWN = 1.25  # ratio of variances, where the other vertices are known and where not, up to which an image tells enough
 
 
 def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
     """Whether an image tells what is measured, and the errors are linear in its noise.
 
     What is measured is the distance of two corners, or all coordinates of any other number of them. Knowledge of where
-    the other vertices are must not decide: without it the variance may be `HELD` times as large.
+    the other vertices are must not decide: without it the variance may be a quarter larger.
     """
     index = tool.index(tool.arrangement.corners)
     rows = _directions(centre.state.vertices[tool.arrangement.corners])
@@ -30,13 +31,13 @@ def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
         np.einsum("ki,ij,kj->k", rows, whole[np.ix_(index, index)], rows)
         for whole in (centre.covariance, tool.wherever(centre))
     )
-    if not np.isfinite(here).all() or (wherever > HELD * here).any():
+    if not np.isfinite(here).all() or (wherever > _KNOWN * here).any():
         return False
     linear, full = _drawn(tool, centre, index, rows)
     spread, apart = linear.std(0), full - linear
     unbiased = np.abs(apart.mean(0)) <= _BIAS * spread
     near = np.sqrt((apart**2).mean(0)) <= _APART * spread
-    alike = np.abs(np.log(full.var(0) / linear.var(0))) <= np.log(HELD)
+    alike = np.abs(np.log(full.var(0) / linear.var(0))) <= np.log(_ALIKE)
     return bool((unbiased & near & alike).all())
 
 

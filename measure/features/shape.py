@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +16,7 @@ from measure.features.arranged import find_arranged
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout
+from measure.goodness import WORST
 
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
@@ -46,7 +48,16 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     tool = prepared(layout, name, threshold)
     if isinstance(tool, ArrangementEstimator):
         return find_arranged(images, layout, tool)
-    return _find(images, layout, name, threshold, _PASSES)
+    found = _find(images, layout, name, threshold, _PASSES)
+    return _judged(found, images, layout) if name == "strip" and layout.arrangement else found
+
+
+def _judged(found: Shape, images: np.ndarray, layout: Layout) -> Shape:
+    """With the goodness of fit of the whole picture: a strip by itself has too few pixels to tell."""
+    whole = find_arranged(images, layout, prepared(layout, "arrangement", 1.0))
+    fits = np.where(whole.p_value < WORST, status.MISFIT, status.OK)
+    state = np.array([status.worst(*pair) for pair in zip(found.status, fits, strict=True)])
+    return replace(found, status=state, p_value=whole.p_value)
 
 
 def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passes: int) -> Shape:

@@ -107,7 +107,8 @@ def judge(rows: list[Row]) -> dict[str, float | bool]:
         "rows": len(rows), "ok": len(good), "ok of fine": sum(f.status == "ok" for f in fine) / max(len(fine), 1),
         "lost images": sum(found.failed for found in good), "median of the bound": float(np.median(ratio)),
         "95 % of the bound": float(np.quantile(ratio, 0.95)), "least of the bound": float(ratio.min()),
-        "empirical / predicted": pooled / sum(found.count - 1 for found in good), "KS": kstest(probability, "uniform").pvalue,
+        "empirical / predicted": pooled / sum(found.count - 1 for found in good),
+        "KS": kstest(probability, "uniform").pvalue,
         "least p": float(probability.min()), "Sidak": sidak, "bias within 0.3": float(np.mean(bias < 0.3)),
         "largest bias": float(bias.max()),
     }  # fmt: skip
@@ -131,9 +132,10 @@ def study(kind: str, count: int, images: int, seed: int, show: bool = True) -> l
         if show:
             ratio = found.empirical / found.predicted
             print(
-                f"{number:4d} s({found.sensor[0]:.1f},{found.sensor[1]:.1f}) l({found.light[0]:.1f},{found.light[1]:.1f})"
-                f" {found.status:15s} lost {found.failed:3d} R {ratio:.3f} told/bound {found.predicted / found.bound:.3f}"
-                f" bound {np.sqrt(found.bound):.4f} px bias {found.bias:+.2f}",
+                f"{number:4d} s({found.sensor[0]:.1f},{found.sensor[1]:.1f})"
+                f" l({found.light[0]:.1f},{found.light[1]:.1f}) {found.status:15s} lost {found.failed:3d} R {ratio:.3f}"
+                f" told/bound {found.predicted / found.bound:.3f} bound {np.sqrt(found.bound):.4f} px"
+                f" bias {found.bias:+.2f}",
                 flush=True,
             )
     return rows
