@@ -39,7 +39,7 @@ def test_validate_json_files_and_pictures(short_scene, tmp_path):
     again = ice("validate", short_scene, "--renders", 200, "--workers", 1, "--out", tmp_path / "out")
     assert again.returncode == 0
     assert "Table 3" in again.stdout
-    assert document["verdict"]["text"].split(":")[0] in " ".join(again.stdout.split())
+    assert document["verdict"].split(";")[0] in " ".join(again.stdout.split())
 
 
 def test_render_then_measure(tmp_path):

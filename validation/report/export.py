@@ -70,5 +70,6 @@ def _judged(judged: Judged) -> dict[str, object]:
     low, high = judged.ratio_interval or (None, None)
     return {
         "propagated": judged.propagated, "empirical": judged.empirical, "n": judged.n, "failed": judged.failed,
-        "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias, "status": judged.status,
+        "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
+        "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
     }  # fmt: skip

@@ -13,9 +13,11 @@ from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.report import diagnostics, figures
-from validation.report.table import failed, far, names, number, ratio, small
+from validation.report.table import errors, failed, far, names, number, ratio, small
+from validation.statistics import ALLOWANCE, LEVEL, Verdict
 
 _ROWS = 64  # rows of the table of settings without a result
+_ERRORS = "bias, px", "rmse, px"
 
 
 @dataclass(frozen=True)
@@ -97,15 +99,18 @@ def _key(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found)
-    columns = [*key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px", "status"]
+    columns = [*key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", *_ERRORS, "status"]
     lines = [
         [
-            *cells[row.index], ratio(row.main), str(row.main.n), failed(row),
-            "-" if row.main.bias is None else f"{row.main.bias:+.4f}", row.main.status,
+            *cells[row.index], ratio(row.main), str(row.main.n), failed(row), *errors(row.main), row.main.status,
         ]
         for row in rows
     ]  # fmt: skip
-    note = "* : 1 lies outside the chi-square interval. failed: one number for each estimator. " + which
+    note = (
+        "* : 1 lies outside the chi-square interval. failed: one number for each estimator. "
+        "rmse: root mean square error, sqrt(variance + bias^2). "
+    )
+    note += which
     return Table("Measured over predicted variance, by setting", columns, lines, note)
 
 
@@ -135,12 +140,32 @@ def _variances(found: Validation) -> Table:
 def _estimators(found: Validation) -> Table:
     main = found.rows[0].main.method
     verdicts = {f"{main} (the verdict's)": found.verdict, **found.classic_verdicts}
-    rows = [
-        [name, f"{v.inside} of {v.rows}", f"{v.smallest_p:.2g}", f"{v.limit:.2g}", "yes" if v.agrees else "no"]
-        for name, v in verdicts.items()
-    ]
-    columns = ["estimator", "rows inside 95 %", "smallest p-value", "limit (Sidak)", "as predicted"]
-    return Table("Verdict on each estimator", columns, rows)
+    columns = [
+        "estimator", "rows inside 95 %", "smallest p-value", "limit", "pooled ratio [95 %]", "p-value", "limit",
+        "largest bias, sigma", "p-value", "limit", "not measured", "as predicted",
+    ]  # fmt: skip
+    note = (
+        f"A row's variance (chi-square, Sidak over the rows), that of all rows pooled, and the mean error of rows that "
+        f"are ok, of which {ALLOWANCE:g} sigma of one image is allowed; a method whose rows mostly could not be "
+        f"measured is not as predicted. The three tests share a level of {LEVEL:g} (Bonferroni)."
+    )
+    return Table("Verdict on each estimator", columns, [[name, *_tests(v)] for name, v in verdicts.items()], note)
+
+
+def _tests(found: Verdict) -> list[str]:
+    """Cells of a verdict, in the order of its tests."""
+    pooled = bias = ["-"] * 3
+    if found.pooled:
+        low, high = found.pooled.interval
+        pooled = [
+            f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]",
+            f"{found.pooled.p_value:.2g}",
+            f"{found.pooled.limit:.2g}",
+        ]
+    if found.bias:
+        bias = [f"{found.bias.largest:.2f}", f"{found.bias.smallest_p:.2g}", f"{found.bias.limit:.2g}"]
+    rows = f"{found.inside} of {found.rows}", f"{found.smallest_p:.2g}", f"{found.limit:.2g}"
+    return [*rows, *pooled, *bias, str(found.not_measured), "yes" if found.agrees else "no"]
 
 
 def _effects(store: RunFile) -> Table:
