@@ -157,15 +157,15 @@ def _tests(found: Verdict) -> list[str]:
     pooled = bias = ["-"] * 3
     if found.pooled:
         low, high = found.pooled.interval
-        pooled = [
-            f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]",
-            f"{found.pooled.p_value:.2g}",
-            f"{found.pooled.limit:.2g}",
-        ]
+        pooled = [f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]", *_level(found.pooled.p_value, found.pooled.limit)]
     if found.bias:
-        bias = [f"{found.bias.largest:.2f}", f"{found.bias.smallest_p:.2g}", f"{found.bias.limit:.2g}"]
-    rows = f"{found.inside} of {found.rows}", f"{found.smallest_p:.2g}", f"{found.limit:.2g}"
+        bias = [f"{found.bias.largest:.2f}", *_level(found.bias.smallest_p, found.bias.limit)]
+    rows = f"{found.inside} of {found.rows}", *_level(found.smallest_p, found.limit)
     return [*rows, *pooled, *bias, str(found.not_measured), "yes" if found.agrees else "no"]
+
+
+def _level(p_value: float, limit: float) -> tuple[str, str]:
+    return f"{p_value:.2g}", f"{limit:.2g}"
 
 
 def _effects(store: RunFile) -> Table:

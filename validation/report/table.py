@@ -113,8 +113,8 @@ def _ratios(found: Validation) -> Table:
     headings, cells = names(found)
     main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
     caption = (
-        f"* : 1 lies outside the interval. failed: one number a method.\nThe verdict is about {main}, as are bias (mean "
-        "error) and rmse, sqrt(variance + bias^2)."
+        f"* : 1 lies outside the interval. failed: one number a method.\nThe verdict is about {main}, as are bias "
+        "(mean error) and rmse, sqrt(variance + bias^2)."
     )
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
