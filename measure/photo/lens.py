@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from measure.features.points import EdgePoints
 from planner.features.locator import reach
 from scenes import InvalidInput
 from scenes.errors import describe
+from scenes.files import read_toml
 from scenes.model import Model
 from scenes.ranges import Positive
 
@@ -65,11 +65,7 @@ def load_lens(path: Path) -> Lens:
         If the file cannot be read, is no TOML, or a value in it is bad.
     """
     try:
-        return Lens.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
+        return Lens.model_validate(read_toml(path))
     except ValidationError as error:
         raise InvalidInput(f"{path}: {describe(error)}") from None
 

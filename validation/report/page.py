@@ -157,7 +157,10 @@ def _tests(found: Verdict) -> list[str]:
     pooled = bias = ["-"] * 3
     if found.pooled:
         low, high = found.pooled.interval
-        pooled = [f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]", *_level(found.pooled.p_value, found.pooled.limit)]
+        pooled = [
+            f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]",
+            *_level(found.pooled.p_value, found.pooled.limit),
+        ]
     if found.bias:
         bias = [f"{found.bias.largest:.2f}", *_level(found.bias.smallest_p, found.bias.limit)]
     rows = f"{found.inside} of {found.rows}", *_level(found.smallest_p, found.limit)
