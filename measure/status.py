@@ -10,6 +10,7 @@ ILL_CONDITIONED = "ill_conditioned"  # the lines of a corner are nearly parallel
 
 MEASURED = (OK, CLUTTER)
 _WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, CLUTTER, OK)
+ALL = frozenset(_WORST_FIRST)
 
 
 def worst(*statuses: str) -> str:

@@ -28,7 +28,7 @@ def short_scene(tmp_path_factory):
 
 
 def test_validate_json_files_and_pictures(short_scene, tmp_path):
-    done = ice("validate", short_scene, "--renders", 200, "--workers", 1, "--out", tmp_path / "out", "--json")
+    done = ice("validate", short_scene, "--renders", 200, "--workers", 1, "--out", tmp_path / "out", "--json", "-q")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert document["scene"] == "short"

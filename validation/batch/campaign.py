@@ -96,7 +96,8 @@ class Campaign(Model):
     Raises
     ------
     pydantic.ValidationError
-        If there is no scene or no setting, more than `MOST_SETTINGS` of them, or a swept value makes a scene invalid. `load` turns it into `InvalidInput`.
+        If there is no scene or no setting, more than `MOST_SETTINGS` of them, or a swept value makes a scene invalid.
+        `load` turns it into `InvalidInput`.
     """
 
     name: FileName

@@ -119,7 +119,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     InvalidInput
         If no setting could be worked on.
     """
-    identity = store.fact("identity")
+    identity = store.identity()
     indices, refused = [], {}
     for i in range(len(campaign)):
         if store.predicted(i):

@@ -40,7 +40,7 @@ def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path)
 def _panels(campaign: Campaign, store: RunFile) -> dict[str, list[Case]]:
     """The first settings that have an image, by sensor and scene, as pictures' names."""
     panels: dict[str, list[Case]] = {}
-    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.packed(i))
+    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.has_image(i))
     for case in map(campaign.case, itertools.islice(shown, _SHOWN)):
         sensor = case.setting.sensor
         labels = [case.scene.name] * (len(campaign.scenes) > 1) + [f"{v:g}" for v in _numbers(case.parameters)]

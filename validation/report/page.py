@@ -189,7 +189,7 @@ def _refused(found: Validation) -> Table:
 
 
 def _facts(found: Validation, store: RunFile) -> Table:
-    identity, machine = store.fact("identity"), store.fact("machine", {})
+    identity, machine = store.identity(), store.fact("machine", {})
     facts = {
         "scenes": ", ".join(scene["name"] for scene in identity["campaign"]["scenes"]),
         "settings x images": f"{len(found.rows) + len(found.refused)} x {identity['renders']}",

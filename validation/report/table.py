@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -12,12 +12,6 @@ from validation.batch.result import Judged, Row, Validation
 
 _ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
-
-
-def console(*, stderr: bool = False) -> Console:
-    """A console wide enough for the tables even where no terminal tells its width."""
-    made = Console(stderr=stderr)
-    return made if made.is_terminal else Console(stderr=stderr, width=132)
 
 
 def report(found: Validation) -> Group:
