@@ -12,9 +12,10 @@ from measure import status
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
 from scenes import InvalidInput, Picture, Scene
+from scenes.arrays import BRIGHTEST, grey_levels, numbers
 
 DEFAULT_ESTIMATOR = "gradient"
-_BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
+_DARK = 1e-200  # squared grey levels
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
 
@@ -123,17 +124,12 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     InvalidInput
         If it has not the given (height, width), is empty, or holds a number that is not finite.
     """
-    images = np.asarray(image, float)
+    images = numbers(image, "image")
     if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
         raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
-    if images.flags.c_contiguous and images.reshape(-1) @ images.reshape(-1) < _BRIGHTEST**2:  # reads them once
+    if images.flags.c_contiguous and _DARK < images.reshape(-1) @ images.reshape(-1) < BRIGHTEST**2:  # read once
         return images
-    low, high = float(images.min()), float(images.max())
-    if not np.isfinite([low, high]).all():
-        raise InvalidInput("image must be of finite numbers, got NaN or infinity")
-    if max(-low, high) > _BRIGHTEST:
-        raise InvalidInput(f"image must be of grey levels up to {_BRIGHTEST:g}, got {max(-low, high):.3g}")
-    return images
+    return grey_levels(images)
 
 
 def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:

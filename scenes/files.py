@@ -27,6 +27,14 @@ _KINDS = {
 }  # fmt: skip
 
 
+class Unreadable(InvalidInput):
+    """A file that cannot be read at all, or is none; ``reason`` says why."""
+
+    def __init__(self, path: Path, reason: str) -> None:
+        super().__init__(f"{path} must be a readable file, got {reason}")
+        self.reason = reason
+
+
 @contextmanager
 def opened(path: Path, most: int) -> Iterator[tuple[BinaryIO, int]]:
     """A regular file, open to be read, and its size.
@@ -42,14 +50,14 @@ def opened(path: Path, most: int) -> Iterator[tuple[BinaryIO, int]]:
     Raises
     ------
     InvalidInput
-        If it cannot be opened, is no regular file, or is larger.
+        If it cannot be opened or is no regular file (`Unreadable`), or is larger.
     """
     try:
         number = os.open(path, _FLAGS)
     except OSError as error:
-        raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
+        raise Unreadable(path, error.strerror or str(error)) from None
     except ValueError:
-        raise InvalidInput(f"{str(path)!r} must be the path of a file, got a null character in it") from None
+        raise Unreadable(path, "a null character in its name") from None
     with os.fdopen(number, "rb", closefd=True) if _is_file(number) else _refused(number, path) as file:
         size = os.fstat(number).st_size
         if size > most:
@@ -64,7 +72,7 @@ def _is_file(number: int) -> bool:
 def _refused(number: int, path: Path) -> Any:
     kind = stat.S_IFMT(os.fstat(number).st_mode)
     os.close(number)
-    raise InvalidInput(f"{path} must be a readable file, got {_KINDS.get(kind, 'something else')}")
+    raise Unreadable(path, _KINDS.get(kind, "something else"))
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -73,7 +81,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         try:
             data = file.read(most + 1)  # it may be growing
         except OSError as error:
-            raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
+            raise Unreadable(path, error.strerror or str(error)) from None
     if len(data) > most:
         raise InvalidInput(f"{path} must be at most {most} bytes long, got more")
     return data

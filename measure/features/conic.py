@@ -13,6 +13,7 @@ from measure.features.calipers import MIN_POSITIONS
 from measure.features.optics import Optics
 from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput
+from scenes.arrays import finite, grey_levels, numbers
 
 _STEPS = 12
 _MIN_FOUND = 0.5
@@ -74,12 +75,12 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     >>> found.parameters.round(6).tolist()
     [50.0, 40.0, 20.0, 10.0, 0.0]
     """
-    points = np.asarray(points, float)
+    points = numbers(points, "points")
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < (3 if circle else 5):
         raise InvalidInput(f"points must be at least {3 if circle else 5} pairs (x, y), got shape {points.shape}")
     if not np.isfinite(points).all():
         raise InvalidInput("points must be finite, got NaN or infinity")
-    full = np.asarray(covariance, float)
+    full = numbers(covariance, "covariance")
     full = full if full.ndim == 2 else np.diag(np.broadcast_to(full, len(points)).astype(float))
     with np.errstate(divide="ignore"):
         weights = np.minimum(1 / np.diag(full), 1e300)
@@ -111,7 +112,10 @@ def find_ellipse(
     spacing : float
         Distance of the edge points in units of the smoothing scale.
     """
-    expected = np.asarray(expected, float) / _UNITS
+    images, expected = grey_levels(images, "images"), finite(expected, "expected")
+    if expected.shape != (5,) or not (expected[2:4] > 0).all():
+        raise InvalidInput(f"expected must be x, y, a, b and angle of an ellipse, got {expected.tolist()}")
+    expected = expected / _UNITS
     stack = images.reshape(-1, *images.shape[-2:])
     angles, places, normals = _positions(expected, optics, spacing)
     if len(angles) < max(MIN_POSITIONS, 5):

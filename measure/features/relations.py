@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from measure.features.shape import Shape
+from scenes.arrays import numbers
 
 
 def point_distance(
@@ -30,10 +31,13 @@ def point_distance(
     >>> float(value), round(float(variance), 6)
     (5.0, 0.04)
     """
-    across = np.asarray(second) - np.asarray(first)
+    first, second = numbers(first, "first"), numbers(second, "second")
+    first_covariance = numbers(first_covariance, "first_covariance")
+    second_covariance = numbers(second_covariance, "second_covariance")
+    across = second - first
     value = np.linalg.norm(across, axis=-1)
     unit = across / np.where(value > 0, value, 1)[..., None]
-    total = np.asarray(first_covariance) + np.asarray(second_covariance)
+    total = first_covariance + second_covariance
     return value, np.einsum("...i,...ij,...j->...", unit, total, unit)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -92,6 +93,8 @@ def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
     InvalidInput
         If Dask is not installed, or no scheduler answers at the address.
     """
+    if not re.fullmatch(r"(?:[a-z]+://)?[\w.\[\]:%-]+:\d{1,5}|inproc://\S+", address):
+        raise InvalidInput(f"--dask must be an address such as tcp://127.0.0.1:8786, got {address!r}")
     try:
         from distributed import Client
     except ImportError:

@@ -35,3 +35,4 @@ def _ice(
     Exit status: 0 done; 1 contradicted, not measured or not finished; 2 bad input; 3 an error of this program.
     """
     verbosity.choose(quiet, verbose)
+    verbosity.hush()

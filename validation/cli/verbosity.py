@@ -6,7 +6,7 @@ import logging
 
 from scenes.errors import InvalidInput
 
-_quiet = False
+_quiet = _verbose = False
 
 
 def choose(quiet: bool, verbose: bool) -> None:
@@ -17,15 +17,23 @@ def choose(quiet: bool, verbose: bool) -> None:
     InvalidInput
         If both are wanted.
     """
-    global _quiet
+    global _quiet, _verbose
     if quiet and verbose:
         raise InvalidInput("-q must be given without -v, got both")
-    _quiet = quiet
+    _quiet, _verbose = quiet, verbose
     if verbose:
         log, shown = logging.getLogger("validation"), logging.StreamHandler()
         shown.setFormatter(_Line())
         log.addHandler(shown)
         log.setLevel(logging.INFO)
+
+
+def hush() -> None:
+    """Warnings of libraries are no lines of their own; -v shows them."""
+    logging.captureWarnings(True)
+    warned = logging.getLogger("py.warnings")
+    warned.propagate = False
+    warned.addHandler(logging.StreamHandler() if _verbose else logging.NullHandler())
 
 
 def quiet() -> bool:

@@ -15,9 +15,14 @@ def write_csv(found: Validation, path: Path) -> Path:
     lines = table(found)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(lines[0]))
-        writer.writeheader()
-        writer.writerows(lines)
+        writer.writerow({key: _inert(key) for key in lines[0]})
+        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines)
     return path
+
+
+def _inert(value: object) -> object:
+    """A text that no spreadsheet takes for a formula: an apostrophe before what would begin one."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else value
 
 
 def write_json(found: Validation, path: Path) -> Path:

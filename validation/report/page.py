@@ -62,10 +62,24 @@ def write(campaign: Campaign, found: Validation, store: RunFile, directory: Path
         environment = jinja2.Environment(
             loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined
         )
+        environment.filters["md"] = markdown
         paths.append(directory / f"report{suffix}")
         text = environment.get_template(f"report{suffix}.j2").render(context)
         paths[-1].write_text(text, encoding="utf-8")
     return paths
+
+
+def markdown(text: str) -> str:
+    """A text that Markdown shows as it is: no HTML, no link, no code, no table's bar, one line.
+
+    >>> markdown("a|b <script>[x](y)`")
+    'a\\\\|b &lt;script&gt;[x]\\\\(y)\\\\`'
+    """
+    for plain, shown in (
+        ("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|"), ("`", "\\`"), ("](", "]\\("),
+    ):  # fmt: skip
+        text = text.replace(plain, shown)
+    return " ".join(text.split())
 
 
 def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Section]:
