@@ -13,6 +13,7 @@ from measure.features.layout import Layout, layout_of
 from measure.measurement import distance, separation
 from planner import predict
 from scenes import Picture, Scene
+from scenes.arrays import picture as one_picture
 
 
 def bound(scene: Scene, sensor: Any, light: Any) -> float:
@@ -41,7 +42,7 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
     scene, sensor, light
         As for `measure.distance`.
     """
-    found = distance(clean, scene, sensor, light, "polygon")
+    found = distance(one_picture(clean), scene, sensor, light, "polygon")
     layout = layout_of(Picture.of(scene, sensor, light))
     covariance = corner_bound(layout, found.edge_contrast, scene.noise.variance)
     _, gradient = separation(found.corners[None])

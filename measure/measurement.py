@@ -99,12 +99,22 @@ def distances(
 
     Parameters and errors are those of `distance`.
     """
+    for name, threshold in methods:
+        _check_method(name, threshold)
     camera, layout = picture.scene.camera, layout_of(picture)
     images = checked_image(image, (camera.height, camera.width))
     first = picture.scene.locator.thresholds[0]
     return tuple(
         _by_method(images, layout, name, first if threshold is None else threshold) for name, threshold in methods
     )
+
+
+def _check_method(estimator: Any, threshold: Any) -> None:
+    if not isinstance(estimator, str):
+        raise InvalidInput(f"estimator must be the name of one, got {type(estimator).__name__}")
+    number = isinstance(threshold, int | float | np.number) and not isinstance(threshold, bool)
+    if threshold is not None and not (number and 0 <= threshold <= BRIGHTEST):
+        raise InvalidInput(f"threshold must be a number of grey levels a px, at least 0, got {threshold!r}")
 
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from measure.features.shape import Shape
+from scenes import InvalidInput
 from scenes.arrays import numbers
 
 
@@ -31,14 +32,25 @@ def point_distance(
     >>> float(value), round(float(variance), 6)
     (5.0, 0.04)
     """
-    first, second = numbers(first, "first"), numbers(second, "second")
-    first_covariance = numbers(first_covariance, "first_covariance")
-    second_covariance = numbers(second_covariance, "second_covariance")
+    first, second = _points("first", first), _points("second", second)
+    first_covariance = _points("first_covariance", first_covariance, 2)
+    second_covariance = _points("second_covariance", second_covariance, 2)
+    try:
+        np.broadcast_shapes(first.shape, second.shape, first_covariance.shape[:-1], second_covariance.shape[:-1])
+    except ValueError:
+        raise InvalidInput("points and covariances must be of shapes that go together, got others") from None
     across = second - first
     value = np.linalg.norm(across, axis=-1)
     unit = across / np.where(value > 0, value, 1)[..., None]
     total = first_covariance + second_covariance
     return value, np.einsum("...i,...ij,...j->...", unit, total, unit)
+
+
+def _points(name: str, values: np.ndarray, axes: int = 1) -> np.ndarray:
+    array = numbers(values, name)
+    if array.shape[-axes:] != (2,) * axes or not np.isfinite(array).all():
+        raise InvalidInput(f"{name} must be finite, of shape (..., {', '.join('2' * axes)}), got shape {array.shape}")
+    return array
 
 
 def line_angle(shape: Shape, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:

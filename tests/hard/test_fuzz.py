@@ -5,7 +5,7 @@ import pytest
 
 import scenes
 from scenes import InvalidInput
-from tests.hard import fuzz
+from tests.hard import fuzzing as fuzz
 from validation import picture_file
 
 

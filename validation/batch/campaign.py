@@ -44,7 +44,7 @@ def _values(axis: Any) -> Any:
     except (KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         raise ValueError(f"a range must be {{from, to, count}} or {{from, to, step}}, got {axis}") from None
     if count > MOST_VALUES:
-        raise ValueError(f"a range must be of at most {MOST_VALUES} values, got {count}")
+        raise ValueError(f"a range must be of at most {MOST_VALUES} values, got {float(count):.3g}")
     return np.linspace(start, stop if how == "count" else start + (count - 1) * size, count).tolist()
 
 

@@ -127,7 +127,8 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         else:
             refused[i] = store.trouble(i) or _WAITING
     if not indices:
-        raise InvalidInput(next(iter(refused.values())))
+        reason = next(iter(refused.values()))
+        raise InvalidInput("the run must have measured a setting, got none yet" if reason == _WAITING else reason)
     scale = _free_scale(campaign, indices, store)
     rows = tuple(_row(campaign.case(i), scale, store) for i in indices)
     return Validation(

@@ -69,4 +69,6 @@ def usage(error: Exception) -> str:
         return f"{name} must be given, got nothing"
     problem = getattr(error.__cause__, "errors", lambda: [{}])()[0]
     wanted = re.sub(r"^Input should be |, unable to parse.*$", "", message)
-    return f"{name} must be {wanted}, got {problem.get('input')!r}"
+    if wanted.startswith("Unable to parse"):  # more digits than Python reads
+        wanted = "a number of fewer digits"
+    return f"{name} must be {wanted}, got {one_line(repr(problem.get('input')), 100)}"
