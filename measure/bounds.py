@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from measure import status
 from measure.estimators.polygon import edge_derivatives
 from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response
@@ -33,7 +34,7 @@ def bound(scene: Scene, sensor: Any, light: Any) -> float:
 
 
 def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> float:
-    """The same bound from the Fisher information of every pixel of the noise-free image, px^2.
+    """The same bound from the Fisher information of every pixel of the noise-free image, px^2; infinite without edges.
 
     Parameters
     ----------
@@ -43,6 +44,8 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
         As for `measure.distance`.
     """
     found = distance(one_picture(clean), scene, sensor, light, "polygon")
+    if str(found.status) not in status.MEASURED:
+        return float("inf")
     layout = layout_of(Picture.of(scene, sensor, light))
     covariance = corner_bound(layout, found.edge_contrast, scene.noise.variance)
     _, gradient = separation(found.corners[None])

@@ -137,7 +137,9 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     images = numbers(image, "image")
     if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
         raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
-    if images.flags.c_contiguous and _DARK < images.reshape(-1) @ images.reshape(-1) < BRIGHTEST**2:  # read once
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = images.reshape(-1) @ images.reshape(-1) if images.flags.c_contiguous else 0.0  # reads them once
+    if _DARK < total < BRIGHTEST**2:
         return images
     return grey_levels(images)
 

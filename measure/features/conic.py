@@ -16,6 +16,7 @@ from scenes import InvalidInput
 from scenes.arrays import finite, grey_levels, numbers
 
 _STEPS = 12
+_FARTHEST, _LARGEST = 1e9, 1e5  # px; of a point, and of an ellipse that an image shows
 _MIN_FOUND = 0.5
 _UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
 
@@ -80,8 +81,9 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
         raise InvalidInput(f"points must be at least {3 if circle else 5} pairs (x, y), got shape {points.shape}")
     if not np.isfinite(points).all():
         raise InvalidInput("points must be finite, got NaN or infinity")
-    full = numbers(covariance, "covariance")
-    full = full if full.ndim == 2 else np.diag(np.broadcast_to(full, len(points)).astype(float))
+    if np.abs(points).max() > _FARTHEST:
+        raise InvalidInput(f"points must lie within {_FARTHEST:g} px, got some beyond")
+    full = _covariance(covariance, len(points))
     with np.errstate(divide="ignore"):
         weights = np.minimum(1 / np.diag(full), 1e300)
     start = _start(points, circle)
@@ -92,6 +94,17 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     if not (good and known):
         return _nothing((), status.ILL_CONDITIONED)
     return Ellipse(parameters * _UNITS, _whole(spread, circle) * np.outer(_UNITS, _UNITS), np.array(status.OK))
+
+
+def _covariance(given: np.ndarray | float, count: int) -> np.ndarray:
+    """Covariance of all points' distances, px^2, shape (I, I)."""
+    full = finite(given, "covariance")
+    if full.shape not in ((), (count,), (count, count)):
+        raise InvalidInput(f"covariance must be a number or of shape (I,) or (I, I), got shape {full.shape}")
+    full = full if full.ndim == 2 else np.diag(np.broadcast_to(full, count))
+    if not (np.diag(full) >= 0).all() or np.abs(full).max() > _FARTHEST**2:
+        raise InvalidInput(f"covariance must be of variances from 0 to {_FARTHEST**2:g} px^2, got others")
+    return full
 
 
 def find_ellipse(
@@ -113,8 +126,12 @@ def find_ellipse(
         Distance of the edge points in units of the smoothing scale.
     """
     images, expected = grey_levels(images, "images"), finite(expected, "expected")
-    if expected.shape != (5,) or not (expected[2:4] > 0).all():
-        raise InvalidInput(f"expected must be x, y, a, b and angle of an ellipse, got {expected.tolist()}")
+    if images.shape[-2:] != optics.shape:
+        raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {images.shape}")
+    if expected.shape != (5,) or not (expected[2:4] > 0).all() or np.abs(expected).max() > _LARGEST:
+        raise InvalidInput(
+            f"expected must be x, y, a, b and angle of an ellipse, got shape {expected.shape}: {expected}"
+        )
     expected = expected / _UNITS
     stack = images.reshape(-1, *images.shape[-2:])
     angles, places, normals = _positions(expected, optics, spacing)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from measure.estimators.gradient import GradientLocator
 from measure.features.calipers import edge_calipers
@@ -20,29 +21,32 @@ from scenes import InvalidInput
 from scenes.errors import describe
 from scenes.files import read_toml
 from scenes.model import Model
-from scenes.ranges import Positive
 
 
 class Lens(Model):
     """Intrinsics in px and distortion coefficients k1, k2, p1, p2, k3 (OpenCV's order, the rest 0)."""
 
-    fx: Positive
-    fy: Positive
-    cx: float
-    cy: float
-    distortion: tuple[float, ...] = ()
+    fx: Annotated[float, Field(ge=1e-3, le=1e12)]
+    fy: Annotated[float, Field(ge=1e-3, le=1e12)]
+    cx: Annotated[float, Field(ge=-1e9, le=1e9)]
+    cy: Annotated[float, Field(ge=-1e9, le=1e9)]
+    distortion: Annotated[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...], Field(max_length=5)] = ()
 
     @property
     def matrix(self) -> np.ndarray:
         """Camera matrix, shape (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
+    @property
+    def coefficients(self) -> np.ndarray:
+        """All five, shape (5,)."""
+        return np.array([*self.distortion, *[0.0] * (5 - len(self.distortion))])
+
     def straighten(self, points: np.ndarray) -> np.ndarray:
         """Where image points (..., 2), px, would be without distortion, px of the same camera matrix."""
         flat = np.asarray(points, float).reshape(-1, 1, 2)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-        coefficients = np.array(self.distortion, float)
-        straight = cv2.undistortPoints(flat, self.matrix, coefficients, None, None, self.matrix, criteria)
+        straight = cv2.undistortPoints(flat, self.matrix, self.coefficients, None, None, self.matrix, criteria)
         return straight.reshape(np.shape(points))
 
     def distort(self, points: np.ndarray) -> np.ndarray:
@@ -52,7 +56,7 @@ class Lens(Model):
         y = (points[..., 1] - self.cy) / self.fy
         rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 1, 3)
         zero = np.zeros(3)
-        bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, np.array(self.distortion, float))
+        bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, self.coefficients)
         return bent.reshape(points.shape)
 
 
