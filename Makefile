@@ -15,9 +15,9 @@ test: lint
 bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
 
-# 10,000 corrupted scene files, mesh files and images: no traceback, no hang, at most 1 GiB (4 minutes).
+# 20,000 hostile files, run directories, options and arrays: no traceback, no hang, at most 1 GiB (12 minutes).
 fuzz: $(VENV)/.test-installed
-	$(BIN)/python -m tests.hard.fuzz --count 10000
+	OMP_NUM_THREADS=1 $(BIN)/python -m tests.hard.fuzzing --count 20000 --workers 2
 
 bench-planner: $(VENV)/.installed
 	$(BIN)/python -m tests.benchmarks.search

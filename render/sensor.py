@@ -49,8 +49,8 @@ def expose(
     if not isinstance(noise, Noise) or not isinstance(rng, np.random.Generator):
         raise InvalidInput("noise and rng must be a Noise and a numpy Generator, got something else")
     image = picture(image)
-    if where is not None and (np.shape(where) != image.shape or np.asarray(where).dtype != bool):
-        raise InvalidInput(f"where must be of bool, shape {image.shape}, got shape {np.shape(where)}")
+    if where is not None and not (isinstance(where, np.ndarray) and where.shape == image.shape and where.dtype == bool):
+        raise InvalidInput(f"where must be an array of bool, shape {image.shape}, got something else")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
     sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
     steady = np.asarray(image, float) + fixed_pattern(image, noise)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import stat
@@ -130,7 +129,7 @@ def check_bounded(document: Any) -> None:
     for _ in range(MOST_DEPTH + 1):
         for item in level:
             if isinstance(item, int) and not -(1 << 63) <= item < 1 << 63:
-                raise ValueError(f"a whole number of {math.ceil(item.bit_length() / math.log2(10))} digits")
+                raise ValueError(f"a whole number of {len(str(abs(item)))} digits")
         level = [inner for item in level for inner in _inside(item)]
         if not level:
             return

@@ -70,7 +70,8 @@ def read(path: Path) -> np.ndarray:
         raise InvalidInput(f"{path} must be a readable image, got something else")
     if image.ndim == 3:
         image = _grey(path, image)
-    return image.astype(float)
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        return image.astype(float)
 
 
 def _array(path: Path) -> np.ndarray:

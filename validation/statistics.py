@@ -189,7 +189,8 @@ def verdict(
         return Verdict(False, 0, 0, float("nan"), level, text, missing, None, None, ("not measured",))
     away = np.full(ratios.shape, np.nan)
     if bias_px is not None:
-        away[:] = np.subtract(bias_px, predicted_bias_px, dtype=float) / np.asarray(sigma_px, float)
+        with np.errstate(all="ignore"):  # what is not finite then is not judged
+            away[:] = np.subtract(bias_px, predicted_bias_px, dtype=float) / np.asarray(sigma_px, float)
     promised = judged & ok & np.isfinite(away)
     levels = _levels(level, promised.any())
     p_values, limit = _p_values(ratios[judged], counts[judged]), sidak(levels["rows"], rows)

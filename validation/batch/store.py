@@ -83,7 +83,11 @@ class RunFile:
         except (OSError, sqlite3.Error) as error:
             raise InvalidInput(f"{self._what}, got {directory} ({error})") from None
         self._check()
-        self._claim(directory, identity)
+        try:
+            self._claim(directory, identity)
+        except InvalidInput:
+            self.close()
+            raise
 
     @classmethod
     def reopen(cls, directory: Path) -> RunFile:
@@ -303,7 +307,6 @@ class RunFile:
     def _claim(self, directory: Path, identity: dict[str, Any]) -> None:
         identity, there = json.loads(json.dumps(identity)), self.fact("identity")
         if there is None and self._rows("SELECT 1 FROM setting UNION ALL SELECT 1 FROM chunk LIMIT 1"):
-            self.close()
             raise InvalidInput(
                 f"--out must be a new directory or hold this run, got {directory}, which does not say which run it "
                 "holds (--fresh starts anew)"
@@ -311,7 +314,6 @@ class RunFile:
         if there is None:
             self.note("identity", identity)
         elif there != identity:
-            self.close()
             texts = list(itertools.islice(_differences(there, identity), 3))
             raise InvalidInput(
                 f"--out must be a new directory or hold this run, got {directory}, where {', '.join(texts)} "

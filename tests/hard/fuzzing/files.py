@@ -57,7 +57,7 @@ def _use_scene(rng: np.random.Generator, path: Path, folder: Path) -> str:
     positive = (variances > 0).all() or (loaded.noise.variance == 0 and (variances >= 0).all())
     if not positive or (found.status == "ok" and not np.isfinite(variances).all()):
         raise AssertionError(f"variances {variances.tolist()}, status {found.status}")
-    return "scene: predicted"
+    return "predicted"
 
 
 def image(rng: np.random.Generator, folder: Path) -> str:
@@ -74,7 +74,7 @@ def image(rng: np.random.Generator, folder: Path) -> str:
     good = np.isin(found.status, ("ok", "clutter"))
     if not (np.isfinite(found.value_px) == good).all() or not (found.variance_px2 > 0).all():
         raise AssertionError(f"value {found.value_px}, variance {found.variance_px2}, status {found.status}")
-    return "image: measured"
+    return "measured"
 
 
 def _picture(rng: np.random.Generator) -> np.ndarray:
