@@ -25,15 +25,15 @@ class _Judged(BaseModel):
     method: str
     n: Annotated[int, Field(ge=0, le=_MOST)]
     failed: Annotated[int, Field(ge=0, le=_MOST)]
-    empirical: Annotated[float, Field(ge=0)] | None
-    bias: FiniteFloat | None
+    empirical: Annotated[float, Field(ge=0, le=1e24)] | None
+    bias: Annotated[float, Field(ge=-1e12, le=1e12)] | None
 
     @model_validator(mode="after")
     def _consistent(self) -> _Judged:
         if self.failed > self.n:
             raise ValueError(f"failed must be at most n, {self.n}, got {self.failed}")
-        if self.empirical is not None and (self.bias is None or not math.isfinite(self.empirical)):
-            raise ValueError("empirical must be a finite number beside a bias, got another")
+        if self.empirical is not None and (self.bias is None or 0 < self.empirical < 1e-30):
+            raise ValueError(f"empirical must be 0 or at least 1e-30, beside a bias, got {self.empirical:g}")
         return self
 
 

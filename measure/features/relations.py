@@ -8,6 +8,8 @@ from measure.features.shape import Shape
 from scenes import InvalidInput
 from scenes.arrays import numbers
 
+_FARTHEST = 1e9  # px
+
 
 def point_distance(
     first: np.ndarray, first_covariance: np.ndarray, second: np.ndarray, second_covariance: np.ndarray
@@ -48,8 +50,9 @@ def point_distance(
 
 def _points(name: str, values: np.ndarray, axes: int = 1) -> np.ndarray:
     array = numbers(values, name)
-    if array.shape[-axes:] != (2,) * axes or not np.isfinite(array).all():
-        raise InvalidInput(f"{name} must be finite, of shape (..., {', '.join('2' * axes)}), got shape {array.shape}")
+    if array.shape[-axes:] != (2,) * axes or not (np.abs(array) <= _FARTHEST**axes).all():
+        shape = f"(..., {', '.join('2' * axes)})"
+        raise InvalidInput(f"{name} must be of numbers to {_FARTHEST**axes:g}, shape {shape}, got shape {array.shape}")
     return array
 
 

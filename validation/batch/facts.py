@@ -15,6 +15,10 @@ _NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 _Images = Annotated[int, Field(ge=0, le=10_000_000)]
 
 
+_Variance = Annotated[float, Field(gt=0)]
+_Length = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
 class _Identity(BaseModel):
     """What the numbers depend on."""
 
@@ -37,11 +41,11 @@ class _Predicted(BaseModel):
 
     model_config = _Strict
 
-    paper: float
-    calibrated: float
-    bound: float
-    value_px: float
-    bias_px: FiniteFloat = 0.0
+    paper: _Variance
+    calibrated: _Variance
+    bound: _Variance
+    value_px: _Length
+    bias_px: _Length = 0.0
 
 
 _Scalar = str | int | float | bool | None
