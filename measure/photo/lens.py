@@ -8,7 +8,7 @@ from typing import Annotated
 
 import cv2
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from measure.estimators.gradient import GradientLocator
 from measure.features.calipers import edge_calipers
@@ -23,11 +23,20 @@ from scenes.files import read_toml
 from scenes.model import Model
 
 
+def _not_tiny(value: float) -> float:
+    if value < 1e-3:
+        raise ValueError(f"a focal length must be at least 0.001 px, got {value:g}")
+    return value
+
+
+_Focal = Annotated[float, Field(gt=0, le=1e12), AfterValidator(_not_tiny)]
+
+
 class Lens(Model):
     """Intrinsics in px and distortion coefficients k1, k2, p1, p2, k3 (OpenCV's order, the rest 0)."""
 
-    fx: Annotated[float, Field(ge=1e-3, le=1e12)]
-    fy: Annotated[float, Field(ge=1e-3, le=1e12)]
+    fx: _Focal
+    fy: _Focal
     cx: Annotated[float, Field(ge=-1e9, le=1e9)]
     cy: Annotated[float, Field(ge=-1e9, le=1e9)]
     distortion: Annotated[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...], Field(max_length=5)] = ()
