@@ -26,23 +26,23 @@ import numpy as np
 
 ROOT = Path(__file__).parents[2]
 SOURCES = (
-    "planner",
-    "measure",
-    "render",
-    "validation/statistics.py",
-    "validation/comparison.py",
-    "validation/cost/interval.py",
-)
+    "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py", "validation/cost/interval.py",
+)  # fmt: skip
 TESTS = ("tests/unit", "tests/hard", "tests/system")
+_BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
+_COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
+_OTHERS = (
+    "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not", "ReplaceAndWithOr", "ReplaceOrWithAnd",
+    "NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop", "ReplaceBreakWithContinue",
+)  # fmt: skip
 OPERATORS = tuple(
     f"core/{name}"
     for name in (
-        *(f"ReplaceBinaryOperator_{pair}" for pair in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")),
-        *(f"ReplaceComparisonOperator_{pair}" for pair in ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")),
-        "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not", "ReplaceAndWithOr", "ReplaceOrWithAnd",
-        "NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop", "ReplaceBreakWithContinue",
+        *(f"ReplaceBinaryOperator_{pair}" for pair in _BINARY),
+        *(f"ReplaceComparisonOperator_{pair}" for pair in _COMPARISON),
+        *_OTHERS,
     )
-)  # fmt: skip
+)
 _FILES = 3  # test files that a mutant meets
 _LIMIT_S = 90  # of them together: under 30 s on an idle machine
 _COMMON = 4  # letters; shorter names say nothing
@@ -59,13 +59,14 @@ class Mutant:
 
 def mutants(root: Path = ROOT) -> list[Mutant]:
     """All of them, in the order of files and operators."""
-    from cosmic_ray.ast import ast_nodes, get_ast_from_source
+    import parso
+    from cosmic_ray.ast import ast_nodes
     from cosmic_ray.plugins import get_operator, operator_names
 
     known, found = set(operator_names()), []
     operators = {name: get_operator(name)() for name in OPERATORS if name in known}
     for file in sources(root):
-        nodes = list(ast_nodes(get_ast_from_source((root / file).read_text(encoding="utf-8"))))
+        nodes = list(ast_nodes(parso.parse((root / file).read_text(encoding="utf-8"))))
         for name, operator in operators.items():
             count = sum(len(list(operator.mutation_positions(node))) for node in nodes)
             found += [Mutant(file, name, place) for place in range(count)]
@@ -74,19 +75,14 @@ def mutants(root: Path = ROOT) -> list[Mutant]:
 
 def sources(root: Path = ROOT) -> list[str]:
     """The files that are mutated."""
-    paths = [
-        path for name in SOURCES for path in (sorted((root / name).rglob("*.py")) if "." not in name else [root / name])
-    ]
-    return [str(path.relative_to(root)) for path in paths if path.name != "__init__.py"]
+    each = ([root / name] if name.endswith(".py") else sorted((root / name).rglob("*.py")) for name in SOURCES)
+    return [str(path.relative_to(root)) for some in each for path in some if path.name != "__init__.py"]
 
 
 def nearest(file: str, root: Path = ROOT) -> list[str]:
     """The test files that use most of a module's names, each name weighing less the more files use it."""
-    texts = {
-        path: set(re.findall(r"\w+", path.read_text()))
-        for name in TESTS
-        for path in sorted((root / name).glob("test_*.py"))
-    }
+    files = [path for name in TESTS for path in sorted((root / name).glob("test_*.py"))]
+    texts = {path: set(re.findall(r"\w+", path.read_text(encoding="utf-8"))) for path in files}
     tree = ast.parse((root / file).read_text(encoding="utf-8"))
     names = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)} | {Path(file).stem}
     names = {name for name in names if not name.startswith("_") and len(name) >= _COMMON}
@@ -110,17 +106,8 @@ def judged(mutant: Mutant, root: Path) -> tuple[str, str]:
     number, line = next(((n, new) for n, (old, new) in enumerate(pairs, 1) if old != new), (0, ""))
     path.write_text(after, encoding="utf-8")
     try:
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-x",
-            "-q",
-            "-p",
-            "no:cacheprovider",
-            mutant.file,
-            *nearest(mutant.file, root),
-        ]
+        tests = [mutant.file, *nearest(mutant.file, root)]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
         environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
         done = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=_LIMIT_S)
         outcome = "survived" if done.returncode in (0, 5) else "killed"
