@@ -26,14 +26,16 @@ import numpy as np
 
 ROOT = Path(__file__).parents[2]
 SOURCES = (
-    "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py", "validation/cost/interval.py",
+    "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py",
+    "validation/cost/interval.py",
 )  # fmt: skip
 TESTS = ("tests/unit", "tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
 _OTHERS = (
     "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not", "ReplaceAndWithOr", "ReplaceOrWithAnd",
-    "NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop", "ReplaceBreakWithContinue",
+    "NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop",
+    "ReplaceBreakWithContinue",
 )  # fmt: skip
 OPERATORS = tuple(
     f"core/{name}"
@@ -112,7 +114,7 @@ def judged(mutant: Mutant, root: Path) -> tuple[str, str]:
         done = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=_LIMIT_S)
         outcome = "survived" if done.returncode in (0, 5) else "killed"
     except subprocess.TimeoutExpired:
-        outcome = "killed"  # a loop that no longer ends
+        outcome = "too slow"  # a loop that no longer ends, or a machine that is too busy: neither killed nor survived
     finally:
         path.write_text(before, encoding="utf-8")
     return outcome, f"{mutant.file}:{number}: {line.strip()}"
@@ -141,7 +143,7 @@ def main() -> None:
     every, began = mutants(), time.perf_counter()
     rng = np.random.default_rng(asked.seed)
     chosen = [every[i] for i in rng.choice(len(every), min(asked.count, len(every)), replace=False)]
-    tally = {"killed": 0, "survived": 0, "same": 0}
+    tally = dict.fromkeys(("killed", "survived", "too slow", "same"), 0)
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(asked.workers) as executor:
         free = copies(asked.workers, Path(folder))
 
@@ -154,9 +156,9 @@ def main() -> None:
 
         for outcome, line, mutant in executor.map(one, chosen):
             tally[outcome] += 1
-            if outcome == "survived":
-                print(f"{line}    [{mutant.operator.removeprefix('core/')}]", flush=True)
-    tried = tally["killed"] + tally["survived"]
+            if outcome in ("survived", "too slow"):
+                print(f"{outcome}: {line}    [{mutant.operator.removeprefix('core/')}]", flush=True)
+    tried = sum(tally.values()) - tally["same"]
     print(f"{tally['killed']} of {tried} mutants killed ({len(every)} in all) in {time.perf_counter() - began:.0f} s")
     sys.exit(tally["killed"] < 0.9 * tried)
 
