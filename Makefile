@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test fuzz lint bench-measure bench-planner bench-cost reference proof agreement clean
+.PHONY: validate test fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -16,9 +16,13 @@ bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
 	$(BIN)/python -m tests.benchmarks.independent
 
-# 10,000 corrupted scene files, mesh files and images: no traceback, no hang, at most 1 GiB (4 minutes).
+# 20,000 hostile files, run directories, options and arrays: no traceback, no hang, at most 1 GiB (12 minutes).
 fuzz: $(VENV)/.test-installed
-	$(BIN)/python -m tests.hard.fuzz --count 10000
+	OMP_NUM_THREADS=1 $(BIN)/python -m tests.hard.fuzzing --count 20000 --workers 2
+
+# 200 slips planted one at a time: which of them does no test notice? (an hour)
+mutants: $(VENV)/.test-installed
+	$(BIN)/python -m tests.proofs.mutants --count 200 --workers 2
 
 bench-planner: $(VENV)/.installed
 	$(BIN)/python -m tests.benchmarks.search

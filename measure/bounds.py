@@ -6,16 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features.arranged import locate
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import prepared
-from measure.measurement import separation
+from measure.measurement import distance, separation
 from planner import predict
 from planner.imaging.arrangement import near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.models.bound import REACH, Information, fisher, known
 from scenes import InvalidInput, Noise, Picture, Scene
+from scenes.arrays import picture as one_picture
 
 
 def bound(scene: Scene, sensor: Any, light: Any) -> float:
@@ -34,7 +36,7 @@ def bound(scene: Scene, sensor: Any, light: Any) -> float:
 
 
 def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> float:
-    """The same bound with positions and levels as an image shows them, px^2.
+    """The same bound with positions and levels as an image shows them, px^2; infinite where it shows none.
 
     Parameters
     ----------
@@ -52,7 +54,9 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
     tool = prepared(layout, "arrangement", 1.0)
     if not isinstance(tool, ArrangementEstimator):
         raise InvalidInput(f"scene must be a convex body before darkness for a bound from an image, got {scene.name}")
-    clean = np.asarray(clean, float)
+    clean = one_picture(clean)
+    if str(distance(clean, scene, sensor, light, "arrangement").status) not in status.MEASURED:
+        return float("inf")
     fit, _ = locate(tool, layout, tool.taken(clean[None])[0], clean)
     covariance = _corners(layout, fit.state, scene.noise)
     _, gradient = separation(fit.state.vertices[tool.arrangement.corners][None])

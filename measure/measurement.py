@@ -15,10 +15,11 @@ from measure.features.shape import find_shape
 from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
+from scenes.arrays import BRIGHTEST, grey_levels, numbers
 
 DEFAULT_ESTIMATOR = "gradient"
 PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
-_BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
+_DARK = 1e-200  # squared grey levels
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
 
@@ -145,12 +146,22 @@ def distances(
 
     Parameters and errors are those of `distance`.
     """
+    for name, threshold in methods:
+        _check_method(name, threshold)
     camera, layout = picture.scene.camera, layout_of(picture)
     images = checked_image(image, (camera.height, camera.width))
     first = picture.scene.locator.thresholds[0]
     return tuple(
         _by_method(images, layout, name, first if threshold is None else threshold) for name, threshold in methods
     )
+
+
+def _check_method(estimator: Any, threshold: Any) -> None:
+    if not isinstance(estimator, str):
+        raise InvalidInput(f"estimator must be the name of one, got {type(estimator).__name__}")
+    number = isinstance(threshold, int | float | np.number) and not isinstance(threshold, bool)
+    if threshold is not None and not (number and 0 <= threshold <= BRIGHTEST):
+        raise InvalidInput(f"threshold must be a number of grey levels a px, at least 0, got {threshold!r}")
 
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
@@ -171,17 +182,14 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     InvalidInput
         If it has not the given (height, width), is empty, or holds a number that is not finite.
     """
-    images = np.asarray(image, float)
+    images = numbers(image, "image")
     if images.ndim < 2 or images.shape[-2:] != size or images.size == 0:
         raise InvalidInput(f"image must be of the camera's size {size[1]} x {size[0]}, got shape {images.shape}")
-    if images.flags.c_contiguous and images.reshape(-1) @ images.reshape(-1) < _BRIGHTEST**2:  # reads them once
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = images.reshape(-1) @ images.reshape(-1) if images.flags.c_contiguous else 0.0  # reads them once
+    if _DARK < total < BRIGHTEST**2:
         return images
-    low, high = float(images.min()), float(images.max())
-    if not np.isfinite([low, high]).all():
-        raise InvalidInput("image must be of finite numbers, got NaN or infinity")
-    if max(-low, high) > _BRIGHTEST:
-        raise InvalidInput(f"image must be of grey levels up to {_BRIGHTEST:g}, got {max(-low, high):.3g}")
-    return images
+    return grey_levels(images)
 
 
 def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:

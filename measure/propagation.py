@@ -13,12 +13,13 @@ from measure.features import arranged
 from measure.features.corners import corner_response
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, distance, separation
+from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, checked_image, distance, separation
 from planner.features.measurand import measurand
 from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.bias import MOST
 from scenes import Picture, Scene
+from scenes.arrays import picture as one_picture
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def propagate(
         As for `measure.distance`.
     """
     picture = Picture.of(scene, sensor, light)
-    clean, noise = recorded(picture.scene.noise, clean)
+    camera = picture.scene.camera
+    clean, noise = recorded(picture.scene.noise, checked_image(one_picture(clean), (camera.height, camera.width)))
     noise = np.broadcast_to(noise, clean.shape).ravel()
     found = distance(clean, picture, estimator=estimator, threshold=threshold)
     if str(found.status) not in status.MEASURED:

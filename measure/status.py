@@ -12,6 +12,7 @@ MISFIT = "misfit"  # the image is not what the model says within its noise: neit
 
 MEASURED = (OK, CLUTTER, MISFIT)
 _WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, AMBIGUOUS, MISFIT, CLUTTER, OK)
+ALL = frozenset(_WORST_FIRST)
 
 
 def worst(*statuses: str) -> str:

@@ -148,6 +148,12 @@ def with_task(scene: Scene, task: Task) -> Scene:
     return scene.model_copy(update={"task": task})
 
 
+def _keep(role: str, poses: np.ndarray, allowed: np.ndarray) -> None:
+    """See that a pose that is held fixed is one that the constraints allow."""
+    if not allowed.all():
+        raise InvalidInput(f"{role} must keep the constraints, got {Pose(*map(float, poses[0]))}")
+
+
 def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {value!r}")
@@ -179,14 +185,16 @@ class _Option:
     @classmethod
     def of(cls, scene, model, step_deg, constraints, sensor, light) -> _Option:
         fast = has_bound(scene, model)
-        step = step_deg or (1.0 if fast else COARSE_STEP)
+        step = (1.0 if fast else COARSE_STEP) if step_deg is None else step_deg
         sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
         lights = ViewingSpace(step, constraints.light_polar_deg).poses
         sensors, lights = sensors[constraints.sensors(scene, sensors)], lights[constraints.lights(lights)]
         if sensor is not None:
             sensors = np.array([list(scene.check_pose("sensor", sensor))])
+            _keep("sensor", sensors, constraints.sensors(scene, sensors))
         if light is not None:
             lights = np.array([list(scene.check_pose("light", light))])
+            _keep("light", lights, constraints.lights(lights))
         if not len(sensors) or not len(lights):
             raise InvalidInput("constraints must leave a pose for sensor and light, got none")
         return cls(scene, model, step, constraints, sensors, lights, sensor is None and light is None)

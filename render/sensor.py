@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.imaging.sensor import full_scale, recorded, shot_noise
 from scenes import InvalidInput, Noise
+from scenes.arrays import grey_levels, picture
 
 TILE = 16  # px; large enough that making a tile's stream costs little, small enough to follow an edge
 
@@ -43,8 +44,13 @@ def expose(
     >>> pictures.shape, bool(abs(pictures.var() - (4 + 1 / 12)) < 0.2)
     ((1000, 4, 4), True)
     """
-    if count < 1:
-        raise InvalidInput(f"count must be at least 1, got {count}")
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InvalidInput(f"count must be at least 1, got {count!r}")
+    if not isinstance(noise, Noise) or not isinstance(rng, np.random.Generator):
+        raise InvalidInput("noise and rng must be a Noise and a numpy Generator, got something else")
+    image = picture(image)
+    if where is not None and not (isinstance(where, np.ndarray) and where.shape == image.shape and where.dtype == bool):
+        raise InvalidInput(f"where must be an array of bool, shape {image.shape}, got something else")
     key = rng.integers(2**64, size=2, dtype=np.uint64)
     sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
     steady = np.asarray(image, float) + fixed_pattern(image, noise)
@@ -71,7 +77,7 @@ def digitised(levels: np.ndarray, noise: Noise) -> np.ndarray:
 
 def variance(image: np.ndarray, noise: Noise) -> np.ndarray:
     """Variance over repeated pictures (not sigma) of each pixel, squared grey levels, shape as the image."""
-    return recorded(noise, image).noise_variance
+    return recorded(noise, grey_levels(image)).noise_variance
 
 
 def fixed_pattern(image: np.ndarray, noise: Noise) -> np.ndarray:

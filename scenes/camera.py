@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenes.lens import Lens
 from scenes.model import Model
 from scenes.ranges import Coordinate, Curve, Length, Level, rising
+
+MOST_PIXELS = 40_000_000  # 320 MB as float64
 
 
 class Camera(Model):
@@ -33,6 +35,14 @@ class Camera(Model):
     analyser_deg: float | None = None
     transmission: Curve = ()
     responsivity: Curve = ()
+
+    @model_validator(mode="after")
+    def _not_too_large(self) -> Camera:
+        if self.width * self.height > MOST_PIXELS:
+            raise ValueError(
+                f"camera.width x height must be at most {MOST_PIXELS} pixels, got {self.width * self.height}"
+            )
+        return self
 
     @field_validator("transmission", "responsivity")
     @classmethod

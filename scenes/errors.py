@@ -37,8 +37,26 @@ _KINDS = {
 _TAGS = ("block", "mesh", "corner", "centre")  # alternatives of the model, no keys of the file
 
 
+_MOST = 600  # characters of a message: enough for a path, a key and what was given
+
+
 class InvalidInput(ValueError):
-    """Input that cannot be used. Its text is one line, "X must be ..., got ..."."""
+    """Input that cannot be used. Its text is one line of limited length, "X must be ..., got ..."."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
+
+
+def one_line(text: str, most: int = _MOST) -> str:
+    """A text that any terminal can show: control characters and broken Unicode escaped, its middle left out if long.
+
+    >>> one_line("a\\nb"), one_line("0123456789" * 9, 20)
+    ('a\\\\nb', '012345678 ... 456789')
+    """
+    if len(text) > most:
+        text = f"{text[: most // 2 - 1]} ... {text[len(text) - (most // 2 - 4) :]}"
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+    return shown if len(shown) <= 2 * most else f"{shown[:most]} ..."
 
 
 def describe(error: ValidationError) -> str:

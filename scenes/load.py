@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from scenes.errors import InvalidInput, describe
+from scenes.files import read_toml
 from scenes.scene import Scene
 
 BUNDLED = Path(__file__).parent
-_MOST_BYTES = 1 << 20
 
 
 def names() -> tuple[str, ...]:
@@ -38,19 +38,12 @@ def load(source: str | Path) -> Scene:
     >>> load("task1").task.edges
     ('e4', 'e9', 'e7', 'e11')
     """
-    path = _find(source)
-    try:
-        with path.open("rb") as file:
-            text = file.read(_MOST_BYTES + 1)
-        if len(text) > _MOST_BYTES:
-            raise InvalidInput(f"{path} must be at most {_MOST_BYTES} bytes long, got more")
-        document = tomllib.loads(text.decode().replace("\r\n", "\n"))
-    except OSError as error:
-        raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
-    except InvalidInput:
-        raise
-    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number too long, nested too deep
-        raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
+    path = find(source)
+    return from_document(path, read_toml(path))
+
+
+def from_document(path: Path, document: dict[str, Any]) -> Scene:
+    """The scene that a file's document describes; errors as of `load`."""
     try:
         return Scene.model_validate({"name": path.stem, **document}, context={"directory": path.parent})
     except ValidationError as error:
@@ -59,13 +52,14 @@ def load(source: str | Path) -> Scene:
         raise InvalidInput(f"{path}: {error}") from None
 
 
-def _find(source: str | Path) -> Path:
+def find(source: str | Path) -> Path:
+    """Path of a scene's file; errors as of `load`, if there can be none."""
     if str(source) in names():
         return BUNDLED / f"{source}.toml"
     path = Path(source)
     try:
         known = path.suffix == ".toml" or path.exists()
-    except OSError:  # a name too long for the file system
+    except (OSError, ValueError):  # a name too long for the file system, or with a null character in it
         known = False
     if not known:
         raise InvalidInput(f"scene must be a TOML file or one of {', '.join(names())}, got {str(source)!r}")

@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+import re
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+_FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')  # by some file system
 
 
 class Model(BaseModel):
     """Frozen, without unknown keys, without NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def _file_name(name: str) -> str:
+    if not name or name.strip(" .") != name or _FORBIDDEN.search(name) or not name.isprintable():
+        raise ValueError(f"name must be usable as a file's name, got {name!r}")
+    return name
+
+
+FileName = Annotated[str, Field(max_length=100), AfterValidator(_file_name)]
+Title = Annotated[str, Field(max_length=1000)]

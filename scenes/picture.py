@@ -56,6 +56,8 @@ class Picture:
         """
         if isinstance(scene, Picture):
             return scene
+        if not isinstance(scene, Scene):
+            raise InvalidInput(f"scene must be a Scene or a Picture, got {type(scene).__name__}")
         poses = () if lights is None else tuple(scene.check_pose("light", pose) for pose in several(lights))
         if lights is not None and len(poses) != len(scene.lights):
             raise InvalidInput(f"light must be {len(scene.lights)} pose(s), one for each light, got {len(poses)}")

@@ -16,7 +16,7 @@ from scenes.errors import InvalidInput
 from scenes.lights import Light
 from scenes.materials import Material
 from scenes.measurands import Centre, Corner, Locator, Task
-from scenes.model import Model
+from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
@@ -58,8 +58,8 @@ class Scene(Model):
         into `scenes.InvalidInput`.
     """
 
-    name: str
-    title: str = ""
+    name: FileName
+    title: Title = ""
     object: Object
     material: Material
     camera: Camera

@@ -1,9 +1,21 @@
 """The batch job: predicted against empirical, the run file, the tables and the pictures."""
 
-from validation.batch.campaign import Campaign, Grid
-from validation.batch.job import run
-from validation.batch.result import Judged, Row, Validation
-from validation.batch.stopped import Stopped
-from validation.statistics import Verdict, ratio_interval, verdict
+from __future__ import annotations
 
-__all__ = ["Campaign", "Grid", "Judged", "Row", "Stopped", "Validation", "Verdict", "ratio_interval", "run", "verdict"]
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.result",
+    "Row": "batch.result", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
+    "ratio_interval": "statistics", "verdict": "statistics",
+}  # fmt: skip
+
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    """Loaded when it is asked for: the command line answers before the renderer is there."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

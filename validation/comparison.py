@@ -2,15 +2,57 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 from scipy import stats
 
 from scenes import InvalidInput
+from scenes.errors import describe
+from scenes.files import read_json
+
+_MOST = 1_000_000_000  # images of a setting
+
+
+class _Judged(BaseModel):
+    """What is compared of one estimator in one setting."""
+
+    model_config = ConfigDict(strict=True)
+
+    method: str
+    n: Annotated[int, Field(ge=0, le=_MOST)]
+    failed: Annotated[int, Field(ge=0, le=_MOST)]
+    empirical: Annotated[float, Field(ge=0, le=1e24)] | None
+    bias: Annotated[float, Field(ge=-1e12, le=1e12)] | None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> _Judged:
+        if self.failed > self.n:
+            raise ValueError(f"failed must be at most n, {self.n}, got {self.failed}")
+        if self.empirical is not None and (self.bias is None or 0 < self.empirical < 1e-30):
+            raise ValueError(f"empirical must be 0 or at least 1e-30, beside a bias, got {self.empirical:g}")
+        return self
+
+
+_Angles = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+
+
+class _Setting(_Judged):
+    scene: str = ""
+    parameters: dict[str, Any] = {}
+    sensor: _Angles
+    light: _Angles
+    classic: list[_Judged]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    scene: str
+    settings: Annotated[list[_Setting], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -56,17 +98,18 @@ def read(path: Path) -> dict[str, Any]:
     Raises
     ------
     InvalidInput
-        If there is none.
+        If there is none, or what is compared of it is missing or of another type.
     """
     file = path / "result.json" if path.is_dir() else path
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-        if not isinstance(document, dict) or not document["settings"]:
-            raise KeyError("settings")
+        document = read_json(file)
+        _Document.model_validate(document)
         return document
-    except (OSError, ValueError, KeyError) as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise InvalidInput(f"{path} must be a run directory or its result.json, got: {reason}") from None
+    except ValidationError as error:
+        reason = describe(error)
+    except InvalidInput as error:
+        reason = str(error)
+    raise InvalidInput(f"{path} must be a run directory or its result.json, got: {reason}")
 
 
 def compare(before: dict[str, Any], after: dict[str, Any], level: float = 0.01) -> Comparison:

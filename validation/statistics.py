@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import stats
+
+LEVEL = 0.01  # of false alarm, of a whole verdict
+SHARES = {"rows": 0.45, "pooled": 0.45, "bias": 0.10}  # of that level, by test
+ALLOWANCE = 0.3  # sigma of one image: adds 4 % to its root mean square error
+STRAY = 0.01  # of a row's images may be lost; with more the rest is a selection, whose scatter says nothing
 
 
 def ratio_interval(ratio: float, n: int, level: float = 0.95) -> tuple[float, float]:
@@ -32,10 +39,64 @@ def ratio_interval(ratio: float, n: int, level: float = 0.95) -> tuple[float, fl
 
 def p_value(ratio: float, n: int) -> float:
     """Two-sided p-value of the hypothesis that the prediction is the true variance."""
-    if n < 2 or not np.isfinite(ratio):
-        return float("nan")
-    x = ratio * (n - 1)
-    return float(min(1.0, 2 * min(stats.chi2.cdf(x, n - 1), stats.chi2.sf(x, n - 1))))
+    return float(_p_values(np.array(ratio, float), np.array(n)))
+
+
+def _p_values(ratios: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The same for each of many; NaN where there is no ratio."""
+    freedom = np.where((counts >= 2) & np.isfinite(ratios), counts - 1.0, np.nan)
+    x = ratios * freedom
+    return np.minimum(1.0, 2 * np.minimum(stats.chi2.cdf(x, freedom), stats.chi2.sf(x, freedom)))
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """All judged rows as one: a chi-square test that sees what is a little wrong everywhere.
+
+    Attributes
+    ----------
+    ratio : float
+        Mean of the rows' variance ratios, weighted by their degrees of freedom n - 1.
+    interval : pair of float
+        Its two-sided 95 % chi-square interval.
+    p_value, limit : float
+        Two-sided, and the level it is held to.
+    """
+
+    ratio: float
+    interval: tuple[float, float]
+    p_value: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Bias:
+    """Whether the mean errors are what was predicted, up to what is allowed.
+
+    Attributes
+    ----------
+    rows : int
+        Rows of status ``ok`` judged.
+    allowance : float
+        What a mean error may differ from the predicted one, in predicted sigmas of one image.
+    largest : float
+        The largest difference, in the same unit.
+    significant : int
+        Rows whose difference is significantly not 0 (95 %), relevant or not.
+    within : int
+        Rows shown to keep the allowance (two one-sided tests at 5 %).
+    smallest_p, limit : float
+        Smallest p-value of the hypothesis that the difference is at most the allowance, and the level each row is held
+        to (Sidak).
+    """
+
+    rows: int
+    allowance: float
+    largest: float
+    significant: int
+    within: int
+    smallest_p: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -45,13 +106,21 @@ class Verdict:
     Attributes
     ----------
     agrees : bool
-        Whether no row contradicts its prediction at the Sidak-corrected level, and there is a row at all.
+        Whether none of the tests contradicts the predictions and at least half of all rows were measured.
     rows, inside : int
-        Rows judged; rows whose own 95 % interval holds 1.
+        Rows judged; rows whose own 95 % interval of the variance ratio holds 1.
     smallest_p, limit : float
-        Smallest p-value, and the level each row is held to so that the whole table has the level asked for.
+        Smallest p-value of a row's variance, and the level each row is held to (Sidak).
     text : str
-        One sentence.
+        One line; begins with "agree" or "contradict".
+    not_measured : int
+        Rows without a variance, or with more than `STRAY` of their images lost; they are not judged, but counted.
+    pooled : Pooled or None
+        None without a row.
+    bias : Bias or None
+        None if no mean errors were given, or no row is ``ok``.
+    reasons : tuple of str
+        What contradicts: some of ``rows``, ``pooled``, ``bias``, ``not measured``.
     """
 
     agrees: bool
@@ -60,10 +129,46 @@ class Verdict:
     smallest_p: float
     limit: float
     text: str
+    not_measured: int
+    pooled: Pooled | None
+    bias: Bias | None
+    reasons: tuple[str, ...]
 
 
-def verdict(ratios: list[float], counts: list[int], level: float = 0.01) -> Verdict:
-    """Judge all rows together: a table of true predictions is rejected with probability ``level``.
+def verdict(
+    ratios: ArrayLike,
+    counts: ArrayLike,
+    level: float = LEVEL,
+    *,
+    lost: ArrayLike = 0,
+    bias_px: ArrayLike | None = None,
+    predicted_bias_px: ArrayLike = 0.0,
+    sigma_px: ArrayLike | None = None,
+    ok: ArrayLike = True,
+) -> Verdict:
+    """Judge all rows together: a table of true predictions is contradicted with probability ``level`` at most.
+
+    Three tests share the level (Bonferroni, so whatever they have to do with each other; `SHARES`): the variance of
+    each row, the variance of all rows pooled, and the mean error of each row that is ``ok``. The last asks what is
+    relevant as well as significant. Its hypothesis is that the mean error lies within `ALLOWANCE` sigma of the
+    predicted one, and a p-value is taken at the end of that interval (a minimum-effect test, as in Murphy and Myors
+    1999): a bias that no single image would show is forgiven however many images prove it, and a small run, which could
+    not show that a bias is small, is not blamed for it. With 1000 images the allowance is 9.5 standard errors wide, so
+    a small share of the level costs this test hardly any power.
+
+    Parameters
+    ----------
+    ratios : array_like, shape (rows,)
+        Sample variance over predicted variance; NaN where there is none.
+    counts, lost : array_like
+        Images measured, and images that could not be.
+    level : float
+        Probability of contradicting a table that is true.
+    bias_px, predicted_bias_px, sigma_px : array_like
+        Measured and predicted mean error and predicted standard deviation (not variance) of one image, px. Without the
+        first nothing is said of biases.
+    ok : array_like of bool
+        Whether the row's status is ``ok``; only such rows have promised to be without bias.
 
     Examples
     --------
@@ -71,20 +176,124 @@ def verdict(ratios: list[float], counts: list[int], level: float = 0.01) -> Verd
     True
     >>> verdict([1.0, 1.3], [1000, 1000]).agrees
     False
+    >>> verdict([1.0, 1.0], [1000, 1000], bias_px=[0.001, 0.05], sigma_px=[0.1, 0.1]).reasons
+    ('bias',)
+    >>> verdict([1.0, float("nan"), float("nan")], [1000, 0, 0]).reasons
+    ('not measured',)
     """
-    judged = [(r, n) for r, n in zip(ratios, counts, strict=True) if n >= 2 and np.isfinite(r)]
-    if not judged:
-        return Verdict(False, 0, 0, float("nan"), level, "No row could be measured, so nothing is shown.")
-    limit = 1 - (1 - level) ** (1 / len(judged))
-    smallest = min(p_value(*row) for row in judged)
-    inside = sum(low <= 1 <= high for low, high in (ratio_interval(*row) for row in judged))
-    agrees = smallest >= limit
-    words = "agree with" if agrees else "contradict"
-    text = (
-        f"The measured variances {words} the predictions: {inside} of {len(judged)} rows inside their 95 % interval, "
-        f"smallest p-value {smallest:.2g} against {limit:.2g} (Sidak, {level:.0%} for the table)."
+    ratios, counts, lost, ok = np.broadcast_arrays(np.asarray(ratios, float), counts, lost, ok)
+    judged = np.isfinite(ratios) & (counts >= 2) & (lost <= STRAY * (counts + lost))
+    rows, missing = int(judged.sum()), int((~judged).sum())
+    if not rows:
+        text = f"contradict: none of {ratios.size} rows could be measured, so nothing is shown."
+        return Verdict(False, 0, 0, float("nan"), level, text, missing, None, None, ("not measured",))
+    away = np.full(ratios.shape, np.nan)
+    if bias_px is not None:
+        with np.errstate(all="ignore"):  # what is not finite then is not judged
+            away[:] = np.subtract(bias_px, predicted_bias_px, dtype=float) / np.asarray(sigma_px, float)
+    promised = judged & ok & np.isfinite(away)
+    levels = _levels(level, promised.any())
+    p_values, limit = _p_values(ratios[judged], counts[judged]), sidak(levels["rows"], rows)
+    smallest = float(p_values.min())
+    pooled = _pooled(ratios[judged], counts[judged] - 1, levels["pooled"])
+    bias = bias_test(away[promised], counts[promised], levels["bias"]) if "bias" in levels else None
+    broken = {
+        "rows": smallest < limit,
+        "pooled": pooled.p_value < pooled.limit,
+        "bias": bias is not None and bias.smallest_p < bias.limit,
+        "not measured": missing > rows,
+    }
+    reasons = tuple(name for name, wrong in broken.items() if wrong)
+    inside = int((p_values >= 0.05).sum())  # as much as 1 lying in the 95 % interval
+    found = Verdict(not reasons, rows, inside, smallest, limit, "", missing, pooled, bias, reasons)
+    return replace(found, text=_text(found, level))
+
+
+def _levels(level: float, with_bias: bool) -> dict[str, float]:
+    """The level of each test; the shares of one that is not made go to the others."""
+    shares = {name: share for name, share in SHARES.items() if with_bias or name != "bias"}
+    return {name: level * share / sum(shares.values()) for name, share in shares.items()}
+
+
+def sidak(level: float, tests: int) -> float:
+    """Level of each of several independent tests so that all together have ``level``.
+
+    >>> round(sidak(0.01, 16), 6)
+    0.000628
+    """
+    return -math.expm1(math.log1p(-level) / tests)
+
+
+def bias_p_value(difference: ArrayLike, n: ArrayLike, allowance: float = ALLOWANCE) -> np.ndarray:
+    """P-value of the hypothesis that a mean error differs from the predicted one by no more than an allowance.
+
+    Parameters
+    ----------
+    difference : array_like
+        Mean of n errors less its prediction, in sigmas of one image (predicted, which is what a user is told).
+    n : array_like
+        Number of images.
+    allowance : float
+        In the same unit; 0 for the plain two-sided test.
+
+    Examples
+    --------
+    >>> float(bias_p_value(0.25, 1000)), float(bias_p_value(0.5, 1000)) < 1e-9
+    (0.943..., True)
+    """
+    root = np.sqrt(n)
+    away = np.abs(difference) * root
+    return np.minimum(stats.norm.sf(away - allowance * root) + stats.norm.sf(away + allowance * root), 1.0)
+
+
+def _pooled(ratios: np.ndarray, freedoms: np.ndarray, level: float) -> Pooled:
+    freedom = int(freedoms.sum())
+    ratio = float((freedoms * ratios).sum() / freedom)
+    return Pooled(ratio, ratio_interval(ratio, freedom + 1), p_value(ratio, freedom + 1), level)
+
+
+def bias_test(difference: np.ndarray, counts: np.ndarray, level: float) -> Bias:
+    """Judge the mean errors of several rows; parameters as of `bias_p_value`, at least one row."""
+    shown = np.abs(difference) + stats.norm.isf(0.05) / np.sqrt(counts) < ALLOWANCE
+    return Bias(
+        rows=difference.size,
+        allowance=ALLOWANCE,
+        largest=float(np.abs(difference).max()),
+        significant=int((bias_p_value(difference, counts, 0.0) < 0.05).sum()),
+        within=int(shown.sum()),
+        smallest_p=float(bias_p_value(difference, counts).min()),
+        limit=sidak(level, difference.size),
     )
-    return Verdict(agrees, len(judged), inside, smallest, limit, text)
+
+
+_WRONG = {"rows": "a row's variance", "pooled": "the pooled variance", "bias": "a row's mean error"}
+
+
+def _text(found: Verdict, level: float) -> str:
+    """One line: the outcome, then the figures of each test."""
+    low, high = found.pooled.interval
+    parts = [
+        f"{found.inside} of {found.rows} rows inside their 95 % interval, smallest p-value {found.smallest_p:.2g} "
+        f"against {found.limit:.2g}",
+        f"pooled ratio {found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}], p-value {found.pooled.p_value:.2g} against "
+        f"{found.pooled.limit:.2g}",
+    ]
+    if found.bias:
+        parts.append(
+            f"mean errors up to {found.bias.largest:.2f} sigma from predicted, {found.bias.allowance:g} allowed, "
+            f"p-value {found.bias.smallest_p:.2g} against {found.bias.limit:.2g}"
+        )
+    if found.not_measured:
+        parts.append(f"{found.not_measured} of {found.rows + found.not_measured} rows not measured")
+    return f"{'; '.join([_outcome(found), *parts])} (false alarm at most {level:.2g} for all)."
+
+
+def _outcome(found: Verdict) -> str:
+    if found.agrees:
+        return "agree: measured is as predicted"
+    wrong = " and ".join(_WRONG[reason] for reason in found.reasons if reason in _WRONG)
+    said = [f"{wrong} not as predicted"] * bool(wrong) + ["most rows not measured"] * ("not measured" in found.reasons)
+    return f"contradict: {', '.join(said)}"
 
 
 def correlation(first: list[float], second: list[float]) -> dict[str, float] | None:

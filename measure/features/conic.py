@@ -9,9 +9,11 @@ import numpy as np
 
 from measure import status
 from scenes import InvalidInput
+from scenes.arrays import finite, numbers
 
 _STEPS = 12
 UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
+_FARTHEST = 1e9  # px; of a point
 
 
 @dataclass(frozen=True)
@@ -70,13 +72,14 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     >>> found.parameters.round(6).tolist()
     [50.0, 40.0, 20.0, 10.0, 0.0]
     """
-    points = np.asarray(points, float)
+    points = numbers(points, "points")
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < (3 if circle else 5):
         raise InvalidInput(f"points must be at least {3 if circle else 5} pairs (x, y), got shape {points.shape}")
     if not np.isfinite(points).all():
         raise InvalidInput("points must be finite, got NaN or infinity")
-    full = np.asarray(covariance, float)
-    full = full if full.ndim == 2 else np.diag(np.broadcast_to(full, len(points)).astype(float))
+    if np.abs(points).max() > _FARTHEST:
+        raise InvalidInput(f"points must lie within {_FARTHEST:g} px, got some beyond")
+    full = _covariance(covariance, len(points))
     with np.errstate(divide="ignore"):
         weights = np.minimum(1 / np.diag(full), 1e300)
     start = _start(points, circle)
@@ -87,6 +90,17 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     if not (good and known):
         return no_ellipse((), status.ILL_CONDITIONED)
     return Ellipse(parameters * UNITS, _whole(spread, circle) * np.outer(UNITS, UNITS), np.array(status.OK))
+
+
+def _covariance(given: np.ndarray | float, count: int) -> np.ndarray:
+    """Covariance of all points' distances, px^2, shape (I, I)."""
+    full = finite(given, "covariance")
+    if full.shape not in ((), (count,), (count, count)):
+        raise InvalidInput(f"covariance must be a number or of shape (I,) or (I, I), got shape {full.shape}")
+    full = full if full.ndim == 2 else np.diag(np.broadcast_to(full, count))
+    if not (np.diag(full) >= 0).all() or np.abs(full).max() > _FARTHEST**2:
+        raise InvalidInput(f"covariance must be of variances from 0 to {_FARTHEST**2:g} px^2, got others")
+    return full
 
 
 def _start(points: np.ndarray, circle: bool) -> np.ndarray:

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from measure.features.shape import Shape
+from scenes import InvalidInput
+from scenes.arrays import numbers
+
+_FARTHEST = 1e9  # px
 
 
 def point_distance(
@@ -30,11 +34,26 @@ def point_distance(
     >>> float(value), round(float(variance), 6)
     (5.0, 0.04)
     """
-    across = np.asarray(second) - np.asarray(first)
+    first, second = _points("first", first), _points("second", second)
+    first_covariance = _points("first_covariance", first_covariance, 2)
+    second_covariance = _points("second_covariance", second_covariance, 2)
+    try:
+        np.broadcast_shapes(first.shape, second.shape, first_covariance.shape[:-1], second_covariance.shape[:-1])
+    except ValueError:
+        raise InvalidInput("points and covariances must be of shapes that go together, got others") from None
+    across = second - first
     value = np.linalg.norm(across, axis=-1)
     unit = across / np.where(value > 0, value, 1)[..., None]
-    total = np.asarray(first_covariance) + np.asarray(second_covariance)
+    total = first_covariance + second_covariance
     return value, np.einsum("...i,...ij,...j->...", unit, total, unit)
+
+
+def _points(name: str, values: np.ndarray, axes: int = 1) -> np.ndarray:
+    array = numbers(values, name)
+    if array.shape[-axes:] != (2,) * axes or not (np.abs(array) <= _FARTHEST**axes).all():
+        shape = f"(..., {', '.join('2' * axes)})"
+        raise InvalidInput(f"{name} must be of numbers to {_FARTHEST**axes:g}, shape {shape}, got shape {array.shape}")
+    return array
 
 
 def line_angle(shape: Shape, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:

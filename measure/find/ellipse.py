@@ -12,11 +12,14 @@ from measure.features.calipers import MIN_POSITIONS
 from measure.features.conic import UNITS, Ellipse, no_ellipse
 from measure.features.optics import Optics
 from planner.features.locator import MIN_CONTRAST, edge_blur
+from scenes import InvalidInput
+from scenes.arrays import finite, grey_levels
 
 _MIN_FOUND = 0.5  # part of the outline on which there must be edge points
 _SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _START_STEPS = 4
 _MOST_INWARD = 0.3  # px up to which the first order in the curvature is good for a start
+_LARGEST = 1e5  # px; of an ellipse that an image shows
 _LEAST_CONTRAST = 2.5  # contrast / noise below which the start is not near enough
 
 
@@ -42,6 +45,11 @@ def find_ellipse(
     spacing : float
         Distance of the edge points in units of the smoothing scale.
 
+    Raises
+    ------
+    InvalidInput
+        If the images are none, or the expected ellipse is none.
+
     Returns
     -------
     Ellipse
@@ -49,8 +57,13 @@ def find_ellipse(
         equal the angle has no meaning, and its variance is infinite. The status is ``clutter`` where the picture has
         more beside the ellipse than the noise explains: the parameters may be biased.
     """
+    images, expected = grey_levels(images, "images"), finite(expected, "expected")
+    if images.shape[-2:] != optics.shape:
+        raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {images.shape}")
+    if expected.shape != (5,) or not (expected[2:4] > 0).all() or np.abs(expected).max() > _LARGEST:
+        raise InvalidInput(f"expected must be x, y, a, b and angle of an ellipse, got {expected}")
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    start = to_symmetric(np.asarray(expected, float) / UNITS)
+    start = to_symmetric(expected / UNITS)
     angles, places, normals = _positions(start, optics, spacing)
     if len(angles) < max(MIN_POSITIONS, 5):
         return no_ellipse(lead, status.NOT_VISIBLE)

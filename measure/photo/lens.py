@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
-from pydantic import ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from measure.estimators.gradient import gradient_along
 from measure.features.calipers import edge_calipers
@@ -19,30 +19,43 @@ from measure.features.points import EdgePoints
 from planner.features.locator import reach
 from scenes import InvalidInput
 from scenes.errors import describe
+from scenes.files import read_toml
 from scenes.model import Model
-from scenes.ranges import Positive
+
+
+def _not_tiny(value: float) -> float:
+    if value < 1e-3:
+        raise ValueError(f"a focal length must be at least 0.001 px, got {value:g}")
+    return value
+
+
+_Focal = Annotated[float, Field(gt=0, le=1e12), AfterValidator(_not_tiny)]
 
 
 class Lens(Model):
     """Intrinsics in px and distortion coefficients k1, k2, p1, p2, k3 (OpenCV's order, the rest 0)."""
 
-    fx: Positive
-    fy: Positive
-    cx: float
-    cy: float
-    distortion: tuple[float, ...] = ()
+    fx: _Focal
+    fy: _Focal
+    cx: Annotated[float, Field(ge=-1e9, le=1e9)]
+    cy: Annotated[float, Field(ge=-1e9, le=1e9)]
+    distortion: Annotated[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...], Field(max_length=5)] = ()
 
     @property
     def matrix(self) -> np.ndarray:
         """Camera matrix, shape (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
+    @property
+    def coefficients(self) -> np.ndarray:
+        """All five, shape (5,)."""
+        return np.array([*self.distortion, *[0.0] * (5 - len(self.distortion))])
+
     def straighten(self, points: np.ndarray) -> np.ndarray:
         """Where image points (..., 2), px, would be without distortion, px of the same camera matrix."""
         flat = np.asarray(points, float).reshape(-1, 1, 2)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-        coefficients = np.array(self.distortion, float)
-        straight = cv2.undistortPoints(flat, self.matrix, coefficients, None, None, self.matrix, criteria)
+        straight = cv2.undistortPoints(flat, self.matrix, self.coefficients, None, None, self.matrix, criteria)
         return straight.reshape(np.shape(points))
 
     def distort(self, points: np.ndarray) -> np.ndarray:
@@ -52,7 +65,7 @@ class Lens(Model):
         y = (points[..., 1] - self.cy) / self.fy
         rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 1, 3)
         zero = np.zeros(3)
-        bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, np.array(self.distortion, float))
+        bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, self.coefficients)
         return bent.reshape(points.shape)
 
 
@@ -65,11 +78,7 @@ def load_lens(path: Path) -> Lens:
         If the file cannot be read, is no TOML, or a value in it is bad.
     """
     try:
-        return Lens.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InvalidInput(f"{path} must be a readable file, got {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path} must be valid TOML, got {str(error).splitlines()[0]}") from None
+        return Lens.model_validate(read_toml(path))
     except ValidationError as error:
         raise InvalidInput(f"{path}: {describe(error)}") from None
 

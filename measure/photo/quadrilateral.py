@@ -12,9 +12,8 @@ from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
 from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
-from measure.measurement import checked_image
 from measure.photo.lens import Lens, straight_corners
-from scenes import InvalidInput
+from scenes.arrays import picture
 
 
 @dataclass(frozen=True)
@@ -73,10 +72,7 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
     InvalidInput
         If there is no quadrilateral, or the image is no image.
     """
-    image = np.asarray(image)
-    image = checked_image(image, image.shape[-2:])
-    if image.ndim != 2:
-        raise InvalidInput(f"image must be of shape (height, width), got {image.shape}")
+    image = picture(image)
     corners, noise = find_quadrilateral(image), max(noise_sigma(image), np.sqrt(1 / 12))
     blur = edge_sigma(image, corners)
     optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))

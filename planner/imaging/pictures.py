@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from planner.imaging.projection import light_position, sensor_position
-from scenes import Picture, Scene
+from scenes import InvalidInput, Picture, Scene
+from scenes.arrays import poses
 
 T = TypeVar("T")
 
@@ -38,8 +39,10 @@ class Pictures:
         """From a picture, or from a scene, sensors (..., 2) and the poses of its light (..., 2) or of each light."""
         if isinstance(scene, Picture):
             return _of_picture(scene)
+        if not isinstance(scene, Scene):
+            raise InvalidInput(f"scene must be a Scene or a Picture, got {type(scene).__name__}")
         each = () if lights is None else lights if isinstance(lights, tuple) and len(scene.lights) > 1 else (lights,)
-        return cls(scene, np.asarray(sensors, float), tuple(np.asarray(poses, float) for poses in each))
+        return cls(scene, poses(sensors, "sensors"), tuple(poses(some, "lights") for some in each))
 
     def with_scene(self, scene: Scene) -> Pictures:
         """The same poses in another scene."""

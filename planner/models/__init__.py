@@ -25,6 +25,6 @@ def variance_model(name: str) -> Callable[[Pictures], Errors]:
     InvalidInput
         If there is no such model.
     """
-    if name not in _MODELS:
+    if not isinstance(name, str) or name not in _MODELS:
         raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {name!r}")
     return _MODELS[name]

@@ -51,9 +51,15 @@ class Constraints:
             low, high = getattr(self, name)
             if not 0 <= low <= high <= 180:
                 raise InvalidInput(f"{name} must be two rising angles between 0 and 180, got {(low, high)}")
-        for name in ("min_edge_px", "min_clearance_px", "min_separation_deg"):
-            if not getattr(self, name) >= 0:
-                raise InvalidInput(f"{name} must be at least 0, got {getattr(self, name)}")
+        for name, most in (("min_edge_px", 1e9), ("min_clearance_px", 1e9), ("min_separation_deg", 180)):
+            value = getattr(self, name)
+            if not 0 <= value <= most:
+                raise InvalidInput(f"{name} must be at {f'most {most:g}' if value > most else 'least 0'}, got {value}")
+        for name in ("forbidden_sensor", "forbidden_light"):
+            for region in getattr(self, name):
+                polar, azimuth, radius = region
+                if not (0 <= polar <= 180 and np.isfinite(azimuth) and 0 <= radius <= 180):
+                    raise InvalidInput(f"{name} must be polar, azimuth and radius in degrees, got {region}")
 
     @property
     def on_pairs(self) -> bool:

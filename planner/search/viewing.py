@@ -54,6 +54,8 @@ class ViewingSpace:
         rings = np.arange(round(180 / self.step_deg) + 1) * self.step_deg
         low, high = self.polar_deg
         rings = rings[(rings >= low - 1e-9) & (rings <= min(high, 180.0) + 1e-9)]
+        if not rings.size:  # a range between two of the grid's rings
+            rings = np.array([(low + min(high, 180.0)) / 2])
         return np.concatenate([self._ring(polar) for polar in rings])
 
     def _ring(self, polar: float) -> np.ndarray:

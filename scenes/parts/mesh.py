@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +14,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
+from scenes.files import Unreadable, read_bytes
 from scenes.parts.solid import Circle, Edge, Solid
 
 FORMATS = (".stl", ".ply", ".obj")
+MOST_BYTES = 32 << 20
+MOST_TRIANGLES = 20_000
+MOST_FACES = 2_000  # plane ones: what is computed grows with the square of their edges
+_FARTHEST = 1e9  # cm; beyond, its faces cannot be told to be flat
+_PLAIN = {"obj": {"skip_materials": True}}
 _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
 _MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
 _ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
@@ -30,13 +39,45 @@ def read(path: Path) -> Solid:
     if path.suffix.lower() not in FORMATS:
         raise InvalidInput(f"object.file must be one of {', '.join(FORMATS)}, got {path.name!r}")
     try:
-        mesh = trimesh.load_mesh(path)
+        data, kind = read_bytes(path, MOST_BYTES), path.suffix.lower()[1:]
+    except Unreadable as error:
+        raise InvalidInput(f"object.file must be a readable mesh, got {path} ({error.reason})") from None
+    _check_told(path, data, kind)
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            # without a resolver: a texture or a material beside the file is none of our business
+            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, resolver=None, **_PLAIN.get(kind, {}))
     except ImportError:  # the reader's guess at the text's encoding
         raise InvalidInput(f"object.file must be a readable mesh, got {path} (text that is not UTF-8)") from None
     except Exception as error:  # every reader raises its own
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InvalidInput(f"object.file must be a readable mesh, got {path} ({reason})") from None
-    return solid(mesh)
+    if isinstance(mesh, trimesh.Trimesh):
+        _check_mesh(path, mesh)
+    with np.errstate(all="ignore"):
+        return solid(mesh)
+
+
+def _check_told(path: Path, data: bytes, kind: str) -> None:
+    """Refuse what says of itself that it is too large, before memory is taken for it."""
+    told = 0
+    if kind == "stl" and len(data) >= 84 and data.lstrip()[:5].lower() != b"solid":
+        told = int.from_bytes(data[80:84], "little")
+    if kind == "ply":
+        counts = re.findall(rb"element\s+\w+\s+(\d{1,20})", data[:10_000])
+        told = max(map(int, counts), default=0)
+    if told > MOST_TRIANGLES:
+        raise InvalidInput(f"object.file must be of at most {MOST_TRIANGLES} triangles, got {path} with {told}")
+
+
+def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
+    if len(mesh.faces) > MOST_TRIANGLES:
+        raise InvalidInput(
+            f"object.file must be of at most {MOST_TRIANGLES} triangles, got {path} with {len(mesh.faces)}"
+        )
+    if len(mesh.vertices) and not (np.isfinite(mesh.vertices).all() and np.abs(mesh.vertices).max() <= _FARTHEST):
+        raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g} cm, got others in {path}")
 
 
 def solid(mesh: trimesh.Trimesh) -> Solid:
@@ -62,6 +103,8 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     if not mesh.is_volume:
         raise InvalidInput("object.file must be a closed surface with outward normals, got an open or inverted one")
     group = _planes(mesh)
+    if group.max() >= MOST_FACES:
+        raise InvalidInput(f"object.file must have at most {MOST_FACES} plane faces, got {group.max() + 1}")
     pieces = _pieces(mesh, group)
     chains = _straight_chains(mesh.vertices, pieces)
     used = np.unique([end for chain in chains for end in chain[0]])

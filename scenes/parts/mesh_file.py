@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from scenes.model import Model
-from scenes.parts import mesh
 from scenes.parts.solid import Solid
 
 
@@ -42,6 +41,8 @@ class Mesh(Model):
     @property
     def solid(self) -> Solid:
         """Vertices, faces, edges and circles of the mesh, read once."""
+        from scenes.parts import mesh  # loads trimesh
+
         key = self.file, tuple(self.names.items())
         if self._made is None or self._made[0] != key:
             self._made = key, mesh.renamed(mesh.read(self.file), self.names)

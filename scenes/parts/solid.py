@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
-from scipy.spatial import ConvexHull
+
+if TYPE_CHECKING:
+    import trimesh
 
 _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
 
@@ -124,6 +126,8 @@ class Solid:
         """Planes (normals, offsets) of the convex hull."""
         if self.is_convex:
             return self.normals, self.offsets
+        from scipy.spatial import ConvexHull  # as trimesh, half a second to load, which a block does not need
+
         planes = ConvexHull(self.vertices).equations
         return planes[:, :3], -planes[:, 3]
 
@@ -155,6 +159,8 @@ class Solid:
 
     def mesh(self) -> trimesh.Trimesh:
         """The surface as triangles, vertices merged, normals outwards."""
+        import trimesh
+
         flat = self.triangles.reshape(-1, 3)
         return trimesh.Trimesh(flat, np.arange(len(flat)).reshape(-1, 3), process=True)
 

@@ -1,29 +1,35 @@
-"""A small run of `tests.hard.fuzz`; ``make fuzz`` feeds 10,000 inputs."""
+"""A small run of `tests.hard.fuzzing`; ``make fuzz`` makes 20,000 tries."""
 
 import numpy as np
 import pytest
 
 import scenes
 from scenes import InvalidInput
-from tests.hard import fuzz
+from tests.hard import fuzzing
+from tests.hard.fuzzing.doors import DOORS
 from validation import picture_file
 
+pytestmark = pytest.mark.render
 
-def test_400_corrupted_inputs(tmp_path, capfd):
-    before = fuzz.peak_memory()
-    found = fuzz.run(400, seed=20261121, folder=tmp_path)
+
+def test_600_tries(tmp_path, capfd):
+    """No finding; every door refuses something, and most of them let something in."""
+    before = fuzzing.peak_memory()
+    found = fuzzing.run(600, seed=20261121, folder=tmp_path)
     capfd.readouterr()  # what the image libraries say of corrupted files
     assert not found.failures
-    assert sum(found.outcomes.values()) == 400
-    assert found.outcomes["scene: predicted"] > 10
-    assert found.outcomes["image: measured"] > 5
-    assert fuzz.peak_memory() < max(fuzz.MOST_MEMORY, before + 1)
+    assert sum(found.outcomes.values()) == 600
+    for door in {door.__name__ for door in DOORS}:
+        assert found.outcomes[f"{door}: refused"] > 5
+    answers = {door.split(":")[0] for door in found.outcomes if not door.endswith("refused")}
+    assert answers >= {"mesh", "image", "campaign", "comparison", "directory", "command", "array"}
+    assert fuzzing.peak_memory() < max(fuzzing.MOST_MEMORY, before + 1)
 
 
 @pytest.mark.parametrize("broken", [lambda *_: 1 / 0, lambda *_: (_ for _ in ()).throw(MemoryError("much"))])
 def test_a_traceback_would_be_found(broken, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(scenes, "load", broken)
-    found = fuzz.run(8, seed=1, folder=tmp_path)
+    found = fuzzing.run(8, seed=1, folder=tmp_path)
     capfd.readouterr()
     assert len(found.failures) >= 5
 

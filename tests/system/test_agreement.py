@@ -70,6 +70,24 @@ def test_a_single_wrong_row_is_seen(kind, estimator):
         assert holds(scaled(rows, kind, off, lambda row, which=which: row is which))[kind, estimator] is False
 
 
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_biased_row_is_seen(estimator):
+    """0.45 sigma in one row of 20 breaks that estimator's claim alone, 0.2 sigma does not: one picture cannot tell."""
+    rows = made_up()
+    first = next(row for row in rows if row.estimator == estimator)
+    for sigmas, truth in ((0.45, False), (-0.45, False), (0.2, True)):
+        off = [replace(row, bias_px=sigmas * np.sqrt(row.propagated)) if row is first else row for row in rows]
+        found = holds(off)
+        assert found.pop(("bias", estimator)) is truth
+        assert all(found.values())
+
+
+@pytest.mark.parametrize("kind", ["propagated", "reported"])
+def test_what_is_a_little_wrong_everywhere_is_seen(kind):
+    """6 % in each of 20 rows of one estimator: every row is inside its limit, all together are not."""
+    assert holds(scaled(made_up(), kind, 1.06, lambda row: row.estimator == "strip"))[kind, "strip"] is False
+
+
 @pytest.mark.parametrize("group", ["one", "two"])
 @pytest.mark.parametrize(
     ("factor", "truth"), [(1.3, False), (1 / 1.3, False), (1.04, False), (0.96, False), (1.02, True)]

@@ -42,7 +42,7 @@ def test_ellipse_in_an_exact_image():
 
 @pytest.mark.parametrize("circle", [False, True])
 def test_covariance_in_noisy_images(rng, circle):
-    """1000 images: standard error of a variance 4.5 %; 1.3 x the prediction is 6 of them away."""
+    """1000 images: standard error of a variance 4.5 %; 1.5 x the prediction is refused for each parameter."""
     true = np.array([55.3, 50.7, 20.0, 20.0, 0.0]) if circle else np.array([55.3, 50.7, 35.0, 18.0, 23.0])
     clean = picture(true)
     predicted = np.diag(measure.find_ellipse(clean, true, OPTICS, circle=circle).covariance)
@@ -53,7 +53,7 @@ def test_covariance_in_noisy_images(rng, circle):
     ratio = found.parameters.var(0, ddof=1)[used] / predicted[used]
     within = 4 * np.sqrt(2 / 999)
     assert np.abs(ratio - 1).max() < within
-    assert np.abs(ratio / 1.3 - 1).max() > within
+    assert np.abs(ratio / 1.5 - 1).min() > within  # each of the parameters
 
 
 @pytest.mark.parametrize(("circle", "arc"), [(False, 2 * np.pi), (False, 4.0), (True, 2 * np.pi), (True, 2.0)])
@@ -74,7 +74,7 @@ def test_fit_to_points_of_unequal_noise(rng, circle, arc):
     used = slice(0, 4) if circle else slice(0, 5)
     ratio = np.array([fit.parameters for fit in fits]).var(0, ddof=1)[used] / predicted[used]
     assert np.abs(ratio - 1).max() < 5 * np.sqrt(2 / 1499)
-    assert np.abs(ratio / 1.3 - 1).max() > 5 * np.sqrt(2 / 1499)
+    assert np.abs(ratio / 1.5 - 1).min() > 5 * np.sqrt(2 / 1499)
 
 
 def test_five_points_determine_an_ellipse():

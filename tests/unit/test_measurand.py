@@ -10,6 +10,7 @@ from planner.features.projected_edges import projected_edges
 from planner.imaging.appearance import paper_contrast2
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, jacobian, project
+from planner.imaging.visibility import visible_spans
 from planner.models.paper import paper
 from scenes import InvalidInput
 
@@ -130,7 +131,6 @@ def test_paper_price_by_monte_carlo(name, angle, rng):
     squared = paper_contrast2(Pictures.of(scene, SENSOR, LIGHT), view.names, fractions)
     sigma = np.sqrt(8.697) * scene.noise.sigma / np.sqrt(squared)
     along = (view.ends[:, 1] - view.ends[:, 0]) / view.lengths[:, None]
-    normal = np.stack([-along[:, 1], along[:, 0]], -1)
     count = 4000
     errors = sigma * rng.standard_normal((count, *sigma.shape))
     u = np.einsum("eni,ei->en", image - view.ends[:, :1], along)
@@ -138,7 +138,6 @@ def test_paper_price_by_monte_carlo(name, angle, rng):
     mean = (weight * u).sum(-1) / weight.sum(-1)
     slope = (weight * (u - mean[:, None]) * errors).sum(-1) / (weight * (u - mean[:, None]) ** 2).sum(-1)
     offset = (weight * errors).sum(-1) / weight.sum(-1) - slope * mean
-    assert normal.shape == along.shape
     values = np.array(
         [measured(scene, np.stack(line, -1), view) for line in zip(offset, np.arctan(slope), strict=True)]
     )
@@ -174,6 +173,13 @@ def test_outline_of_a_hidden_edge_keeps_what_is_seen():
     bracket = scenes.load("bracket")
     sensor = np.array([55.0, 178.0])  # behind the upright
     view = projected_edges(Pictures.of(bracket, sensor), ("e14",))
-    shown = view.shown[0]
-    assert 0 < shown[0] < shown[1] == 1 or not view.visible[0]
-    assert view.trims[0, 0] > shown[0] * view.lengths[0]
+    (shown,), (trim,) = view.shown, view.trims
+    assert view.visible[0]
+    # the part that is hidden in space, 0.859, as perspective shows it: by the depths of the edge's ends
+    edge, at = bracket.solid.edge("e14"), bracket.position("sensor", scenes.Pose(*sensor))
+    ((free, end),) = visible_spans(bracket.solid, edge, at)
+    near, far = (at - bracket.solid.vertices[list(edge.ends)]) @ (at - np.array(bracket.camera.look_at))
+    assert shown[0] == pytest.approx(free * far / ((1 - free) * near + free * far), rel=1e-9)
+    assert (shown[1], end) == (1, 1)
+    assert 0.8 < shown[0] < 0.9
+    assert trim[0] > shown[0] * view.lengths[0]

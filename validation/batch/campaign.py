@@ -6,7 +6,6 @@ import bisect
 import contextlib
 import itertools
 import math
-import tomllib
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +17,15 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 import scenes
 from scenes import InvalidInput, Picture, Pose, Scene, Setting
 from scenes.errors import describe
-from scenes.model import Model
+from scenes.files import read_toml
+from scenes.load import find, from_document
+from scenes.model import FileName, Model, Title
+
+MOST_SETTINGS = 4_000_000
+MOST_SCENES = 1_000
+MOST_VALUES = 1_000  # of an axis or a swept key
+_LARGEST = 1e15  # of a range's numbers
+_MOST_KEYS = 8  # swept at a time
 
 
 def _values(axis: Any) -> Any:
@@ -27,24 +34,33 @@ def _values(axis: Any) -> Any:
         return axis
     try:
         start, stop = float(axis["from"]), float(axis["to"])
-        count = int(axis["count"]) if "count" in axis else math.floor((stop - start) / axis["step"] + 1e-9) + 1
-        if len(axis) != 3 or count < 1:
+        (how,) = axis.keys() - {"from", "to"}
+        size = float(axis[how])
+        if how not in ("count", "step") or len(axis) != 3 or not max(map(abs, (start, stop, size))) <= _LARGEST:
             raise ValueError
-        return np.linspace(start, stop if "count" in axis else start + (count - 1) * axis["step"], count).tolist()
-    except (KeyError, TypeError, ValueError, ZeroDivisionError):
+        count = int(size) if how == "count" else math.floor((stop - start) / size + 1e-9) + 1
+        if count < 1 or (how == "count" and count != size):
+            raise ValueError
+    except (KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         raise ValueError(f"a range must be {{from, to, count}} or {{from, to, step}}, got {axis}") from None
+    if count > MOST_VALUES:
+        raise ValueError(f"a range must be of at most {MOST_VALUES} values, got {float(count):.3g}")
+    return np.linspace(start, stop if how == "count" else start + (count - 1) * size, count).tolist()
 
 
-Axis = Annotated[tuple[float, ...], BeforeValidator(_values), Field(min_length=1)]
+_Angle = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST)]
+_Axis = Field(min_length=1, max_length=MOST_VALUES)
+Polar = Annotated[tuple[Annotated[float, Field(ge=0, le=180)], ...], BeforeValidator(_values), _Axis]
+Azimuth = Annotated[tuple[_Angle, ...], BeforeValidator(_values), _Axis]
 
 
 class Grid(Model):
     """Every sensor with every light; angles in degrees."""
 
-    sensor_polar: Axis
-    sensor_azimuth: Axis
-    light_polar: Axis
-    light_azimuth: Axis
+    sensor_polar: Polar
+    sensor_azimuth: Azimuth
+    light_polar: Polar
+    light_azimuth: Azimuth
 
     @property
     def axes(self) -> tuple[tuple[float, ...], ...]:
@@ -80,14 +96,15 @@ class Campaign(Model):
     Raises
     ------
     pydantic.ValidationError
-        If there is no scene or no setting, or a swept value makes a scene invalid. `load` turns it into `InvalidInput`.
+        If there is no scene or no setting, more than `MOST_SETTINGS` of them, or a swept value makes a scene invalid.
+        `load` turns it into `InvalidInput`.
     """
 
-    name: str
-    title: str = ""
-    scenes: Annotated[tuple[Scene, ...], Field(min_length=1)]
+    name: FileName
+    title: Title = ""
+    scenes: Annotated[tuple[Scene, ...], Field(min_length=1, max_length=MOST_SCENES)]
     grid: Grid | None = None
-    sweep: dict[str, Annotated[tuple[Any, ...], BeforeValidator(_values), Field(min_length=1)]] = Field({})
+    sweep: dict[str, Annotated[tuple[Any, ...], BeforeValidator(_values), _Axis]] = Field({})
     _latest: tuple[tuple[int, int], Scene] | None = PrivateAttr(None)
 
     @classmethod
@@ -162,10 +179,14 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Campaign:
-        if not len(self):
+        if not self._ends[-1]:
             raise ValueError(
                 f"settings must be a list of at least one sensor and light, or a grid given, got {self.name}"
             )
+        if len(self.sweep) > _MOST_KEYS:
+            raise ValueError(f"sweep must be of at most {_MOST_KEYS} keys, got {len(self.sweep)}")
+        if self._ends[-1] > MOST_SETTINGS:
+            raise ValueError(f"settings must be at most {MOST_SETTINGS} in all, got {self._ends[-1]:.3g}")
         for scene, (key, values) in itertools.product(self.scenes, self.sweep.items()):
             for value in values:
                 changed(scene, {key: value})
@@ -200,16 +221,12 @@ def load(source: str | Path) -> Campaign:
     InvalidInput
         One line that names the file and the key.
     """
-    path = Path(source)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8")) if path.suffix == ".toml" else {}
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):
-        document = {}  # the scene's loader says what is wrong
+    path = find(source)
+    document = read_toml(path)
     if "scenes" in document:
         return _campaign(path, document)
-    scene = scenes.load(source)
     try:
-        return Campaign.of(scene)
+        return Campaign.of(from_document(path, document))
     except ValidationError as error:
         raise InvalidInput(f"{source}: {describe(error)}") from None
 
@@ -218,6 +235,8 @@ def _campaign(path: Path, document: dict[str, Any]) -> Campaign:
     names = document["scenes"]
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InvalidInput(f"{path}: scenes must be a list of names or files, got {names!r}")
+    if len(names) > MOST_SCENES:
+        raise InvalidInput(f"{path}: scenes must be at most {MOST_SCENES}, got {len(names)}")
     document["scenes"] = [scenes.load(name if name in scenes.names() else path.parent / name) for name in names]
     if "sweep" in document:
         document["sweep"] = _flat(document["sweep"])

@@ -99,6 +99,8 @@ def run(
         If workers keep dying, the scheduler goes away, or the run file cannot be written. The same call continues.
     """
     _check(scene, renders, seed, workers, effects)
+    if dask:
+        pools.check_address(dask)
     started = time.perf_counter()
     campaign, variant = Campaign.of(scene), variants.choose()
     count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)

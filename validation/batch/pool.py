@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
@@ -15,6 +17,8 @@ from multiprocessing.connection import Connection
 
 from scenes import InvalidInput
 from validation.batch.stopped import Stopped
+
+_ANSWER_S = 4.0  # within which a host answers
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,25 @@ def _end_with(lifeline: Connection) -> None:
         os._exit(1)
 
 
+def check_address(address: str) -> None:
+    """See that a scheduler's address has the form of one, and that somebody answers at it if it is a host's.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    form = re.fullmatch(r"(?:([a-z]+)://)?\[?([\w.:%-]+?)\]?:(\d{1,5})", address)
+    if not form and not re.fullmatch(r"inproc://\S+", address):
+        raise InvalidInput(f"--dask must be an address such as tcp://127.0.0.1:8786, got {address!r}")
+    if form and form[1] in (None, "tcp", "tls"):
+        try:
+            socket.create_connection((form[2], int(form[3])), timeout=_ANSWER_S).close()
+        except (OSError, OverflowError, UnicodeError) as error:
+            reason = f"{address} ({_line(error)})"
+            raise InvalidInput(f"--dask must be the address of a running scheduler, got {reason}") from None
+
+
 @contextmanager
 def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
     """The workers of a running Dask cluster.
@@ -92,6 +115,7 @@ def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
     InvalidInput
         If Dask is not installed, or no scheduler answers at the address.
     """
+    check_address(address)
     try:
         from distributed import Client
     except ImportError:

@@ -17,13 +17,17 @@ from validation.batch.store import RunFile
 from validation.batch.work import Method, methods
 from validation.statistics import Verdict
 
+_WAITING = "not yet worked on"
+
 
 @dataclass(frozen=True)
 class Judged:
     """One method in one setting: predicted from its image against measured.
 
     Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
-    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px.
+    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
+    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error sqrt(empirical + bias^2), px. The
+    status is that of the noise-free image unless it is ``ok`` and more images are lost than may be (`row_status`).
     """
 
     method: str
@@ -35,6 +39,8 @@ class Judged:
     ratio: float | None
     ratio_interval: tuple[float, float] | None
     bias: float | None
+    predicted_bias: float
+    rmse: float | None
     status: str
 
 
@@ -42,15 +48,13 @@ class Judged:
 class Row:
     """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
 
-    ``value_px`` is the model's distance and ``predicted_bias`` what the classic locators add to it without noise, px;
-    ``parameters`` are the values that a campaign gave to keys of the scene.
+    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
     """
 
     index: int
     scene: str
     parameters: dict[str, Any]
     value_px: float
-    predicted_bias: float
     sensor: tuple[float, float]
     light: tuple[float, float]
     paper_ice: float | None
@@ -99,7 +103,8 @@ class Validation:
                     for scene, sensor, light, theirs, ours in self.search
                 ],
                 "correlation": self.correlation,
-                "verdict": asdict(self.verdict),
+                "verdict": self.verdict.text,
+                "judgement": asdict(self.verdict),
                 "classic_verdicts": {name: asdict(found) for name, found in self.classic_verdicts.items()},
                 "seconds": self.seconds,
             }
@@ -114,15 +119,16 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     InvalidInput
         If no setting could be worked on.
     """
-    identity = store.fact("identity")
+    identity = store.identity()
     indices, refused = [], {}
     for i in range(len(campaign)):
         if store.predicted(i):
             indices.append(i)
         else:
-            refused[i] = store.trouble(i) or "not yet worked on"
+            refused[i] = store.trouble(i) or _WAITING
     if not indices:
-        raise InvalidInput(next(iter(refused.values())))
+        reason = next(iter(refused.values()))
+        raise InvalidInput("the run must have measured a setting, got none yet" if reason == _WAITING else reason)
     scale = _free_scale(campaign, indices, store)
     rows = tuple(_row(campaign.case(i), scale, store) for i in indices)
     return Validation(
@@ -135,7 +141,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         refused=refused,
         search=_search(campaign, scale),
         correlation=_correlations(rows),
-        verdict=_judge([row.main for row in rows]),
+        verdict=_judge([row.main for row in rows], sum(reason != _WAITING for reason in refused.values())),
         classic_verdicts=_classic_verdicts(rows),
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
@@ -161,13 +167,12 @@ def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float
 
 def _row(case: Case, scale: float | None, store: RunFile) -> Row:
     setting, model = case.setting, store.predicted(case.index)
-    main, *classic = (_judged(case.index, method, model["value_px"], store) for method in methods(case.scene))
+    main, *classic = (_judged(case.index, method, model, store) for method in methods(case.scene))
     return Row(
         index=case.index,
         scene=case.scene.name,
         parameters=case.parameters,
         value_px=model["value_px"],
-        predicted_bias=model["predicted_bias"],
         sensor=tuple(setting.sensor),
         light=tuple(setting.light),
         paper_ice=setting.paper_ice,
@@ -180,7 +185,7 @@ def _row(case: Case, scale: float | None, store: RunFile) -> Row:
     )
 
 
-def _judged(setting: int, method: Method, model_px: float, store: RunFile) -> Judged:
+def _judged(setting: int, method: Method, model: dict[str, float], store: RunFile) -> Judged:
     propagated, _, status = store.propagated(setting, method.name)
     distances = store.distances(setting, method.name)
     good = distances[np.isfinite(distances)]
@@ -188,8 +193,7 @@ def _judged(setting: int, method: Method, model_px: float, store: RunFile) -> Ju
     empirical = float(np.var(good, ddof=1)) if good.size > 1 else None
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
     ratio = empirical / propagated if judged else None
-    if failures and status == "ok":
-        status = max(failures, key=failures.get)
+    bias = float(good.mean() - model["value_px"]) if good.size else None
     return Judged(
         method=method.name,
         propagated=propagated,
@@ -199,15 +203,54 @@ def _judged(setting: int, method: Method, model_px: float, store: RunFile) -> Ju
         failures=failures,
         ratio=ratio,
         ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
-        bias=float(good.mean() - model_px) if good.size else None,
-        status=status,
+        bias=bias,
+        predicted_bias=model["predicted_bias"],
+        rmse=None if empirical is None else math.hypot(math.sqrt(empirical), bias),
+        status=row_status(status, failures, distances.size),
     )
 
 
-def _judge(judged: list[Judged]) -> Verdict:
+def row_status(clean: str, others: dict[str, int], images: int) -> str:
+    """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.
+
+    Parameters
+    ----------
+    clean : str
+        Status of the noise-free image.
+    others : dict
+        Number of noisy images by status, of those that are not ``ok``.
+    images : int
+        Noisy images in all; `statistics.STRAY` of them may be lost.
+
+    Examples
+    --------
+    >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
+    ('ok', 'low_contrast')
+    """
+    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
+        return clean
+    return max(others, key=others.get)
+
+
+def _judge(judged: list[Judged], refused: int = 0) -> Verdict:
+    """Of one method; a setting that could not be worked on counts as one that was not measured."""
+    listed = [*judged, *[_NOTHING] * refused]
+
+    def column(name: str) -> np.ndarray:
+        return np.array([getattr(j, name) for j in listed], float)  # None becomes NaN
+
     return statistics.verdict(
-        [float("nan") if j.ratio is None else j.ratio for j in judged], [j.n - j.failed for j in judged]
+        column("ratio"),
+        column("n") - column("failed"),
+        lost=column("failed"),
+        bias_px=column("bias"),
+        predicted_bias_px=column("predicted_bias"),
+        sigma_px=np.sqrt(column("propagated")),
+        ok=[j.status == "ok" for j in listed],
     )
+
+
+_NOTHING = Judged("", math.inf, None, 0, 0, {}, None, None, None, 0.0, None, "refused")
 
 
 def _correlations(rows: tuple[Row, ...]) -> dict[str, Any]:
@@ -248,7 +291,6 @@ def _row_json(row: Row) -> dict[str, Any]:
         "paper_ice": row.paper_ice,
         "paper_real": row.paper_real,
         "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
-        "predicted_bias": row.predicted_bias,
         **main,
         "bound": row.bound,
         "classic": [asdict(judged) for judged in row.classic],

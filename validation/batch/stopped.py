@@ -13,8 +13,8 @@ class Stopped(RuntimeError):
 
 
 class Interrupted(BaseException):
-    """Ctrl-C or SIGTERM. Not a KeyboardInterrupt, which typer swallows."""
+    """Ctrl-C or SIGTERM. Not a KeyboardInterrupt, which typer swallows; ``status`` is the exit status."""
 
     def __init__(self, word: str, status: int) -> None:
-        super().__init__(f"stopped: {word}; {CONTINUE}")
-        self.status = status
+        super().__init__(f"stopped: {word}")
+        self.word, self.status = word, status

@@ -5,33 +5,41 @@ from __future__ import annotations
 import itertools
 import json
 import sqlite3
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
+from measure import status as statuses
 from scenes import InvalidInput
+from scenes.errors import describe, one_line
+from validation.batch import facts
+from validation.batch.campaign import Campaign
 from validation.batch.stopped import Stopped
-from validation.batch.work import Chunk, Clean, Found, Packed
+from validation.batch.work import CHUNK, Chunk, Clean, Found, Packed
 
-_SCHEMA = """
-BEGIN IMMEDIATE;
-CREATE TABLE IF NOT EXISTS run (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS setting (
-    setting INTEGER PRIMARY KEY, height INTEGER, width INTEGER, image BLOB, predicted TEXT, seconds TEXT, trouble TEXT);
-CREATE TABLE IF NOT EXISTS propagated (
-    setting INTEGER, method TEXT, variance_px2 REAL, value_px REAL, status TEXT, PRIMARY KEY (setting, method));
-CREATE TABLE IF NOT EXISTS chunk (
-    setting INTEGER, chunk INTEGER, count INTEGER, seconds TEXT, PRIMARY KEY (setting, chunk));
-CREATE TABLE IF NOT EXISTS distance (
-    setting INTEGER, chunk INTEGER, method TEXT, values_px BLOB, PRIMARY KEY (setting, chunk, method));
-CREATE TABLE IF NOT EXISTS failure (
-    setting INTEGER, chunk INTEGER, method TEXT, image INTEGER, count INTEGER, status TEXT,
-    PRIMARY KEY (setting, chunk, method, image));
-COMMIT;
-"""
+_TABLES = {
+    "run": "key TEXT PRIMARY KEY, value TEXT NOT NULL",
+    "setting": "setting INTEGER PRIMARY KEY, height INTEGER, width INTEGER, image BLOB, predicted TEXT, seconds TEXT, "
+    "trouble TEXT",
+    "propagated": "setting INTEGER, method TEXT, variance_px2 REAL, value_px REAL, status TEXT, "
+    "PRIMARY KEY (setting, method)",
+    "chunk": "setting INTEGER, chunk INTEGER, count INTEGER, seconds TEXT, PRIMARY KEY (setting, chunk)",
+    "distance": "setting INTEGER, chunk INTEGER, method TEXT, values_px BLOB, PRIMARY KEY (setting, chunk, method)",
+    "failure": "setting INTEGER, chunk INTEGER, method TEXT, image INTEGER, count INTEGER, status TEXT, "
+    "PRIMARY KEY (setting, chunk, method, image)",
+}
+_APPLICATION, _VERSION = 0x49434552, 2  # "ICER", in the file's header; the version counts changes of the tables
+_SCHEMA = "\n".join([
+    "BEGIN IMMEDIATE;", *(f"CREATE TABLE {name} ({columns});" for name, columns in _TABLES.items()),
+    f"PRAGMA application_id = {_APPLICATION};", f"PRAGMA user_version = {_VERSION};", "COMMIT;",
+])  # fmt: skip
+_LARGEST = 512 << 20  # bytes of a value in the file
+_FARTHEST = 1e12  # px; of a distance
 BUSY_S = 30.0  # how long a lock of another process is waited for
 
 
@@ -59,9 +67,10 @@ class RunFile:
     """
 
     def __init__(self, directory: Path, identity: dict[str, Any], fresh: bool = False) -> None:
-        self.path = directory / "run.sqlite"
+        self.path, self._what = directory / "run.sqlite", "--out must be a writable directory"
         try:
             directory.mkdir(parents=True, exist_ok=True)
+            self._check_files()
             self._lock = _lock(directory)
             if fresh:
                 for file in (self.path, *directory.glob("run.sqlite-*")):
@@ -69,22 +78,69 @@ class RunFile:
             self._db = sqlite3.connect(self.path, timeout=BUSY_S)
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = FULL")
-            self._db.executescript(_SCHEMA)
+            if not self._db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
+                self._db.executescript(_SCHEMA)
         except (OSError, sqlite3.Error) as error:
-            raise InvalidInput(f"--out must be a writable directory, got {directory} ({error})") from None
-        self._claim(directory, identity)
+            raise InvalidInput(f"{self._what}, got {directory} ({error})") from None
+        self._check()
+        try:
+            self._claim(directory, identity)
+        except InvalidInput:
+            self.close()
+            raise
 
     @classmethod
     def reopen(cls, directory: Path) -> RunFile:
-        """The run file of a directory, to read, also while a run is writing it."""
+        """The run file of a directory, to read, also while a run is writing it; nothing in it is trusted.
+
+        Raises
+        ------
+        InvalidInput
+            If there is none, or it is damaged or of another version. So does every method that reads, where what it
+            reads is not what is written there.
+        """
         store = cls.__new__(cls)
         store.path, store._lock = directory / "run.sqlite", None
+        store._what = "DIR must be a run directory of `ice validate`"
+        store._check_files()
         try:
-            store._db = sqlite3.connect(f"file:{store.path}?mode=ro", uri=True, timeout=BUSY_S)
-            store._db.execute("SELECT * FROM run JOIN setting LIMIT 1")
-        except sqlite3.Error as error:
-            raise InvalidInput(f"DIR must be a run directory of `ice validate`, got {directory} ({error})") from None
+            store._db = sqlite3.connect(f"{store.path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)
+        except (sqlite3.Error, ValueError) as error:
+            raise InvalidInput(f"{store._what}, got {directory} ({error})") from None
+        store._check()
         return store
+
+    def _check_files(self) -> None:
+        """All of SQLite's files are files: a named pipe would be waited for."""
+        try:
+            odd = [file for file in self.path.parent.glob("run.*") if file.exists() and not file.is_file()]
+        except (OSError, ValueError) as error:
+            raise InvalidInput(f"{self._what}, got {self.path.parent} ({error})") from None
+        if odd:
+            raise InvalidInput(f"{self._what}, got {self.path.parent} ({odd[0].name} is no file)")
+
+    def _check(self) -> None:
+        """The file is whole, and its tables are those of this version."""
+        try:
+            self._db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST)
+            self._db.execute("PRAGMA trusted_schema = OFF")
+            self._db.execute("PRAGMA cell_size_check = ON")
+            made = tuple(
+                self._db.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version")
+            )
+            found = dict(self._db.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"))
+            whole = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
+        except (sqlite3.Error, UnicodeDecodeError, ValueError, MemoryError) as error:
+            self.close()
+            raise InvalidInput(f"{self._what}, got {self.path.parent} ({error})") from None
+        reason = "" if whole == "ok" else f"damaged: {whole}"
+        if found != {name: f"CREATE TABLE {name} ({columns})" for name, columns in _TABLES.items()}:
+            reason = "run.sqlite has other tables"
+        if made != (_APPLICATION, _VERSION):
+            reason = f"run.sqlite is of version {made[1]}, not {_VERSION}; --fresh starts anew"
+        if reason:
+            self.close()
+            raise InvalidInput(f"{self._what}, got {self.path.parent} ({reason})")
 
     def close(self) -> None:
         self._db.close()
@@ -98,8 +154,22 @@ class RunFile:
 
     def fact(self, key: str, default: Any = None) -> Any:
         """A recorded fact."""
-        row = self._db.execute("SELECT value FROM run WHERE key = ?", (key,)).fetchone()
-        return default if row is None else json.loads(row[0])
+        rows = self._rows("SELECT value FROM run WHERE key = ?", key)
+        return self._document(key, rows[0][0]) if rows else default
+
+    def identity(self) -> dict[str, Any]:
+        """What the run's numbers depend on."""
+        found = self.fact("identity")
+        if found is None:
+            raise self._damaged("it does not say which run it is")
+        return found
+
+    def campaign(self) -> Campaign:
+        """The campaign that the run works through."""
+        try:
+            return Campaign.model_validate(self.identity()["campaign"])
+        except ValidationError as error:
+            raise self._damaged(f"its campaign: {describe(error)}") from None
 
     def add(self, setting: int, found: Found) -> None:
         """Commit all that a task found, or nothing."""
@@ -119,58 +189,106 @@ class RunFile:
 
     def packed(self, setting: int) -> Packed | None:
         """Noise-free image of a setting, or None if it is not rendered or not kept."""
-        row = self._db.execute("SELECT height, width, image FROM setting WHERE setting = ?", (setting,)).fetchone()
-        return Packed(*row) if row and row[2] is not None else None
+        rows = self._rows("SELECT height, width, image FROM setting WHERE setting = ?", setting)
+        if not rows or rows[0][2] is None:
+            return None
+        packed = Packed(*rows[0])
+        if not (isinstance(packed.data, bytes) and packed.fits()):
+            raise self._damaged(f"the image of setting {setting} has no size")
+        return packed
+
+    def has_image(self, setting: int) -> bool:
+        """Whether there is one."""
+        return bool(self._rows("SELECT 1 FROM setting WHERE setting = ? AND image IS NOT NULL", setting))
 
     def image(self, setting: int) -> np.ndarray | None:
         """The same as an array, grey levels."""
         packed = self.packed(setting)
-        return packed and packed.array()
+        try:
+            return packed and packed.array()
+        except (ValueError, zlib.error) as error:
+            raise self._damaged(f"the image of setting {setting}: {error}") from None
 
     def chunks(self, setting: int) -> dict[int, int]:
         """The finished chunks of a setting, with their number of images."""
-        return dict(self._db.execute("SELECT chunk, count FROM chunk WHERE setting = ?", (setting,)).fetchall())
+        rows = self._rows("SELECT chunk, count FROM chunk WHERE setting = ?", setting)
+        if not all(isinstance(chunk, int) and isinstance(n, int) and 0 < n <= CHUNK for chunk, n in rows):
+            raise self._damaged(f"the chunks of setting {setting}")
+        return dict(rows)
 
     def images(self) -> int:
         """Number of images measured so far."""
-        return self._db.execute("SELECT COALESCE(SUM(count), 0) FROM chunk").fetchone()[0]
+        (found,) = self._rows("SELECT COALESCE(SUM(count), 0) FROM chunk")[0]
+        if not (isinstance(found, int) and found >= 0):
+            raise self._damaged("the number of images")
+        return found
 
     def predicted(self, setting: int) -> dict[str, float] | None:
         """Predictions that need no image, as `work.Clean.predicted`; None if there are none yet."""
-        row = self._db.execute("SELECT predicted FROM setting WHERE setting = ?", (setting,)).fetchone()
-        return json.loads(row[0]) if row and row[0] else None
+        rows = self._rows("SELECT predicted FROM setting WHERE setting = ?", setting)
+        return self._document("predicted", rows[0][0]) if rows and rows[0][0] is not None else None
 
     def trouble(self, setting: int) -> str | None:
-        """Why a setting cannot be worked on."""
-        row = self._db.execute("SELECT trouble FROM setting WHERE setting = ?", (setting,)).fetchone()
-        return row and row[0]
+        """Why a setting cannot be worked on, in one line."""
+        rows = self._rows("SELECT trouble FROM setting WHERE setting = ?", setting)
+        return one_line(str(rows[0][0])) if rows and rows[0][0] is not None else None
 
     def propagated(self, setting: int, method: str) -> tuple[float, float, str]:
         """Variance (px^2), distance in the noise-free image (px) and status, as predicted from the image."""
         query = "SELECT variance_px2, value_px, status FROM propagated WHERE setting = ? AND method = ?"
-        variance, value, status = self._db.execute(query, (setting, method)).fetchone()
-        return variance, float("nan") if value is None else value, status
+        rows = self._rows(query, setting, method)
+        if not rows:
+            raise self._damaged(f"no prediction of setting {setting} by {method}")
+        variance, value, status = rows[0]
+        value = float("nan") if value is None else value
+        if not (isinstance(variance, float) and variance >= 0 and isinstance(value, float) and status in statuses.ALL):
+            raise self._damaged(f"the prediction of setting {setting} by {method}")
+        return variance, value, status
 
     def distances(self, setting: int, method: str) -> np.ndarray:
         """All distances measured so far in the order of the images, px; NaN for failed ones."""
-        query = "SELECT values_px FROM distance WHERE setting = ? AND method = ? ORDER BY chunk"
-        return np.concatenate(
-            [np.empty(0), *(np.frombuffer(row[0], "<f8") for row in self._db.execute(query, (setting, method)))]
-        )
+        query = "SELECT chunk, values_px FROM distance WHERE setting = ? AND method = ? ORDER BY chunk"
+        rows, sizes = self._rows(query, setting, method), self.chunks(setting)
+        if {chunk: isinstance(data, bytes) and len(data) for chunk, data in rows} != {
+            c: 8 * n for c, n in sizes.items()
+        }:
+            raise self._damaged(f"the distances of setting {setting} by {method}")
+        values = np.concatenate([np.empty(0), *(np.frombuffer(data, "<f8") for _, data in rows)])
+        if not (np.isnan(values) | (np.abs(values) <= _FARTHEST)).all():
+            raise self._damaged(f"the distances of setting {setting} by {method}")
+        return values
 
     def failures(self, setting: int, method: str) -> dict[str, int]:
         """How many images failed, by status."""
         query = "SELECT status, SUM(count) FROM failure WHERE setting = ? AND method = ? GROUP BY status"
-        return dict(self._db.execute(query, (setting, method)).fetchall())
+        found = dict(self._rows(query, setting, method))
+        if not all(status in statuses.ALL and isinstance(n, int) and n > 0 for status, n in found.items()):
+            raise self._damaged(f"the failures of setting {setting} by {method}")
+        return found
 
     def seconds(self) -> dict[str, float]:
         """Working time of all workers by what it was spent on."""
         total: dict[str, float] = {}
         query = "SELECT seconds FROM setting WHERE seconds IS NOT NULL UNION ALL SELECT seconds FROM chunk"
-        for (text,) in self._db.execute(query):
-            for name, value in json.loads(text).items():
+        for (text,) in self._rows(query):
+            for name, value in self._document("seconds", text).items():
                 total[name] = total.get(name, 0.0) + value
         return total
+
+    def _rows(self, query: str, *values: Any) -> list[tuple]:
+        try:
+            return self._db.execute(query, values).fetchall()
+        except (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError) as error:
+            raise self._damaged(str(error)) from None
+
+    def _document(self, kind: str, text: Any) -> Any:
+        try:
+            return facts.read(kind, text)
+        except ValueError as error:
+            raise self._damaged(str(error)) from None
+
+    def _damaged(self, what: str) -> InvalidInput:
+        return InvalidInput(f"{self.path} must be an undamaged run file, got one where this is wrong: {what}")
 
     def _add_clean(self, setting: int, clean: Clean) -> None:
         row = setting, *clean.image, json.dumps(clean.predicted), json.dumps(clean.seconds)
@@ -188,10 +306,14 @@ class RunFile:
 
     def _claim(self, directory: Path, identity: dict[str, Any]) -> None:
         identity, there = json.loads(json.dumps(identity)), self.fact("identity")
+        if there is None and self._rows("SELECT 1 FROM setting UNION ALL SELECT 1 FROM chunk LIMIT 1"):
+            raise InvalidInput(
+                f"--out must be a new directory or hold this run, got {directory}, which does not say which run it "
+                "holds (--fresh starts anew)"
+            )
         if there is None:
             self.note("identity", identity)
         elif there != identity:
-            self.close()
             texts = list(itertools.islice(_differences(there, identity), 3))
             raise InvalidInput(
                 f"--out must be a new directory or hold this run, got {directory}, where {', '.join(texts)} "
@@ -205,6 +327,8 @@ class RunFile:
                 yield
         except sqlite3.OperationalError as error:
             raise Stopped(f"{self.path} could not be written ({error})") from None
+        except sqlite3.DatabaseError as error:
+            raise self._damaged(str(error)) from None
 
 
 def _lock(directory: Path) -> sqlite3.Connection:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 import time
 import zlib
@@ -20,6 +21,7 @@ import render
 from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
+from scenes.camera import MOST_PIXELS
 from validation.batch.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
@@ -57,8 +59,22 @@ class Packed(NamedTuple):
     def of(cls, image: np.ndarray) -> Packed:
         return cls(*image.shape, zlib.compress(image.astype("<f8").tobytes(), 1))
 
+    def fits(self) -> bool:
+        """Whether the size is one that a camera has."""
+        size = self.height, self.width
+        return all(isinstance(n, int) and n > 0 for n in size) and math.prod(size) <= MOST_PIXELS
+
     def array(self) -> np.ndarray:
-        return np.frombuffer(zlib.decompress(self.data), "<f8").reshape(self.height, self.width)
+        """The image, float64, shape (height, width).
+
+        Raises
+        ------
+        ValueError, zlib.error
+            If the data are not such an image; no more of them is unpacked than fits it.
+        """
+        size = 8 * self.height * self.width
+        data = zlib.decompressobj().decompress(self.data, size + 1)
+        return np.frombuffer(data, "<f8").reshape(self.height, self.width)
 
 
 @dataclass(frozen=True)

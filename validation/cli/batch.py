@@ -8,21 +8,36 @@ import time
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from render import Tolerance
 from scenes import InvalidInput
 from validation.batch import campaign
-from validation.batch.job import run
-from validation.batch.result import Validation
-from validation.batch.store import RunFile
-from validation.cli.common import AUTO, Effects, Json, LeaveOutPx, LeaveOutVariance, Seed, app, progress, stoppable
-from validation.cost.goal import Reached, check_accuracy, reach, seconds
+from validation.cli.common import (
+    MOST_WORKERS,
+    Effects,
+    Json,
+    LeaveOutPx,
+    LeaveOutVariance,
+    Seed,
+    check_number,
+    check_seed,
+    commands,
+    continued,
+    progress,
+    tolerance,
+)
+from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
-from validation.report import export
-from validation.report.table import console, report
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    from validation.batch.result import Validation
+    from validation.cost.goal import Reached
+
+commands = commands()
+_MOST_RENDERS = 10_000_000
 
 Target = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")]
 Renders = Annotated[int, typer.Option(help="Noisy images a setting.")]
@@ -40,7 +55,7 @@ Budget = Annotated[str | None, typer.Option(metavar="TIME", help="Instead: the b
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
 
-@app.command("validate")
+@commands.command("validate")
 def validate_command(
     scene: Target,
     renders: Renders = 1000,
@@ -52,8 +67,8 @@ def validate_command(
     accuracy: Accuracy = None,
     budget: Budget = None,
     effects: Effects = "auto",
-    bias_px: LeaveOutPx = AUTO.bias_px,
-    variance: LeaveOutVariance = AUTO.variance,
+    bias_px: LeaveOutPx = None,
+    variance: LeaveOutVariance = None,
     log_json: LogJson = False,
     as_json: Json = False,
 ) -> None:
@@ -62,13 +77,22 @@ def validate_command(
     Writes run.sqlite, table.csv, result.json and pictures to DIR. Exit status 1 if the measurements contradict the
     predictions.
     """
-    started, limit = time.perf_counter(), _goal(accuracy, budget)
+    started = time.perf_counter()
+    check_number("renders", renders, 2, _MOST_RENDERS)
+    check_number("workers", workers, 1, MOST_WORKERS)
+    check_seed(seed)
     loaded = campaign.load(scene)
+    out = out or Path("runs") / loaded.name
+    check_directory("--out", out)
+    from validation.batch.job import run
+    from validation.cost.goal import reach
+
+    limit = _goal(accuracy, budget)
     how = {
-        "seed": seed, "out": out or Path("runs") / loaded.name, "workers": workers, "fresh": fresh, "dask": dask,
-        "effects": effects, "tolerance": Tolerance(bias_px, variance),
+        "seed": seed, "out": out, "workers": workers, "fresh": fresh, "dask": dask, "effects": effects,
+        "tolerance": tolerance(bias_px, variance),
     }  # fmt: skip
-    with stoppable(log_json):
+    with continued(log_json):
         with nullcontext() if log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
             if accuracy is None and limit is None:
                 found, goal = run(loaded, renders, progress=shown, **how), None
@@ -85,6 +109,8 @@ def _show(found: Validation, goal: Reached | None, directory: Path, as_json: boo
     if as_json:
         print(json.dumps(found.to_json() | ({"goal": goal.to_json()} if goal else {}), indent=1))
         return
+    from validation.report.table import report
+
     shown_on = console()
     shown_on.print(report(found))
     if goal:
@@ -94,6 +120,8 @@ def _show(found: Validation, goal: Reached | None, directory: Path, as_json: boo
 
 def _goal(accuracy: float | None, budget: str | None) -> float | None:
     """Seconds of the budget; both options are checked."""
+    from validation.cost.goal import check_accuracy, seconds
+
     if accuracy is not None and budget is not None:
         raise InvalidInput(f"--budget must be given without --accuracy, got both ({budget}, {accuracy:g})")
     if accuracy is not None:
@@ -102,7 +130,8 @@ def _goal(accuracy: float | None, budget: str | None) -> float | None:
 
 
 def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> None:
-    from validation.report import figures  # matplotlib takes half a second to load
+    from validation.batch.store import RunFile
+    from validation.report import export, figures
 
     export.write_csv(found, directory / "table.csv")
     export.write_json(found, directory / "result.json")

@@ -1,47 +1,78 @@
-"""What the commands of ``ice`` share: the application, common options, one line for bad input, the progress bar."""
+"""What the commands of ``ice`` share: common options, poses, progress. Loads little, as do the commands themselves."""
 
 from __future__ import annotations
 
 import json
 import logging
-import signal
-from collections.abc import Iterator
+import sys
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
-from rich.text import Text
 
-from render import Tolerance
 from scenes import InvalidInput, Pose
-from validation.batch.job import Progress as Report
-from validation.batch.stopped import Interrupted
-from validation.report.table import console
+from validation.batch.stopped import CONTINUE, Interrupted
+from validation.cli import verbosity
+from validation.report.terminal import console
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
+if TYPE_CHECKING:
+    from render import Tolerance
+
+Report = Callable[[str, int, int], None]
+
+MOST_SEED = 2**63 - 1
+MOST_WORKERS = 1024
+_EVERY_S = 10.0  # between lines of progress where there is no terminal
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene or a TOML file.")]
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
 LightPose = Annotated[str, typer.Option(metavar="P,A", help="Light pose: polar angle and azimuth, degrees.")]
-
-AUTO = Tolerance()  # what auto leaves out unless told otherwise
 Effects = Annotated[
     str, typer.Option("--effects", metavar="WHICH", help="What is simulated: auto, all, or names with commas between.")
 ]
 LeaveOutPx = Annotated[
-    float, typer.Option("--leave-out-px", help="auto leaves out what changes the mean distance by at most this, px.")
+    float | None,
+    typer.Option("--leave-out-px", help="auto leaves out what changes the mean distance by at most this, px."),
 ]
 LeaveOutVariance = Annotated[
-    float, typer.Option("--leave-out-variance", help="... and its variance by at most this part.")
+    float | None, typer.Option("--leave-out-variance", help="... and its variance by at most this part.")
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Root of all random numbers.")]
+Seed = Annotated[int, typer.Option(help="Root of all random numbers.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
-@app.callback()
-def _ice() -> None:
-    """Predict how precisely an image will let you measure, and prove it by rendering and re-measuring."""
+def commands() -> typer.Typer:
+    """What a module adds its commands to."""
+    return typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+def tolerance(bias_px: float | None, variance: float | None) -> Tolerance:
+    """What ``auto`` may leave out: its own limits where none are given."""
+    from render import Tolerance
+
+    given = {"bias_px": bias_px, "variance": variance}
+    return Tolerance(**{name: value for name, value in given.items() if value is not None})
+
+
+def check_number(option: str, value: float | None, least: float, most: float) -> None:
+    """See that a number is in its range, if it is given.
+
+    Raises
+    ------
+    InvalidInput
+        If it is not.
+    """
+    if value is not None and not value >= least:
+        raise InvalidInput(f"{option} must be at least {least}, got {value}")
+    if value is not None and not value <= most:
+        raise InvalidInput(f"{option} must be at most {most}, got {value}")
+
+
+def check_seed(seed: int | None, option: str = "seed") -> None:
+    """See that a seed is one."""
+    check_number(option, seed, 0, MOST_SEED)
 
 
 def parse_pose(option: str, text: str) -> Pose:
@@ -61,64 +92,46 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 @contextmanager
 def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
-    """A progress bar with rate and time left on standard error, if that is a terminal."""
-    errors = console(stderr=True)
-    if not errors.is_terminal:
+    """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s."""
+    if verbosity.quiet():
         yield None
         return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(unit),
-        _Rate(),
-        _Left(),
-    )
-    with Progress(*columns, console=errors, transient=True) as bar:
-        task = bar.add_task(title, total=None)
+    errors = console(stderr=True)
+    if not errors.is_terminal:
+        yield _lines(title, unit)
+        return
+    from validation.cli.bar import bar
 
-        def report(_what: str, done: int, total: int) -> None:
-            if bar.tasks[0].total is None:  # what an earlier session has done says nothing about the rate
-                bar.reset(task, completed=done, total=total)
-            bar.update(task, completed=done, total=total)
-
+    with bar(errors, title, unit) as report:
         yield report
 
 
-class _Rate(ProgressColumn):
-    """Images a second."""
+def _lines(title: str, unit: str) -> Report:
+    told = time.monotonic()
 
-    def render(self, task: Task) -> str:
-        return "" if not task.speed else f"{task.speed:.0f}/s"
+    def report(_what: str, done: int, total: int) -> None:
+        nonlocal told
+        if time.monotonic() - told >= _EVERY_S:
+            told = time.monotonic()
+            print(f"{title}: {done} of {total} {unit}", file=sys.stderr, flush=True)
 
-
-class _Left(TimeRemainingColumn):
-    """Time left, in words."""
-
-    def render(self, task: Task) -> Text:
-        return super().render(task) + " left"
+    return report
 
 
 @contextmanager
-def stoppable(log_json: bool) -> Iterator[None]:
-    """Ctrl-C and SIGTERM raise `Interrupted`; with ``log_json`` every event is a JSON line on standard error."""
+def continued(log_json: bool) -> Iterator[None]:
+    """Say of an interruption that the run can be continued; with ``log_json`` every event is a JSON line on stderr."""
     log, shown = logging.getLogger("validation"), logging.StreamHandler()
     if log_json:
         shown.setFormatter(_JsonLine())
         log.addHandler(shown)
         log.setLevel(logging.INFO)
-    former = signal.signal(signal.SIGTERM, _terminate)
     try:
         yield
-    except KeyboardInterrupt:
-        raise Interrupted("interrupted", 130) from None
+    except Interrupted as error:
+        raise Interrupted(f"{error.word}; {CONTINUE}", error.status) from None
     finally:
-        signal.signal(signal.SIGTERM, former)
         log.removeHandler(shown)
-
-
-def _terminate(*_) -> None:
-    raise Interrupted("terminated", 143)
 
 
 class _JsonLine(logging.Formatter):

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from scenes import InvalidInput
-from validation import comparison
-from validation.cli.common import Json, app, say
+from validation.cli.common import Json, commands, say
+
+commands = commands()
 
 _Run = typer.Argument(help="Run directory, or a result.json.")
 
 
-@app.command("compare")
+@commands.command("compare")
 def compare_command(
     before: Annotated[Path, _Run],
     after: Annotated[Path, _Run],
@@ -28,6 +29,8 @@ def compare_command(
     """
     if not 0 < level < 1:
         raise InvalidInput(f"--level must be between 0 and 1, got {level:g}")
+    from validation import comparison
+
     found = comparison.compare(*map(comparison.read, (before, after)), level)
     lines = [found.text]
     lines += [

@@ -9,14 +9,15 @@ from typing import Annotated
 import typer
 
 from validation.batch import campaign
-from validation.cli.common import Json, SceneName, Seed, app, progress
-from validation.cost.sweep import sweep
-from validation.cost.table import tables, write_csv
+from validation.cli.common import Json, SceneName, Seed, check_seed, commands, progress
+from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
-from validation.report.table import console
+from validation.report.terminal import console
+
+commands = commands()
 
 
-@app.command("cost")
+@commands.command("cost")
 def cost_command(
     scene: SceneName,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; default runs/SCENE-cost.")] = None,
@@ -27,10 +28,14 @@ def cost_command(
 
     Writes cost.json, and a CSV file and a plot of each parameter to DIR.
     """
-    from validation.report import cost_figures  # matplotlib takes half a second to load
-
+    check_seed(seed)
     loaded = campaign.load(scene)
     directory = out or Path("runs") / f"{loaded.name}-cost"
+    check_directory("--out", directory)
+    from validation.cost.sweep import sweep
+    from validation.cost.table import tables, write_csv
+    from validation.report import cost_figures
+
     with progress(f"{loaded.name}: cost", "parameters") as shown:
         found = sweep(loaded, seed, shown)
     directory.mkdir(parents=True, exist_ok=True)

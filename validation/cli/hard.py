@@ -8,10 +8,13 @@ from typing import Annotated
 import typer
 
 from scenes import InvalidInput
-from validation.cli.common import Json, app, progress, say
+from validation.cli.common import Json, commands, progress, say
+from validation.cli.outputs import check_file
+
+commands = commands()
 
 
-@app.command("hard")
+@commands.command("hard")
 def hard_command(
     area: Annotated[str | None, typer.Option(help="reflectance, planner, fit, measure or render only.")] = None,
     precision: Annotated[
@@ -20,6 +23,7 @@ def hard_command(
     as_json: Json = False,
 ) -> None:
     """Answers beside references where numbers lose their digits; exit status 1 if one is wrong. A minute."""
+    check_file("--precision", precision, ".png")
     from validation import hard  # all cases are made, and the references' library loads
     from validation.hard import table
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-import measure
-import render
 import scenes
-from render import Tolerance
 from scenes import InvalidInput
-from validation import picture_file
 from validation.cli.common import (
-    AUTO,
     Effects,
     Json,
     LeaveOutPx,
@@ -23,13 +18,21 @@ from validation.cli.common import (
     LightPose,
     SceneName,
     Sensor,
-    app,
+    check_seed,
+    commands,
     parse_pose,
     say,
+    tolerance,
 )
+from validation.cli.outputs import check_file
+
+if TYPE_CHECKING:
+    import measure
+
+commands = commands()
 
 
-@app.command("render")
+@commands.command("render")
 def render_command(
     scene: SceneName,
     sensor: Sensor,
@@ -37,14 +40,19 @@ def render_command(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
     noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
     effects: Effects = "auto",
-    bias_px: LeaveOutPx = AUTO.bias_px,
-    variance: LeaveOutVariance = AUTO.variance,
+    bias_px: LeaveOutPx = None,
+    variance: LeaveOutVariance = None,
     as_json: Json = False,
 ) -> None:
     """Render one image of a scene."""
+    poses = parse_pose("--sensor", sensor), parse_pose("--light", light)
+    check_seed(noise_seed, "--noise-seed")
+    check_file("--output", output, ".png", ".tif", ".tiff", ".npy")
     loaded = scenes.load(scene)
-    poses, tolerance = (parse_pose("--sensor", sensor), parse_pose("--light", light)), Tolerance(bias_px, variance)
-    image = render.image(loaded, *poses, effects=effects, tolerance=tolerance)
+    import render
+    from validation import picture_file
+
+    image = render.image(loaded, *poses, effects=effects, tolerance=tolerance(bias_px, variance))
     if noise_seed is not None:
         image = render.expose(image, loaded.noise, np.random.default_rng(noise_seed), 1)[0]
     picture_file.write(output, image)
@@ -62,7 +70,7 @@ def render_command(
     )
 
 
-@app.command("measure")
+@commands.command("measure")
 def measure_command(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="PNG, TIFF, JPEG or .npy, 8 or 16 bit or float.")],
     scene: Annotated[
@@ -70,7 +78,7 @@ def measure_command(
     ] = None,
     sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; helps strip and polygon.")] = None,
-    estimator: Annotated[str | None, typer.Option(help=" or ".join(measure.ESTIMATORS))] = None,
+    estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
     as_json: Json = False,
@@ -79,6 +87,9 @@ def measure_command(
 
     Exit status 1 if it cannot be measured.
     """
+    import measure
+    from validation import picture_file
+
     picture = picture_file.read(file)
     if scene is None:
         found = measure.measure_quadrilateral(picture, estimator or "strip", lens and measure.load_lens(lens))

@@ -1,63 +1,69 @@
-"""The command ``ice``: every module of `validation.cli` adds its commands to one application."""
+"""The command ``ice``: whatever happens is an answer or one line, and an exit status that tells which.
+
+0: done. 1: the measurement contradicts the prediction, or something could not be measured or finished. 2: bad input.
+3: an error of this program, told of in a log file. 130, 143: interrupted, terminated.
+"""
 
 from __future__ import annotations
 
-import errno
-import re
+import os
+import signal
 import sys
 
-import typer
 
-from scenes import InvalidInput
-from validation.batch.stopped import CONTINUE, Interrupted, Stopped
-from validation.cli import batch, calibrate, compare, cost, effects, hard, image, plan, report  # noqa: F401
-from validation.cli.common import app
+def __getattr__(name: str):
+    """The application, for those who call it from Python; loaded when it is asked for."""
+    if name == "app":
+        from validation.cli.application import app
 
-_UsageError = typer.BadParameter.__base__  # typer does not export it
-_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        return app
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+_FLAGS = ("-q", "--quiet", "-v", "--verbose")
 
 
 def main() -> None:
-    """Entry point: bad input is one line on standard error and exit status 2."""
+    """Entry point. Little is loaded before it begins, so that it is in charge when something goes wrong."""
+    code = 3
     try:
-        code = app(standalone_mode=False)
-    except InvalidInput as error:
-        print(error, file=sys.stderr)
-        code = 2
-    except _UsageError as error:
-        print(_usage(error), file=sys.stderr)
-        code = 2
-    except Stopped as error:
-        print(error, file=sys.stderr)
-        code = 1
-    except OSError as error:
-        if error.errno not in _DISK:
-            raise
-        print(
-            f"stopped: {error.filename or 'a file'} could not be written ({error.strerror}); {CONTINUE}",
-            file=sys.stderr,
-        )
-        code = 1
-    except Interrupted as error:
-        print(error, file=sys.stderr)
-        code = error.status
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, _interrupted)
+        code = _run(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 141
+    except BaseException as error:
+        code = _told(error)
     sys.exit(code)
 
 
-def _usage(error: Exception) -> str:
-    """A usage error as "X must be ..., got ..."."""
-    message = str(error.message).rstrip(".")
-    parameter = getattr(error, "param", None)
-    if parameter is None:
-        unknown = re.match(r"No such (option|command):? '?([^' ]+)'?", message)
-        known = f"{unknown[1]} must be a known one (see --help), got {unknown[2]!r}" if unknown else None
-        return known or f"the command line must be usable (see --help), got: {message}"
-    name = parameter.opts[0] if parameter.opts[0].startswith("-") else parameter.name.upper()
-    if not message or message.startswith("Missing"):
-        return f"{name} must be given, got nothing"
-    problem = getattr(error.__cause__, "errors", lambda: [{}])()[0]
-    wanted = re.sub(r"^Input should be |, unable to parse.*$", "", message)
-    return f"{name} must be {wanted}, got {problem.get('input')!r}"
+def _run(arguments: list[str]) -> int:
+    from validation.cli.application import app
+
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    flags = [a for a in arguments[:end] if a in _FLAGS]  # may stand anywhere
+    rest = [a for a in arguments[:end] if a not in _FLAGS] + arguments[end:]
+    return app(flags + rest if rest else ["--help"], standalone_mode=False) or 0
+
+
+def _interrupted(number: int, _frame) -> None:
+    from validation.batch.stopped import Interrupted
+
+    for other in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(other, signal.SIG_IGN)  # once is enough
+    raise Interrupted("interrupted" if number == signal.SIGINT else "terminated", 128 + number)
+
+
+def _told(error: BaseException) -> int:
+    """Print one line; the exit status."""
+    from validation.cli.ending import ending
+
+    line, code = ending(error)
+    if line:
+        print(line, file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

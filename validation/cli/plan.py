@@ -6,19 +6,22 @@ import dataclasses
 import json
 import math
 import time
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import Progress
 
-import planner
 import scenes
-from validation.cli.common import Json, SceneName, app, parse_pose, progress
-from validation.plan_check import CheckedSetting, PlanCheck, check_plan
-from validation.report import plan_table
-from validation.report.table import console
+from validation.cli.common import Json, SceneName, check_number, commands, parse_pose, progress
+from validation.cli.outputs import check_directory, check_file
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    import planner
+    from validation.plan_check import CheckedSetting, PlanCheck
+
+commands = commands()
+_MOST_CHECKED = 1000
 
 Objective = Annotated[str, typer.Option(help="object (cm^2) or image (px^2)")]
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
@@ -43,7 +46,7 @@ Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Wri
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")]
 
 
-@app.command("plan")
+@commands.command("plan")
 def plan_command(
     scene: SceneName,
     objective: Objective = "object",
@@ -69,16 +72,20 @@ def plan_command(
     as_json: Json = False,
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
+    check_number("--check", check, 1, _MOST_CHECKED)
+    check_file("--map", map_file, ".png")
+    check_directory("--out", out)
+    poses = _poses(sensor=sensor, light=light, start=start)
     loaded = scenes.load(scene)
-    if check < 1:
-        raise scenes.InvalidInput(f"--check must be at least 1, got {check}")
+    import planner
+
     limits = planner.Constraints(
         sensor_polar_deg=_range("--sensor-polar", sensor_polar), light_polar_deg=_range("--light-polar", light_polar),
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
     how = {"model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
-    poses, tolerances = _poses(sensor=sensor, light=light, start=start), _tolerances(tolerance or [])
+    tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = None if no_check else _check(found, check)
@@ -92,24 +99,19 @@ def _poses(**texts: str | None) -> dict[str, scenes.Pose | None]:
 
 def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan, float]:
     """The plan and the seconds that it took."""
+    import planner
+
     began = time.perf_counter()
-    with _progress(f"{scene.name}: searching") as shown:
-        found = planner.plan(scene, objective, **how, report=shown)
+    with progress(f"{scene.name}: searching", "sensors") as shown:
+        found = planner.plan(scene, objective, **how, report=shown or (lambda *_: None))
     return found, time.perf_counter() - began
 
 
 def _check(found: planner.Plan, count: int) -> PlanCheck:
+    from validation.plan_check import check_plan
+
     with progress(f"{found.scene.name}: rendering the best", "settings") as shown:
         return check_plan(found, count, report=shown or (lambda *_: None))
-
-
-@contextmanager
-def _progress(title: str):
-    """A bar of the sensors searched, on standard error, if that is a terminal."""
-    errors = console(stderr=True)
-    with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
-        task = bar.add_task(title, total=None)
-        yield lambda _what, done, total: bar.update(task, completed=done, total=total)
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:
@@ -123,6 +125,8 @@ def _range(option: str, text: str | None) -> tuple[float, float]:
 
 
 def _tolerances(texts: list[str]) -> planner.Tolerances | None:
+    import planner
+
     known = [field.name for field in dataclasses.fields(planner.Tolerances)]
     values = {}
     for text in texts:
@@ -155,6 +159,8 @@ def _show(
     if as_json:
         print(json.dumps(_facts(found, checked, safe, seconds, pictures), indent=1))
         return
+    from validation.report import plan_table
+
     shown_on = console()
     shown_on.print(plan_table.report(found, checked, safe, seconds), highlight=False)
     for path in pictures:

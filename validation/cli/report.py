@@ -7,14 +7,13 @@ from typing import Annotated
 
 import typer
 
-from validation.batch.campaign import Campaign
-from validation.batch.result import collect
-from validation.batch.store import RunFile
-from validation.cli.common import Json, app, say
-from validation.report import export
+from validation.cli.common import Json, commands, say
+from validation.cli.outputs import check_directory
+
+commands = commands()
 
 
-@app.command("report")
+@commands.command("report")
 def report_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Run directory of `ice validate`.")],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; default: the run directory.")] = None,
@@ -25,11 +24,15 @@ def report_command(
 
     A run that is not finished, or still going, is reported as far as it has come.
     """
-    from validation.report import page as report  # matplotlib takes half a second to load
+    check_directory("--out", out)
+    from validation.batch.result import collect
+    from validation.batch.store import RunFile
+    from validation.report import export
+    from validation.report import page as report
 
     store = RunFile.reopen(directory)
     try:
-        campaign = Campaign.model_validate(store.fact("identity")["campaign"])
+        campaign = store.campaign()
         found = collect(campaign, store)
         out = out or directory
         out.mkdir(parents=True, exist_ok=True)

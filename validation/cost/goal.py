@@ -166,7 +166,7 @@ def _begun(out: Path | None, fresh: bool) -> tuple[int, Quality] | None:
         return None
     store = RunFile.reopen(out)
     try:
-        identity = store.fact("identity")
+        identity = store.identity()
         return identity["renders"], Quality(**identity["quality"])
     finally:
         store.close()

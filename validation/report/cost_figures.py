@@ -29,7 +29,7 @@ def _draw(parameter: Parameter, path: Path) -> Path:
     if parameter.name == "pareto":
         _front(parameter, axes)
     axes.set(xscale="log", yscale="log", xlabel=parameter.x, ylabel=parameter.y)
-    axes.set_title(parameter.title, fontsize=10)
+    axes.set_title(parameter.title, fontsize=10, parse_math=False)
     if parameter.series:
         axes.legend(frameon=False, fontsize=8)
     axes.grid(which="both", alpha=0.2)

@@ -15,9 +15,14 @@ def write_csv(found: Validation, path: Path) -> Path:
     lines = table(found)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(lines[0]))
-        writer.writeheader()
-        writer.writerows(lines)
+        writer.writerow({key: _inert(key) for key in lines[0]})
+        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines)
     return path
+
+
+def _inert(value: object) -> object:
+    """A text that no spreadsheet takes for a formula: an apostrophe before what would begin one."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else value
 
 
 def write_json(found: Validation, path: Path) -> Path:
@@ -59,7 +64,7 @@ def _line(row: Row) -> dict[str, object]:
         "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
         "light_polar": row.light[0], "light_azimuth": row.light[1],
         "paper_ice": row.paper_ice, "paper_real_12": real[0], "paper_real_10": real[1],
-        "our_ice": row.paper, "calibrated": row.calibrated, "bound": row.bound, "predicted_bias_px": row.predicted_bias,
+        "our_ice": row.paper, "calibrated": row.calibrated, "bound": row.bound,
     }  # fmt: skip
     for judged in (row.main, *row.classic):
         line |= {f"{judged.method}_{key}": value for key, value in _judged(judged).items()}
@@ -70,5 +75,6 @@ def _judged(judged: Judged) -> dict[str, object]:
     low, high = judged.ratio_interval or (None, None)
     return {
         "propagated": judged.propagated, "empirical": judged.empirical, "n": judged.n, "failed": judged.failed,
-        "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias, "status": judged.status,
+        "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
+        "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
     }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from pathlib import Path
 
 import matplotlib
@@ -39,18 +40,29 @@ def draw(campaign: Campaign, found: Validation, store: RunFile, directory: Path)
 
 def _panels(campaign: Campaign, store: RunFile) -> dict[str, list[Case]]:
     """The first settings that have an image, by sensor and scene, as pictures' names."""
-    panels: dict[str, list[Case]] = {}
-    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.packed(i))
+    panels: dict[tuple, list[Case]] = {}
+    shown = (i for i in range(min(len(campaign), 4 * _SHOWN)) if store.has_image(i))
     for case in map(campaign.case, itertools.islice(shown, _SHOWN)):
-        sensor = case.setting.sensor
-        labels = [case.scene.name] * (len(campaign.scenes) > 1) + [f"{v:g}" for v in _numbers(case.parameters)]
-        stem = "_".join([f"sensor_{sensor.polar_deg:g}_{sensor.azimuth_deg:g}", *labels])
-        panels.setdefault(stem, []).append(case)
-    return panels
+        panels.setdefault((case.scene.name, case.setting.sensor, repr(case.parameters)), []).append(case)
+    named: dict[str, list[Case]] = {}
+    for cases in panels.values():
+        stem = _stem(cases[0], len(campaign.scenes) > 1)
+        several = sum(known.split("__")[0] == stem for known in named)
+        named[f"{stem}__{several + 1}" if several else stem] = cases
+    return named
 
 
-def _numbers(parameters: dict) -> list[float]:
-    return [float(v) for value in parameters.values() for v in np.atleast_1d(value)]
+def _stem(case: Case, with_scene: bool) -> str:
+    """A file's name: the sensor, and what else tells its settings apart; of texts only what is safe in a name."""
+    sensor = case.setting.sensor
+    values = [v for value in case.parameters.values() for v in (value if isinstance(value, list | tuple) else [value])]
+    labels = [case.scene.name] * with_scene + [_label(value) for value in values]
+    return "_".join([f"sensor_{sensor.polar_deg:g}_{sensor.azimuth_deg:g}", *labels])
+
+
+def _label(value: object) -> str:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g}" if number else re.sub(r"[^A-Za-z0-9.-]+", "-", str(value))[:20].strip("-.")
 
 
 def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
@@ -90,7 +102,7 @@ def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[fl
 
 def _agreement(found: Validation, path: Path) -> Path:
     """Measured against predicted variance with 95 % intervals, and their ratio below."""
-    rows = [row for row in found.rows if row.main.ratio is not None]
+    rows = [row for row in found.rows if row.main.ratio]
     figure, (top, bottom) = plt.subplots(
         2, 1, figsize=(7, 7.5), sharex=True, height_ratios=[3, 1.3], layout="constrained"
     )
@@ -112,12 +124,11 @@ def _agreement(found: Validation, path: Path) -> Path:
     if rows:
         limits = np.array([0.9 * min(row.bound for row in rows), 1.2 * propagated.max()])
         top.plot(limits, limits, "k-", lw=0.8, label="predicted = measured")
-    top.set(
-        xscale="log",
-        yscale="log",
-        ylabel="measured variance, px$^2$",
-        title=f"{found.scene}: variance of the measured distance",
-    )
+        top.set(xscale="log", yscale="log")
+    else:
+        top.text(0.5, 0.5, "no setting was measured", ha="center", transform=top.transAxes)
+    top.set_ylabel("measured variance, px$^2$")
+    top.set_title(f"{found.scene}: variance of the measured distance", parse_math=False)
     top.legend(frameon=False)
     bottom.errorbar(propagated, ratio, spread, fmt="o", color="C0", ms=5)
     bottom.plot(calibrated, ratio * propagated / np.where(calibrated > 0, calibrated, 1), "x", color="C1")

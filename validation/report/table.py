@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -12,12 +12,6 @@ from validation.batch.result import Judged, Row, Validation
 
 _ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
-
-
-def console(*, stderr: bool = False) -> Console:
-    """A console wide enough for the tables even where no terminal tells its width."""
-    made = Console(stderr=stderr)
-    return made if made.is_terminal else Console(stderr=stderr, width=132)
 
 
 def report(found: Validation) -> Group:
@@ -112,17 +106,20 @@ def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     headings, cells = names(found)
     main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
-    caption = f"* : 1 lies outside the interval.\nThe verdict is about {main}. failed: one number a method."
+    caption = (
+        f"* : 1 lies outside the interval. failed: one number a method.\nThe verdict is about {main}, as are bias "
+        "(mean error) and rmse, sqrt(variance + bias^2)."
+    )
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
-        *headings, main, *others, "n", "failed", "bias px\npred.", "\nmeas.", "status",
+        *headings, main, *others, "n", "failed", "bias px\npred.", "\nmeas.", "rmse px", "status",
         caption="\n".join(filter(None, [caption, which])),
     )  # fmt: skip
     for row in rows:
         judged = {j.method: j for j in (row.main, *row.classic)}
         table.add_row(
             *cells[row.index], *(ratio(judged[name]) if name in judged else "-" for name in (main, *others)),
-            str(row.main.n), failed(row), shift(row.predicted_bias), shift(row.main.bias), row.main.status,
+            str(row.main.n), failed(row), shift(row.main.predicted_bias), *errors(row.main), row.main.status,
         )  # fmt: skip
     return table
 
@@ -195,6 +192,12 @@ def ratio(judged: Judged) -> str:
         return f"- ({judged.status})"
     low, high = judged.ratio_interval
     return f"{judged.ratio:.3f} [{low:.3f}, {high:.3f}]{' ' if low <= 1 <= high else '*'}"
+
+
+def errors(judged: Judged) -> tuple[str, str]:
+    """Bias and root mean square error, px."""
+    bias = "-" if judged.bias is None else f"{judged.bias:+.4f}"
+    return bias, number(judged.rmse, 4)
 
 
 def failed(row: Row) -> str:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.proofs.agreement.rows import Row
-from validation.statistics import verdict
+from validation.statistics import LEVEL, bias_test, verdict
 
-LEVEL = 0.01  # of false alarm, of one kind of variance of one estimator over all its rows
 MEAN, EACH = 0.03, 0.10  # calibrated over propagated: of a scene's geometric mean, and of any row
 CLOSED_FORM = "gradient"  # whose closed form `calibrated` is
 
@@ -21,7 +20,7 @@ class Claim:
     Attributes
     ----------
     kind : str
-        ``propagated``, ``reported`` or ``calibrated``; ``bias``, which is told and not judged.
+        ``propagated``, ``reported``, ``calibrated`` or ``bias``.
     subject : str
         The estimator; the scene for ``calibrated``.
     holds : bool or None
@@ -39,14 +38,15 @@ class Claim:
 def judge(rows: list[Row], level: float = LEVEL) -> tuple[Claim, ...]:
     """All claims about rows of status ``ok``.
 
-    For each estimator the propagated and the reported variance must lie within what chance does to the empirical one
-    (chi-square, Sidak over the rows, ``level`` for each estimator and kind). For each scene calibrated over propagated
+    For each estimator the propagated and the reported variance must lie within what chance does to the empirical one,
+    in each row and pooled, and no mean error may be significantly beyond what `validation.statistics.verdict` allows
+    (``level`` for each estimator and kind: false alarm, over all its rows). For each scene calibrated over propagated
     must be within 3 % in the geometric mean, and within 10 % in every row, unless an effect without a formula is
     simulated there. What is ``ok`` has a variance.
     """
     estimators, groups = (tuple(dict.fromkeys(getattr(row, name) for row in rows)) for name in ("estimator", "group"))
     by_chance = [_by_chance(kind, name, rows, level) for kind in ("propagated", "reported") for name in estimators]
-    biases = [_bias(name, rows) for name in estimators]
+    biases = [_bias(name, rows, level) for name in estimators]
     return (*by_chance, *(_closed_form(name, rows) for name in groups), *biases)
 
 
@@ -65,7 +65,8 @@ def _by_chance(kind: str, estimator: str, rows: list[Row], level: float) -> Clai
     worst = max(known, key=lambda row: abs(np.log(row.ratio(kind))))
     text = (
         f"{found.inside} of {found.rows} rows inside their 95 % interval, smallest p-value {found.smallest_p:.2g} "
-        f"against {found.limit:.2g}; farthest {worst.ratio(kind):.3f} at {_name(worst)}{unknown}"
+        f"against {found.limit:.2g}, pooled {found.pooled.ratio:.3f} with {found.pooled.p_value:.2g} against "
+        f"{found.pooled.limit:.2g}; farthest {worst.ratio(kind):.3f} at {_name(worst)}{unknown}"
     )
     return Claim(kind, estimator, found.agrees and not unknown, text)
 
@@ -91,17 +92,19 @@ def _closed_form(group: str, rows: list[Row]) -> Claim:
     return Claim("calibrated", group, near and not unknown, text)
 
 
-def _bias(estimator: str, rows: list[Row]) -> Claim:
+def _bias(estimator: str, rows: list[Row], level: float) -> Claim:
     known = [row for row in _ok(estimator, rows) if np.isfinite(row.bias_over_sigma)]
     if not known:
         return Claim("bias", estimator, None, "no row is ok")
-    sizes = np.abs([row.bias_over_sigma for row in known])
-    worst = known[int(sizes.argmax())]
+    away = np.array([row.bias_over_sigma for row in known])
+    found = bias_test(away, np.array([row.n for row in known]), level)
+    worst = known[int(np.abs(away).argmax())]
     text = (
-        f"{np.median(sizes):.2f} sigma in the median of {len(known)} rows, above 1 in {(sizes > 1).sum()}; "
-        f"farthest {worst.bias_over_sigma:+.2f} sigma, {worst.bias_px:+.4f} px, at {_name(worst)}"
+        f"{found.within} of {found.rows} rows shown within {found.allowance:g} sigma, smallest p-value "
+        f"{found.smallest_p:.2g} against {found.limit:.2g}; farthest {worst.bias_over_sigma:+.2f} sigma, "
+        f"{worst.bias_px:+.4f} px, at {_name(worst)}"
     )
-    return Claim("bias", estimator, None, text)
+    return Claim("bias", estimator, found.smallest_p >= found.limit, text)
 
 
 def _unknown(rows: list[Row]) -> str:

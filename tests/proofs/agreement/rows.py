@@ -16,13 +16,13 @@ import render
 from measure import status
 from scenes import InvalidInput
 from tests.proofs.agreement.settings import Place
+from validation.batch.result import row_status
 from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 
 KINDS = "calibrated", "propagated", "reported"
 ESTIMATORS = "gradient", "canny", "isophote", "strip", "arrangement"
 _BATCH = 50  # pictures held in memory at a time
-_STRAY = 0.01  # part of the noisy pictures that may be refused where a setting is ok
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def _rows(place: Place, renders: int, seed: int, variant: str) -> list[Row]:
                 sensor=tuple(sensor),
                 light=tuple(light),
                 estimator=estimator,
-                status=common(propagated.status, values.state),
+                status=row_status(propagated.status, _others(values.state), values.state.size),
                 n=int(good.sum()),
                 failed=int((~good).sum()),
                 empirical=float(values.distance[good].var(ddof=1)) if several else float("nan"),
@@ -156,24 +156,9 @@ def _measured(place: Place, clean: np.ndarray, renders: int, seed: int) -> dict[
     }
 
 
-def common(clean: str, noisy: np.ndarray) -> str:
-    """Status of a setting: ``ok`` if the noise-free picture is and at least 99 % of the noisy ones are.
-
-    Where many are refused, the rest is a selection, whose scatter says nothing.
-
-    Examples
-    --------
-    >>> common("ok", np.array(["ok"] * 99 + ["short"]))
-    'ok'
-    >>> common("ok", np.array(["ok"] * 9 + ["short"]))
-    'short'
-    >>> common("low_contrast", np.array(["ok"] * 9))
-    'low_contrast'
-    """
-    others = Counter(noisy[noisy != status.OK].tolist())
-    if clean != status.OK or others.total() <= _STRAY * noisy.size:
-        return clean
-    return others.most_common(1)[0][0]
+def _others(state: np.ndarray) -> dict[str, int]:
+    """Number of pictures by status, of those that are not ``ok``."""
+    return dict(Counter(state[state != status.OK].tolist()))
 
 
 def _refused(place: Place, estimator: str, reason: str) -> Row:

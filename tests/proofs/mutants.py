@@ -1,0 +1,167 @@
+"""``make mutants``: are the tests there that would notice a slip? A sample of them, each judged by the nearest tests.
+
+A mutant is one place of the code changed by one of cosmic-ray's operators: a sign, a comparison, a number, a condition.
+Each is made in a copy of the repository and tested there: first the examples of its own module, then the test files
+that speak most of the names that it defines. Killed is what makes one of them fail. What survives is printed with its
+line: a test is missing, or the mutant is equivalent.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Queue
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+SOURCES = (
+    "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py",
+    "validation/cost/interval.py",
+)  # fmt: skip
+TESTS = ("tests/unit", "tests/hard", "tests/system")
+_BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
+_COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
+_OTHERS = (
+    "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Not", "ReplaceAndWithOr", "ReplaceOrWithAnd",
+    "NumberReplacer", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop",
+    "ReplaceBreakWithContinue",
+)  # fmt: skip
+OPERATORS = tuple(
+    f"core/{name}"
+    for name in (
+        *(f"ReplaceBinaryOperator_{pair}" for pair in _BINARY),
+        *(f"ReplaceComparisonOperator_{pair}" for pair in _COMPARISON),
+        *_OTHERS,
+    )
+)
+_FILES = 3  # test files that a mutant meets
+_LIMIT_S = 90  # of them together: under 30 s on an idle machine
+_COMMON = 4  # letters; shorter names say nothing
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One place (its number among those of the operator) of one file."""
+
+    file: str
+    operator: str
+    place: int
+
+
+def mutants(root: Path = ROOT) -> list[Mutant]:
+    """All of them, in the order of files and operators."""
+    import parso
+    from cosmic_ray.ast import ast_nodes
+    from cosmic_ray.plugins import get_operator, operator_names
+
+    known, found = set(operator_names()), []
+    operators = {name: get_operator(name)() for name in OPERATORS if name in known}
+    for file in sources(root):
+        nodes = list(ast_nodes(parso.parse((root / file).read_text(encoding="utf-8"))))
+        for name, operator in operators.items():
+            count = sum(len(list(operator.mutation_positions(node))) for node in nodes)
+            found += [Mutant(file, name, place) for place in range(count)]
+    return found
+
+
+def sources(root: Path = ROOT) -> list[str]:
+    """The files that are mutated."""
+    each = ([root / name] if name.endswith(".py") else sorted((root / name).rglob("*.py")) for name in SOURCES)
+    return [str(path.relative_to(root)) for some in each for path in some if path.name != "__init__.py"]
+
+
+def nearest(file: str, root: Path = ROOT) -> list[str]:
+    """The test files that use most of a module's names, each name weighing less the more files use it."""
+    files = [path for name in TESTS for path in sorted((root / name).glob("test_*.py"))]
+    texts = {path: set(re.findall(r"\w+", path.read_text(encoding="utf-8"))) for path in files}
+    tree = ast.parse((root / file).read_text(encoding="utf-8"))
+    names = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)} | {Path(file).stem}
+    names = {name for name in names if not name.startswith("_") and len(name) >= _COMMON}
+    uses = {name: sum(name in words for words in texts.values()) for name in names}
+    score = {path: sum(1 / uses[name] for name in names if name in words) for path, words in texts.items()}
+    best = sorted((path for path in texts if score[path]), key=lambda path: (-score[path], str(path)))[:_FILES]
+    return [str(path.relative_to(root)) for path in best]
+
+
+def judged(mutant: Mutant, root: Path) -> tuple[str, str]:
+    """ "killed", "survived" or "same" (no change), and the changed line; ``root`` is a copy that nobody else uses."""
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator
+
+    path = root / mutant.file
+    before = path.read_text(encoding="utf-8")
+    after = mutate_code(before, get_operator(mutant.operator)(), mutant.place)
+    if after is None or after == before:
+        return "same", ""
+    pairs = zip(before.splitlines(), after.splitlines(), strict=False)
+    number, line = next(((n, new) for n, (old, new) in enumerate(pairs, 1) if old != new), (0, ""))
+    path.write_text(after, encoding="utf-8")
+    try:
+        tests = [mutant.file, *nearest(mutant.file, root)]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+        environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
+        done = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=_LIMIT_S)
+        outcome = "survived" if done.returncode in (0, 5) else "killed"
+    except subprocess.TimeoutExpired:
+        outcome = "too slow"  # a loop that no longer ends, or a machine that is too busy: neither killed nor survived
+    finally:
+        path.write_text(before, encoding="utf-8")
+    return outcome, f"{mutant.file}:{number}: {line.strip()}"
+
+
+def copies(count: int, folder: Path) -> Queue[Path]:
+    """So many copies of what git knows."""
+    names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
+    free: Queue[Path] = Queue()
+    for number in range(count):
+        for name in filter(None, names):
+            target = folder / str(number) / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, target)
+        free.put(folder / str(number))
+    return free
+
+
+def main() -> None:
+    """Print what survives and the share that is killed; exit status 1 if that is below 90 %."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=2)
+    asked = parser.parse_args()
+    every, began = mutants(), time.perf_counter()
+    rng = np.random.default_rng(asked.seed)
+    chosen = [every[i] for i in rng.choice(len(every), min(asked.count, len(every)), replace=False)]
+    tally = dict.fromkeys(("killed", "survived", "too slow", "same"), 0)
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(asked.workers) as executor:
+        free = copies(asked.workers, Path(folder))
+
+        def one(mutant: Mutant) -> tuple[str, str, Mutant]:
+            root = free.get()
+            try:
+                return *judged(mutant, root), mutant
+            finally:
+                free.put(root)
+
+        for outcome, line, mutant in executor.map(one, chosen):
+            tally[outcome] += 1
+            if outcome in ("survived", "too slow"):
+                print(f"{outcome}: {line}    [{mutant.operator.removeprefix('core/')}]", flush=True)
+    tried = sum(tally.values()) - tally["same"]
+    print(f"{tally['killed']} of {tried} mutants killed ({len(every)} in all) in {time.perf_counter() - began:.0f} s")
+    sys.exit(tally["killed"] < 0.9 * tried)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""What a run file says of its run, checked: nobody knows who wrote the file."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
+
+from scenes.errors import describe
+from scenes.files import check_bounded
+
+_Strict = ConfigDict(strict=True)
+_NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+_Images = Annotated[int, Field(ge=0, le=10_000_000)]
+
+
+_Variance = Annotated[float, Field(gt=0)]
+_Length = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
+class _Identity(BaseModel):
+    """What the numbers depend on."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    campaign: dict[str, Any]
+    seed: Annotated[int, Field(ge=0)]
+    renders: Annotated[int, Field(ge=2, le=10_000_000)]
+    chunk: int
+    variant: str
+    quality: dict[str, float | int | None]
+    effects: str
+    tolerance: dict[str, float]
+    versions: dict[str, str]
+    code: str
+
+
+class _Predicted(BaseModel):
+    """Predictions that need no image; variances may be infinite."""
+
+    model_config = _Strict
+
+    paper: _Variance
+    calibrated: _Variance
+    bound: _Variance
+    value_px: _Length
+    bias_px: _Length = 0.0
+
+
+_Scalar = str | int | float | bool | None
+_KINDS: dict[str, TypeAdapter] = {
+    "identity": TypeAdapter(_Identity),
+    "predicted": TypeAdapter(_Predicted),
+    "seconds": TypeAdapter(dict[str, _NotNegative], config=_Strict),
+    "wall": TypeAdapter(_NotNegative, config=_Strict),
+    "workers": TypeAdapter(_Images, config=_Strict),
+    "stages": TypeAdapter(list[list[_Images]], config=_Strict),
+    "machine": TypeAdapter(dict[str, _Scalar], config=_Strict),
+    "effects": TypeAdapter(dict[str, list[dict[str, _Scalar]]], config=_Strict),
+}
+
+
+def read(kind: str, text: Any) -> Any:
+    """A stored document of one kind.
+
+    Raises
+    ------
+    ValueError
+        If it is not what is stored there.
+    """
+    try:
+        found = json.loads(text)
+        check_bounded(found)
+        _KINDS[kind].validate_python(found)
+        return found
+    except ValidationError as error:
+        raise ValueError(f"{kind}: {describe(error)}") from None
+    except (TypeError, RecursionError):
+        raise ValueError(f"{kind} must be a document, got something else") from None

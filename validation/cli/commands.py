@@ -1,0 +1,45 @@
+"""Which commands there are; the module of one is loaded only when it is asked for."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command_from_info
+
+COMMANDS = {
+    "validate": ("batch", "Predict, render and measure every setting, and judge the predictions."),
+    "plan": ("plan", "Find where sensor and light should stand, and check it by rendering."),
+    "render": ("image", "Render one image of a scene."),
+    "measure": ("image", "Measure an image: a scene's distance, or the quadrilateral it shows."),
+    "effects": ("effects", "Which effects a scene calls for, why, their influence and cost."),
+    "calibrate": ("calibrate", "Measure the position noise of every locator."),
+    "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
+    "hard": ("hard", "Answers beside references where numbers lose their digits."),
+    "report": ("report", "Write report.html, report.md and tables of a run."),
+    "compare": ("compare", "Which settings changed beyond chance from one run to another?"),
+}
+
+
+class Commands(TyperGroup):
+    """A group of commands that are loaded one at a time: help and errors do not wait for the renderer."""
+
+    def list_commands(self, ctx) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx, cmd_name: str):
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"validation.cli.{COMMANDS[cmd_name][0]}")
+        (info,) = (known for known in module.commands.registered_commands if known.name == cmd_name)
+        return get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
+
+    def format_commands(self, ctx, formatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+    def shell_complete(self, ctx, incomplete: str) -> list:
+        found = typer.core.TyperGroup.__mro__[1].shell_complete(self, ctx, incomplete)  # options, as of any command
+        item = typer._click.shell_completion.CompletionItem
+        return [item(name, help=text) for name, (_, text) in COMMANDS.items() if name.startswith(incomplete)] + found

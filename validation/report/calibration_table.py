@@ -1,0 +1,50 @@
+"""What ``ice calibrate`` prints."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.table import Table
+
+from measure.calibration import Calibration, blur_for
+
+
+def facts(found: Calibration) -> dict:
+    curves = [
+        {**vars(curve), "ratios": curve.ratios.tolist(), "sigma_px": _finite(curve.sigma_px)} for curve in found.curves
+    ]
+    for curve in curves:
+        for key in ("floor_px", "kappa2", "correlation_px", "linear_to", "efficiency"):
+            curve[key] = curve[key] if np.isfinite(curve[key]) else None
+    return {**vars(found), "curves": curves}
+
+
+def _finite(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def table(found: Calibration) -> Table:
+    caption = (
+        f"closed form of gradient: kappa^2 {found.closed_kappa2:.3f} over {found.closed_correlation_px:.2f} px; the "
+        f"calibrated model uses it. Bound of kappa^2 x length: {found.bound:.3f} px.\n"
+        f"The paper's kappa^2 is {found.paper_kappa2}; the closed form gives that at a lens blur of "
+        f"{blur_for(found.paper_kappa2, found.scale_px):.2f} px instead of {found.blur_px:g}.\n"
+        "floor: noise-free error of the points. strip and polygon find none: theirs is the variance "
+        "of a line's middle, told at gradient's length."
+    )
+    made = Table(title=f"{found.scene}: position noise of the locators", caption=caption, box=None, padding=(0, 2))
+    made.title_justify = made.caption_justify = "left"
+    for name in (
+        "locator",
+        "floor px",
+        "kappa^2",
+        "correlation px",
+        "product px",
+        "efficiency",
+        "linear to noise/contrast",
+    ):
+        made.add_column(name, justify="right", no_wrap=True)
+    for curve in found.curves:
+        product = curve.kappa2 * curve.correlation_px
+        cells = (curve.floor_px, curve.kappa2, curve.correlation_px, product, curve.efficiency, curve.linear_to)
+        made.add_row(curve.name, *(f"{value:.3g}" if np.isfinite(value) else "-" for value in cells))
+    return made
