@@ -66,11 +66,23 @@ class Point(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """The likelihood's maximum in one image, the inverse of the information there (q, q), whether the steps ended."""
+    """The likelihood's maximum in one image.
+
+    Attributes
+    ----------
+    point : Point
+    inverse : ndarray, shape (q, q)
+        Of the information there.
+    settled : bool
+        Whether the steps ended.
+    rivalled : bool
+        Whether another maximum, elsewhere, explains the image within the noise as well.
+    """
 
     point: Point
     inverse: np.ndarray
     settled: bool
+    rivalled: bool = False
 
     @property
     def state(self) -> State:
@@ -118,12 +130,15 @@ class Centre:
         Of the parameters' errors.
     freedom : tuple of float
         Degrees of freedom of each chi-square.
+    rivalled : bool
+        As in `Fit`.
     """
 
     state: State
     expansion: Expansion
     covariance: np.ndarray
     freedom: tuple[float, float, float]
+    rivalled: bool
 
 
 Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
@@ -285,7 +300,7 @@ class ArrangementEstimator:
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
         fitted = len(precision) - (precision * fit.inverse).sum() - taken
         near, far, bows = expansion.near, self.pixels.size - expansion.near, float(len(expansion.bows[1]))
-        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0), bows))
+        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0), bows), fit.rivalled)
 
     def index(self, vertices: np.ndarray) -> np.ndarray:
         """Where free vertices' x and y stand among the parameters."""

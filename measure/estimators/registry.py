@@ -24,7 +24,8 @@ from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, edge_blur, reach
-from scenes import InvalidInput
+from planner.imaging.appearance import is_plain
+from scenes import InvalidInput, Scene
 
 ESTIMATORS = ("canny", "gradient", "isophote", "strip", "arrangement")
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
@@ -34,6 +35,15 @@ _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the i
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
+
+
+def best_estimator(scene: Scene) -> str:
+    """What an image of a scene is best measured by: ``arrangement`` where one convex body stands before darkness.
+
+    There it is the most precise, and tells by its goodness of fit whether the image is what it takes it for. Where
+    things hide or shade each other, ``gradient``, whose errors and bias the planner knows.
+    """
+    return "arrangement" if is_plain(scene) else "gradient"
 
 
 def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator | ArrangementEstimator:

@@ -16,6 +16,8 @@ from measure.goodness import WORST, p_value
 from planner.features.locator import MIN_USABLE
 
 _FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
+_APART = 0.5  # px between vertices of two different solutions
+_TELLING = 9.0  # of a chi-square: what tells one solution from another
 _SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
 
 
@@ -62,12 +64,20 @@ def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: 
     if fit.settled and _near(tool, fit) and _probability(centre, used) >= WORST:
         return fit, centre
     x, y, turn = align(image[None], layout)[0]
-    if x or y or turn:
-        moved = tool.arrangement.moved((x, y), turn, layout.ends.reshape(-1, 2).mean(0)).vertices
-        other = tool.climb(used, tool.start(used, moved))
-        if (other.settled, -other.cost) > (fit.settled, -fit.cost):
-            fit, centre = other, tool.centre(other)
-    return fit, centre
+    if not (x or y or turn):
+        return fit, centre
+    moved = tool.arrangement.moved((x, y), turn, layout.ends.reshape(-1, 2).mean(0)).vertices
+    other = tool.climb(used, tool.start(used, moved))
+    best, rest = (other, fit) if (other.settled, -other.cost) > (fit.settled, -fit.cost) else (fit, other)
+    best = best._replace(rivalled=_rivals(tool, best, rest))
+    return best, tool.centre(best)
+
+
+def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
+    """Whether two maxima lie apart and the noise does not tell which is the right one."""
+    away = tool.parameters(rest.state) - tool.parameters(best.state)
+    apart = np.abs(away[: 2 * tool.model.free.size]).max(initial=0.0) > _APART
+    return bool(apart and rest.settled and rest.cost - best.cost < _TELLING)
 
 
 def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
@@ -140,7 +150,8 @@ def _states(tool, layout, found: Found, normals, probability, edge_status) -> np
     sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
     joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
     told = np.full(len(found.vertices), _reliable(tool, found))
-    turned = np.where(_inverted(tool, found.vertices), status.AMBIGUOUS, status.OK)
+    rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
+    turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
     good = found.settled & (_moved(tool, found.vertices) < _FURTHEST) & (probability >= WORST)
     fits = np.where(good, status.OK, status.MISFIT)
     runs = np.where(_moved(tool, found.vertices) < _FURTHEST, status.OK, status.LOW_CONTRAST)

@@ -26,8 +26,9 @@ class Judged:
 
     Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
     propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
-    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error sqrt(empirical + bias^2), px. The
-    status is that of the noise-free image unless it is ``ok`` and more images are lost than may be (`row_status`).
+    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error
+    sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
+    lost than may be (`row_status`).
     """
 
     method: str
