@@ -193,7 +193,7 @@ def _judged(setting: int, method: Method, model: dict[str, float], store: RunFil
     empirical = float(np.var(good, ddof=1)) if good.size > 1 else None
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
     ratio = empirical / propagated if judged else None
-    bias = float(good.mean() - model["value_px"]) if good.size else None
+    bias = float(good.mean() - model["value_px"]) if good.size and math.isfinite(model["value_px"]) else None
     return Judged(
         method=method.name,
         propagated=propagated,
@@ -205,7 +205,7 @@ def _judged(setting: int, method: Method, model: dict[str, float], store: RunFil
         ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
         bias=bias,
         predicted_bias=model.get("bias_px", 0.0),
-        rmse=None if empirical is None else math.hypot(math.sqrt(empirical), bias),
+        rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
         status=row_status(status, failures, distances.size),
     )
 
