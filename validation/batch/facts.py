@@ -15,7 +15,7 @@ _NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 _Images = Annotated[int, Field(ge=0, le=10_000_000)]
 
 
-_Variance = Annotated[float, Field(gt=0)]
+_Variance = Annotated[float, Field(ge=0)]  # 0 without noise
 _FARTHEST = 1e12  # px
 
 

@@ -161,7 +161,7 @@ def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float
     if campaign.grid or campaign.sweep:
         return None
     known = [(campaign.case(i).setting.paper_ice, store.predicted(i)["paper"]) for i in indices]
-    ratios = [ice / ours for ice, ours in known if ice and math.isfinite(ours)]
+    ratios = [ice / ours for ice, ours in known if ice and 0 < ours < math.inf]
     return float(np.median(ratios)) if ratios else None
 
 
