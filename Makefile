@@ -16,7 +16,7 @@ bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
 	$(BIN)/python -m tests.benchmarks.independent
 
-# 20,000 hostile files, run directories, options and arrays: no traceback, no hang, at most 1 GiB (12 minutes).
+# 20,000 hostile files, run directories, options and arrays: no traceback, no hang, at most 1 GiB (5 minutes).
 fuzz: $(VENV)/.test-installed
 	OMP_NUM_THREADS=1 $(BIN)/python -m tests.hard.fuzzing --count 20000 --workers 2
 

@@ -160,8 +160,9 @@ def _check_method(estimator: Any, threshold: Any) -> None:
     if not isinstance(estimator, str):
         raise InvalidInput(f"estimator must be the name of one, got {type(estimator).__name__}")
     number = isinstance(threshold, int | float | np.number) and not isinstance(threshold, bool)
-    if threshold is not None and not (number and 0 <= threshold <= BRIGHTEST):
-        raise InvalidInput(f"threshold must be a number of grey levels a px, at least 0, got {threshold!r}")
+    if threshold is not None and not (number and 0 < threshold <= BRIGHTEST):
+        wanted = "greater than 0" if number and threshold <= 0 else f"a number up to {BRIGHTEST:g}"
+        raise InvalidInput(f"threshold must be {wanted}, got {threshold!r}")
 
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:

@@ -197,6 +197,16 @@ def test_a_run_that_measured_nothing_is_reported(tiny, tmp_path):
     assert (tmp_path / "out" / "report.html").read_text().count("<img") >= 4
 
 
+def test_a_sensor_without_noise_has_no_variance_to_judge(tiny, tmp_path):
+    """Predicted variances of 0 are stored, read, and judged by nobody."""
+    silent = tmp_path / "silent.toml"
+    silent.write_text(tiny.read_text().replace("sigma = 2.4", "sigma = 0.0").replace("bits = 8", ""))
+    found = validation.run(scenes.load(silent), renders=3, seed=1, out=tmp_path / "out", workers=1)
+    assert found.rows[0].calibrated == 0
+    assert found.rows[0].main.ratio is None
+    assert not found.verdict.agrees
+
+
 def test_a_sweep_over_text_is_reported_and_injects_nothing(tiny, tmp_path):
     """Titles that are HTML, Markdown, a formula and a path."""
     titles = ["<script>alert(1)</script>", "=cmd|' /C calc'!A0", "](javascript:alert(1)) ../../x"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from scenes.errors import describe
 from scenes.files import check_bounded
@@ -15,8 +15,17 @@ _NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 _Images = Annotated[int, Field(ge=0, le=10_000_000)]
 
 
-_Variance = Annotated[float, Field(gt=0)]
-_Length = Annotated[float, Field(ge=-1e12, le=1e12)]
+_Variance = Annotated[float, Field(ge=0)]  # 0 without noise
+_FARTHEST = 1e12  # px
+
+
+def _length(value: float) -> float:
+    if abs(value) > _FARTHEST:  # NaN is none: nothing to be measured lies before the camera
+        raise ValueError(f"a distance must be at most {_FARTHEST:g} px, got {value:g}")
+    return value
+
+
+_Length = Annotated[float, AfterValidator(_length)]
 
 
 class _Identity(BaseModel):
@@ -45,7 +54,7 @@ class _Predicted(BaseModel):
     calibrated: _Variance
     bound: _Variance
     value_px: _Length
-    bias_px: _Length = 0.0
+    predicted_bias: _Length
 
 
 _Scalar = str | int | float | bool | None

@@ -162,7 +162,7 @@ def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float
     if campaign.grid or campaign.sweep:
         return None
     known = [(campaign.case(i).setting.paper_ice, store.predicted(i)["paper"]) for i in indices]
-    ratios = [ice / ours for ice, ours in known if ice and math.isfinite(ours)]
+    ratios = [ice / ours for ice, ours in known if ice and 0 < ours < math.inf]
     return float(np.median(ratios)) if ratios else None
 
 
@@ -194,7 +194,7 @@ def _judged(setting: int, method: Method, model: dict[str, float], store: RunFil
     empirical = float(np.var(good, ddof=1)) if good.size > 1 else None
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
     ratio = empirical / propagated if judged else None
-    bias = float(good.mean() - model["value_px"]) if good.size else None
+    bias = float(good.mean() - model["value_px"]) if good.size and math.isfinite(model["value_px"]) else None
     return Judged(
         method=method.name,
         propagated=propagated,
@@ -206,7 +206,7 @@ def _judged(setting: int, method: Method, model: dict[str, float], store: RunFil
         ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
         bias=bias,
         predicted_bias=model["predicted_bias"],
-        rmse=None if empirical is None else math.hypot(math.sqrt(empirical), bias),
+        rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
         status=row_status(status, failures, distances.size),
     )
 
