@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from measure import status
-from measure.estimators.registry import SYNONYMS
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
 from planner.imaging.pictures import Pictures
@@ -20,7 +19,6 @@ from scenes.arrays import BRIGHTEST, grey_levels, numbers
 DEFAULT_ESTIMATOR = "gradient"
 PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _DARK = 1e-200  # squared grey levels
-_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -167,9 +165,7 @@ def _check_method(estimator: Any, threshold: Any) -> None:
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    batch = len(stack) if SYNONYMS.get(estimator, estimator) == "arrangement" else _BATCH
-    parts = [_measure(stack[i : i + batch], layout, estimator, threshold) for i in range(0, len(stack), batch)]
-    whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    whole = _measure(stack, layout, estimator, threshold)
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
     )
@@ -194,7 +190,7 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
 
 
 def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:
-    """All columns of a Measurement for a small stack (n, height, width)."""
+    """All columns of a Measurement for a stack (n, height, width)."""
     shape = find_shape(images, layout, estimator, threshold)
     measured = np.isin(shape.status, status.MEASURED)
     value, gradient = separation(shape.corners)

@@ -107,6 +107,8 @@ class Found(NamedTuple):
         Which of ``centres`` was expanded about.
     settled : ndarray of bool, shape (n,)
     centres : tuple of Centre
+    fit : Fit
+        Of the first image.
     """
 
     vertices: np.ndarray
@@ -116,6 +118,7 @@ class Found(NamedTuple):
     centre: np.ndarray
     settled: np.ndarray
     centres: tuple[Centre, ...]
+    fit: Fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,14 +232,19 @@ class ArrangementEstimator:
     def drawn(self, centre: Centre, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Errors of the parameters in ``count`` drawn images of a state, to first order and in full, both (n, q).
 
-        Always the same draws.
+        Always the same draws. NaN from the first on in which the steps do not end.
         """
         expected, weight, gain, jacobian = self.expected(centre.state)
         half = np.random.default_rng(0).standard_normal((count // 2, len(expected)))
         noise, truth = np.concatenate([half, -half]), self.parameters(centre.state)
         linear = (noise * np.sqrt(weight) * gain) @ jacobian @ centre.expansion.inverse
-        fits = [self.climb(expected + part / np.sqrt(weight), centre.state, truth) for part in noise]
-        return linear, np.stack([self.parameters(fit.state) for fit in fits]) - truth
+        full = np.full_like(linear, np.nan)
+        for row, part in zip(full, noise, strict=True):
+            fit = self.climb(expected + part / np.sqrt(weight), centre.state, truth)
+            if not fit.settled:
+                break
+            row[:] = self.parameters(fit.state) - truth
+        return linear, full
 
     def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Fit:
         """Fisher scoring from a state to the likelihood's maximum for one image (P,).
@@ -318,23 +326,27 @@ class ArrangementEstimator:
         _, weight, gain, jacobian = self.expected(centre.state)
         return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
 
-    def find(self, images: np.ndarray, locate: Locate | None = None) -> Found:
+    def find(self, images: np.ndarray, locate: Locate | None = None, known: Found | None = None) -> Found:
         """Most likely parameters in images (n, height, width).
 
         The first image is measured by itself; the others around it, as far as the expansion holds; the first that is
-        left by itself, and so on.
+        left by itself, and so on. ``known`` is what was found in the first image alone, if it was.
         """
-        collected, left, centres = _Collected(self, len(images)), np.arange(len(images)), []
+        collected, left, centres, first_fit = _Collected(self, len(images)), np.arange(len(images)), [], None
         while left.size:
             image = images[left[0]]
             used = self.taken(image[None])[0]
-            fit, centre = locate(used, image) if locate else self._locate(used)
+            if known and not centres:
+                fit, centre = known.fit, known.centres[0]
+            else:
+                fit, centre = locate(used, image) if locate else self._locate(used)
+            first_fit = first_fit or fit
             tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
             done = [self._around(images, tried[at : at + _BATCH], fit, centre, collected, len(centres), at == 0)
                     for at in range(0, tried.size, _BATCH)]  # fmt: skip
             centres.append(centre)
             left = np.setdiff1d(left, np.concatenate(done))
-        return collected.found(tuple(centres))
+        return collected.found(tuple(centres), first_fit)
 
     def _locate(self, used: np.ndarray) -> tuple[Fit, Centre]:
         fit = self.climb(used, self.start(used))
@@ -370,14 +382,14 @@ class _Collected:
     def add(self, which: np.ndarray, parameters: np.ndarray, squares: np.ndarray) -> None:
         self.parameters[which], self.squares[which] = parameters, squares
 
-    def found(self, centres: tuple[Centre, ...]) -> Found:
+    def found(self, centres: tuple[Centre, ...], fit: Fit) -> Found:
         arrangement, free = self.tool.arrangement, self.tool.model.free
         count, first = len(self.parameters), 2 * free.size
         vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
         vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
         return Found(
             vertices, self.parameters[:, first:-1], self.parameters[:, -1], self.squares, self.owner, self.settled,
-            centres,
+            centres, fit,
         )  # fmt: skip
 
 

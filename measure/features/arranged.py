@@ -23,18 +23,17 @@ _SEEN = 4.0  # standard deviations of a required edge's contrast that there must
 
 def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
     """Lines and corners in images (n, height, width)."""
-    if not layout.visible.all() or (tool.arrangement.required < 0).any() or not tool.pixels.size:
+    if not _is_shown(tool, layout):
         return _nothing(len(images), layout)
-    found = tool.find(images, lambda used, image: locate(tool, layout, used, image))
+    found, reliable = _find(images, layout, tool)
     ends = found.vertices[:, tool.arrangement.required]
     along = ends[:, :, 1] - ends[:, :, 0]
     lengths = np.maximum(np.linalg.norm(along, axis=-1), 1e-12)
     normals = np.stack([-along[..., 1], along[..., 0]], -1) / lengths[..., None]
     corners = found.vertices[:, tool.arrangement.corners]
-    freedom = np.array([centre.freedom for centre in found.centres])[found.centre]
-    probability = p_value(found.squares, freedom)
+    probability = _probabilities(found)
     contrast, edge_status = _edges(tool, layout, found)
-    state = _states(tool, layout, found, normals, probability, edge_status)
+    state = _states(tool, layout, found, normals, probability, edge_status, reliable)
     measured = np.isin(state, status.MEASURED)
     covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
     tilts = np.stack([_tilts(tool, centre) for centre in found.centres])[found.centre]
@@ -52,6 +51,42 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
         rejected=np.zeros_like(count),
         p_value=probability,
     )
+
+
+def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
+    """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
+    if not _is_shown(tool, layout):
+        return np.full(len(images), np.nan)
+    found, reliable = _find(images, layout, tool)
+    return _probabilities(found) if reliable else np.full(len(images), np.nan)
+
+
+def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Found, bool]:
+    """What is found in the images, and whether it can be relied on.
+
+    Judged where the light says the picture is, so that all images have one answer; else where the first one is. Where
+    the answer is no, the first image stands for all: nothing that is found in the others would be told.
+    """
+
+    def here(used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
+        return locate(tool, layout, used, image)
+
+    first = tool.find(images[:1], here)
+    reliable = _expected_reliable(tool) if tool.is_lit else is_reliable(tool, first.centres[0])
+    if not reliable:
+        each = np.zeros(len(images), int)
+        return first._replace(
+            **{key: getattr(first, key)[each] for key in first._fields if key not in ("centres", "fit")}
+        ), False
+    return tool.find(images, here, first), True
+
+
+def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
+    return bool(layout.visible.all() and (tool.arrangement.required >= 0).all() and tool.pixels.size)
+
+
+def _probabilities(found: Found) -> np.ndarray:
+    return p_value(found.squares, np.array([centre.freedom for centre in found.centres])[found.centre])
 
 
 def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
@@ -144,12 +179,12 @@ def _shown(tool: ArrangementEstimator) -> np.ndarray:
     return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
 
 
-def _states(tool, layout, found: Found, normals, probability, edge_status) -> np.ndarray:
+def _states(tool, layout, found: Found, normals, probability, edge_status, reliable: bool) -> np.ndarray:
     """Status of each image."""
     first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
     sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
     joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
-    told = np.full(len(found.vertices), _reliable(tool, found))
+    told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
     rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
     turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
     good = found.settled & (_moved(tool, found.vertices) < _FURTHEST) & (probability >= WORST)
@@ -157,12 +192,6 @@ def _states(tool, layout, found: Found, normals, probability, edge_status) -> np
     runs = np.where(_moved(tool, found.vertices) < _FURTHEST, status.OK, status.LOW_CONTRAST)
     each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
     return np.array([status.worst(*row) for row in each])
-
-
-def _reliable(tool: ArrangementEstimator, found: Found) -> str:
-    """Judged where the light says the picture is, so that all images have one answer; else where the first one is."""
-    fine = _expected_reliable(tool) if tool.is_lit else is_reliable(tool, found.centres[0])
-    return status.OK if fine else status.ILL_CONDITIONED
 
 
 @lru_cache(maxsize=64)

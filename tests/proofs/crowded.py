@@ -6,6 +6,7 @@ shading are its own; noise is the scene's, rounded. Rows whose status is not ok 
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from scenes import InvalidInput, Picture, Scene
 from scenes.parts.block import Block
 from tests.oracle import block_image, pinhole
 
+POSES = {"task1": 200, "small": 100, "blocks": 200}
 FINE = 0.1  # px: standard deviation below which a pose ought to be measured
 LEVEL = 0.01
 
@@ -132,7 +134,7 @@ def study(kind: str, count: int, images: int, seed: int, show: bool = True) -> l
         if show:
             ratio = found.empirical / found.predicted
             print(
-                f"{number:4d} s({found.sensor[0]:.1f},{found.sensor[1]:.1f})"
+                f"{kind:6s} {number:3d} s({found.sensor[0]:.1f},{found.sensor[1]:.1f})"
                 f" l({found.light[0]:.1f},{found.light[1]:.1f}) {found.status:15s} lost {found.failed:3d} R {ratio:.3f}"
                 f" told/bound {found.predicted / found.bound:.3f} bound {np.sqrt(found.bound):.4f} px"
                 f" bias {found.bias:+.2f}",
@@ -142,11 +144,19 @@ def study(kind: str, count: int, images: int, seed: int, show: bool = True) -> l
 
 
 def crowded(
-    kind: Annotated[str, typer.Option(help="task1, small or blocks.")] = "task1",
-    count: Annotated[int, typer.Option(help="Poses.")] = 200,
+    kind: Annotated[str, typer.Option(help="task1, small, blocks or all.")] = "all",
+    count: Annotated[int | None, typer.Option(help="Poses a kind; 200, 100 and 200 when not given.")] = None,
     images: Annotated[int, typer.Option(help="Images a pose.")] = 300,
     seed: Annotated[int, typer.Option()] = 1,
+    workers: Annotated[int, typer.Option(min=1)] = 2,
 ) -> None:
-    """Measure random poses of crowded edges and judge them together."""
-    for name, value in judge(study(kind, count, images, seed)).items():
-        print(f"{name}: {value}")
+    """Measure random poses of crowded edges and judge each kind; exit status 1 if a claim does not hold."""
+    kinds = list(POSES) if kind == "all" else [kind]
+    with ProcessPoolExecutor(workers) as pool:
+        done = [pool.submit(study, one, count or POSES[one], images, seed) for one in kinds]
+        found = {one: judge(future.result()) for one, future in zip(kinds, done, strict=True)}
+    for one, figures in found.items():
+        print(f"\n{one}")
+        for name, value in figures.items():
+            print(f"  {name}: {value if isinstance(value, bool | int) else format(value, '.4g')}")
+    raise typer.Exit(0 if all(figures["holds"] for figures in found.values()) else 1)
