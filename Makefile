@@ -11,9 +11,10 @@ validate: $(VENV)/.installed
 test: lint
 	$(BIN)/pytest -n 2
 
-# How near the estimators come to the Cramer-Rao bound, and how fast they are (10 minutes).
+# How near estimators and ellipses come to the Cramer-Rao bound, on our images and on GalSim's, and how fast (15 minutes).
 bench-measure: $(VENV)/.test-installed
 	$(BIN)/python -m tests.benchmarks.estimators
+	$(BIN)/python -m tests.benchmarks.independent
 
 # 20,000 hostile files, run directories, options and arrays: no traceback, no hang, at most 1 GiB (5 minutes).
 fuzz: $(VENV)/.test-installed

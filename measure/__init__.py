@@ -2,8 +2,9 @@
 
 from measure.bounds import bound, image_bound
 from measure.estimators.registry import ESTIMATORS
-from measure.features.conic import Ellipse, find_ellipse, fit_ellipse
+from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
+from measure.find.ellipse import find_ellipse
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral

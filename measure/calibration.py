@@ -23,6 +23,7 @@ from scenes import Scene
 
 RATIOS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 ANGLES = (0.0, 11.0, 22.5, 37.0)
+_POINTS = ("canny", "gradient", "isophote")  # estimators by edge points
 _SIDE, _SIZE = 60.0, 96  # px: of the square, and of the image
 _CONTRAST = 100.0  # grey levels; only noise over contrast matters
 _SMALL = 0.1  # noise over contrast up to which the law is fitted
@@ -111,7 +112,7 @@ def _variance(name: str, ratio: float, scene: Scene, images: int, rng) -> tuple[
     for degrees in ANGLES:
         clean, layout = _square(degrees, ratio, scene)
         noisy = clean + _CONTRAST * ratio * rng.standard_normal((images, *clean.shape))
-        found = _points(noisy, layout, name) if name in ("canny", "gradient") else _lines(noisy, layout, name)
+        found = _points(noisy, layout, name) if name in _POINTS else _lines(noisy, layout, name)
         if found is not None:
             points.append(found[0])
             lengths.append(found[1])
@@ -145,9 +146,7 @@ def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float]
     for part in tool.parts:
         found = part.locator.locate(noisy)
         span = part.caliper.positions[-1] - part.caliper.positions[0]
-        if found.valid.sum(1).mean() < 0.98 * (
-            part.caliper.positions.size if name == "gradient" else span / np.sqrt(2)
-        ):
+        if found.valid.sum(1).mean() < 0.98 * (part.caliper.positions.size if name != "canny" else span / np.sqrt(2)):
             return None
         weight = found.valid / found.valid.sum(1, keepdims=True)
         mean = (weight * found.offset).sum(1)

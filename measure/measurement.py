@@ -75,8 +75,9 @@ def distance(
         Where the image was taken from; edges are sought where this pose projects them, up to 4 px and 2 degrees away.
     light : Pose or pair of float, optional
         Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``polygon``.
-    estimator : {"gradient", "canny", "strip", "polygon"}
-        ``gradient``: zero crossing of the Gaussian second derivative. ``canny``: the classic pipeline, edge pixels
+    estimator : {"gradient", "isophote", "canny", "strip", "polygon"}
+        ``gradient``: zero crossing of the Gaussian second derivative. ``isophote``: where the smoothed image takes the
+        mean of both sides' levels. ``canny``: the classic pipeline, edge pixels
         above a gradient threshold, each moved to where the gradient across the edge is largest. ``strip``: maximum
         likelihood along each edge. ``polygon``: all edges of the face together, corners included; the most precise.
     threshold : float, optional

@@ -21,7 +21,7 @@ from measure.features.calipers import Caliper
 from measure.features.lines import cells, trend_along
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints, UnitNoise
-from planner.features.locator import edge_blur
+from planner.features.locator import MIN_CONTRAST, edge_blur
 
 _BESIDE = 0.7  # of the gradient at its top is left at a pixel half a diagonal away, at least
 _LOST = 0.1  # of an edge's points; up to there the variance is off by 3 % at most
@@ -46,6 +46,8 @@ class CannyLocator:
         Where they are in the edge's caliper, ideal px, and the ideal px across it for a recorded px.
     kernel : ndarray, shape (k * k, 8)
         What k x k pixels tell of the gradient across the edge (`profile_kernel`).
+    least_contrast : float
+        Contrast / noise below which an edge point's error is no longer linear in the noise.
     """
 
     caliper: Caliper
@@ -57,6 +59,7 @@ class CannyLocator:
     offset: np.ndarray
     gain: np.ndarray
     kernel: np.ndarray
+    least_contrast: float = MIN_CONTRAST
 
     @classmethod
     def of(cls, optics: Optics, caliper: Caliper, threshold: float, thinning: Thinning) -> CannyLocator:

@@ -11,8 +11,10 @@ from scipy import sparse
 
 from measure import status
 from measure.estimators.canny import CannyLocator, thinnings
+from measure.estimators.crossing import CrossingLocator
 from measure.estimators.estimate import Estimate, Estimator, noisy
-from measure.estimators.gradient import GradientLocator
+from measure.estimators.gradient import gradient_locator
+from measure.estimators.isophote import TRIM, isophote_locator
 from measure.estimators.likelihood import LikelihoodEstimator
 from measure.estimators.polygon import polygon_estimator
 from measure.estimators.profile import TRUNCATE
@@ -21,11 +23,11 @@ from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
-from planner.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, reach
+from planner.features.locator import CLEARANCE, edge_blur, reach
 from scenes import InvalidInput
 
-ESTIMATORS = ("canny", "gradient", "strip", "polygon")
-CAPTURE = {"canny": 1.5, "gradient": 1.5, "strip": 0.125, "polygon": 0.125}
+ESTIMATORS = ("canny", "gradient", "isophote", "strip", "polygon")
+CAPTURE = {"canny": 1.5, "gradient": 1.5, "isophote": 0.5, "strip": 0.125, "polygon": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
 _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
@@ -39,7 +41,7 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     Parameters
     ----------
     layout : Layout
-    name : {"canny", "gradient", "strip", "polygon"}
+    name : {"canny", "gradient", "isophote", "strip", "polygon"}
     threshold : float
         Gradient threshold of ``canny``, grey levels a pixel.
 
@@ -69,18 +71,35 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
         )
         return LikelihoodEstimator.joined(calipers, parts)
     kernel = (TRUNCATE if name == "canny" else 4) * optics.scale_px
-    calipers = edge_calipers(layout, reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1)
+    beside, margin = reach(optics.scale_px, optics.blur_px), optics.window_px + kernel + 1
+    if name == "isophote":
+        return _isophotes(layout, edge_calipers(layout, TRIM / CLEARANCE * beside, margin, beside))
+    calipers = edge_calipers(layout, beside, margin)
     if name == "gradient":
         calipers = tuple(_thinned(caliper, optics.scale_px) for caliper in calipers)
-        return SeparateEstimator(calipers, _by_points(optics, calipers, partial(GradientLocator.of, optics)))
+        return SeparateEstimator(calipers, _by_points(optics, calipers, partial(gradient_locator, optics)))
     looks = iter(thinnings(optics, [caliper for caliper in calipers if _measurable(caliper)], threshold))
     parts = _by_points(optics, calipers, lambda caliper: CannyLocator.of(optics, caliper, threshold, next(looks)))
     different = {part.locator.thinning for part in parts if part}
     return SeparateEstimator(calipers, parts, different.pop() if len(different) == 1 else None)
 
 
+def _isophotes(layout: Layout, calipers: tuple[Caliper, ...]) -> SeparateEstimator:
+    """Each edge by its isophote; `clutter` where one of its sides has no level of its own."""
+    parts, found = [], []
+    for index, caliper in enumerate(calipers):
+        part = None
+        if _measurable(caliper):
+            locator, state = isophote_locator(layout, index, _thinned(caliper, layout.optics.scale_px))
+            part = PointEstimator(replace(caliper, positions=locator.positions), locator)
+            caliper = replace(part.caliper, status=status.worst(caliper.status, state))
+        found.append(caliper)
+        parts.append(part)
+    return SeparateEstimator(tuple(found), tuple(parts))
+
+
 def _by_points(
-    optics: Optics, calipers: tuple[Caliper, ...], locator: Callable[[Caliper], GradientLocator | CannyLocator]
+    optics: Optics, calipers: tuple[Caliper, ...], locator: Callable[[Caliper], CrossingLocator | CannyLocator]
 ) -> tuple[PointEstimator | None, ...]:
     return tuple(PointEstimator(f, locator(f)) if _measurable(f) else None for f in calipers)
 
@@ -108,7 +127,7 @@ class PointEstimator:
     """One edge from edge points and a total-least-squares line."""
 
     caliper: Caliper
-    locator: GradientLocator | CannyLocator
+    locator: CrossingLocator | CannyLocator
 
     @property
     def calipers(self) -> tuple[Caliper, ...]:
@@ -124,7 +143,7 @@ class PointEstimator:
         lines = fit_lines(points, points.weights)
         slope = np.tan(lines.tilt)
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
-        clear = points.contrast > MIN_CONTRAST * np.sqrt(noise_variance)
+        clear = points.contrast > self.locator.least_contrast * np.sqrt(noise_variance)
         edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
         state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
         columns = (

@@ -61,16 +61,8 @@ def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) 
 
 def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[np.ndarray, ...]:
     """Pixels of the strip (flat indices), their ideal coordinates, and those in the caliper (along, across)."""
-    height, width = layout.optics.shape
-    used = layout.optics.recorded(caliper.at(caliper.positions[[0, -1]], np.zeros(2)))
-    low = np.maximum(np.floor(used.min(0) - HALF_WIDTH - 1), 0).astype(int)
-    high = np.minimum(np.ceil(used.max(0) + HALF_WIDTH + 2), [width, height]).astype(int)
-    y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
-    points = layout.optics.ideal(np.stack([x, y], 1).astype(float))
-    along, across = caliper.coordinates(points)
-    keep = (
-        (np.abs(across) <= HALF_WIDTH) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
-    )
+    flat, points, along, across = pixels_beside(caliper, HALF_WIDTH)
+    keep = np.ones(flat.size, bool)
     # an edge may be required twice, once for each of its corners
     task = [ends for ends in layout.ends[layout.visible] if not np.array_equal(ends, layout.ends[index])]
     apart = {segment.tobytes() for segment in layout.apart[index]}
@@ -78,7 +70,25 @@ def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[
         away = distance_to_segment(points[keep], *segment)
         crowded = segment.tobytes() in apart  # too near all along: nothing would be left, so it is flagged instead
         keep[keep] = (away > clear) | (crowded & (away > NEARER * np.abs(across[keep])))
-    labels = layout.labels()[y, x]
+    labels = layout.labels().flat[flat]
     expected = np.where(across > 0, *layout.sides[index])
     keep &= (labels == expected) | (np.abs(across) < 1)
-    return (y * width + x)[keep], points[keep], along[keep], across[keep]
+    return flat[keep], points[keep], along[keep], across[keep]
+
+
+def pixels_beside(caliper: Caliper, half_width: float) -> tuple[np.ndarray, ...]:
+    """Pixels (flat indices) within ``half_width`` px of the part of an edge that is used.
+
+    With them their ideal coordinates (P, 2), px, and those in the caliper (along, across).
+    """
+    height, width = caliper.optics.shape
+    used = caliper.optics.recorded(caliper.at(caliper.positions[[0, -1]], np.zeros(2)))
+    low = np.maximum(np.floor(used.min(0) - half_width - 1), 0).astype(int)
+    high = np.minimum(np.ceil(used.max(0) + half_width + 2), [width, height]).astype(int)
+    y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
+    points = caliper.optics.ideal(np.stack([x, y], 1).astype(float))
+    along, across = caliper.coordinates(points)
+    near = (
+        (np.abs(across) <= half_width) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
+    )
+    return (y * width + x)[near], points[near], along[near], across[near]

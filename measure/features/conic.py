@@ -8,17 +8,12 @@ import cv2
 import numpy as np
 
 from measure import status
-from measure.estimators.gradient import GradientLocator
-from measure.features.calipers import MIN_POSITIONS
-from measure.features.optics import Optics
-from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput
-from scenes.arrays import finite, grey_levels, numbers
+from scenes.arrays import finite, numbers
 
 _STEPS = 12
-_FARTHEST, _LARGEST = 1e9, 1e5  # px; of a point, and of an ellipse that an image shows
-_MIN_FOUND = 0.5
-_UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
+UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
+_FARTHEST = 1e9  # px; of a point
 
 
 @dataclass(frozen=True)
@@ -33,7 +28,8 @@ class Ellipse:
     covariance : ndarray, shape (..., 5, 5)
         Of the parameters. For a circle a and b are the same number, and the angle has no error.
     status : ndarray of str, shape (...)
-        ``ok``, ``low_contrast``, ``not_visible`` or ``ill_conditioned``; parameters are NaN unless ``ok``.
+        ``ok``, ``clutter``, ``low_contrast``, ``not_visible`` or ``ill_conditioned``; parameters are NaN unless it is
+        one of the first two.
     """
 
     parameters: np.ndarray
@@ -92,8 +88,8 @@ def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, cir
     response, known = _solve(_free(jacobian, circle), weights / weights.max())
     spread = response @ full @ response.T
     if not (good and known):
-        return _nothing((), status.ILL_CONDITIONED)
-    return Ellipse(parameters * _UNITS, _whole(spread, circle) * np.outer(_UNITS, _UNITS), np.array(status.OK))
+        return no_ellipse((), status.ILL_CONDITIONED)
+    return Ellipse(parameters * UNITS, _whole(spread, circle) * np.outer(UNITS, UNITS), np.array(status.OK))
 
 
 def _covariance(given: np.ndarray | float, count: int) -> np.ndarray:
@@ -105,87 +101,6 @@ def _covariance(given: np.ndarray | float, count: int) -> np.ndarray:
     if not (np.diag(full) >= 0).all() or np.abs(full).max() > _FARTHEST**2:
         raise InvalidInput(f"covariance must be of variances from 0 to {_FARTHEST**2:g} px^2, got others")
     return full
-
-
-def find_ellipse(
-    images: np.ndarray, expected: np.ndarray, optics: Optics, *, circle: bool = False, spacing: float = 2.0
-) -> Ellipse:
-    """Find an ellipse in images, from edge points along normals of the expected one.
-
-    Parameters
-    ----------
-    images : ndarray, shape (..., height, width)
-        Grey levels.
-    expected : array_like, shape (5,)
-        Parameters as in `Ellipse`, within ``optics.window_px`` of the truth.
-    optics : Optics
-        Blur, noise and scale.
-    circle : bool
-        Fit a circle.
-    spacing : float
-        Distance of the edge points in units of the smoothing scale.
-    """
-    images, expected = grey_levels(images, "images"), finite(expected, "expected")
-    if images.shape[-2:] != optics.shape:
-        raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {images.shape}")
-    if expected.shape != (5,) or not (expected[2:4] > 0).all() or np.abs(expected).max() > _LARGEST:
-        raise InvalidInput(
-            f"expected must be x, y, a, b and angle of an ellipse, got shape {expected.shape}: {expected}"
-        )
-    expected = expected / _UNITS
-    stack = images.reshape(-1, *images.shape[-2:])
-    angles, places, normals = _positions(expected, optics, spacing)
-    if len(angles) < max(MIN_POSITIONS, 5):
-        return _nothing(images.shape[:-2], status.NOT_VISIBLE)
-    locator = GradientLocator.along_curve(optics, angles, places, normals)
-    found = locator.locate(stack)
-    seen = (found.valid.mean(1) >= _MIN_FOUND) & (found.contrast > MIN_CONTRAST * np.sqrt(optics.noise_variance))
-    # on a curve the zero crossing lies inside the edge by half the curvature times the variance of the smoothed profile
-    inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * _curvature(expected, angles)
-    points = places + (found.offset + inward)[..., None] * normals
-    start = np.broadcast_to(expected, (len(stack), 5))
-    parameters, good = _descend(points, found.valid.astype(float), start, circle)
-    unit = locator.unit_noise().response
-    covariances = []
-    for row, valid, contrast in zip(parameters, found.valid, found.contrast, strict=True):
-        response, known = _solve(_free(_distances(places, row)[1], circle), valid.astype(float))
-        noise = response @ unit / max(contrast, 1e-12)
-        covariances.append(
-            _whole(optics.noise_variance * noise @ noise.T, circle) if known else np.full((5, 5), np.nan)
-        )
-    state = np.where(seen, np.where(good, status.OK, status.ILL_CONDITIONED), status.LOW_CONTRAST)
-    parameters = np.where((state == status.OK)[:, None], parameters, np.nan)
-    lead = images.shape[:-2]
-    covariance = np.array(covariances).reshape(*lead, 5, 5) * np.outer(_UNITS, _UNITS)
-    return Ellipse(parameters.reshape(*lead, 5) * _UNITS, covariance, state.reshape(lead))
-
-
-def _positions(expected: np.ndarray, optics: Optics, spacing: float):
-    """Parameter angles, places (m, 2) and outward unit normals (m, 2) about evenly spaced, where the image has room."""
-    fine = np.linspace(0, 2 * np.pi, 2001)
-    a, b = expected[2:4]
-    speed = np.hypot(a * np.sin(fine), b * np.cos(fine))
-    length = np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(fine))])
-    count = max(8, int(length[-1] / (spacing * optics.scale_px)))
-    t = np.interp(length[-1] * np.arange(count) / count, length, fine)
-    places, normals = _curve(expected, t)
-    margin = optics.window_px + 4 * optics.scale_px + 1
-    inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
-    return t[inside], places[inside], normals[inside]
-
-
-def _curvature(parameters: np.ndarray, t: np.ndarray) -> np.ndarray:
-    a, b = parameters[2:4]
-    return a * b / np.hypot(a * np.sin(t), b * np.cos(t)) ** 3
-
-
-def _curve(parameters: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    x, y, a, b, angle = parameters
-    c, s = np.cos(angle), np.sin(angle)
-    rotation = np.array([[c, s], [-s, c]])
-    normal = np.stack([b * np.cos(t), a * np.sin(t)], -1)
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return np.stack([a * np.cos(t), b * np.sin(t)], -1) @ rotation + [x, y], normal @ rotation
 
 
 def _start(points: np.ndarray, circle: bool) -> np.ndarray:
@@ -285,5 +200,6 @@ def _tidy(row: np.ndarray) -> np.ndarray:
     return np.array([x, y, a, b, (angle + np.pi / 2) % np.pi - np.pi / 2])
 
 
-def _nothing(lead: tuple[int, ...], state: str) -> Ellipse:
+def no_ellipse(lead: tuple[int, ...], state: str) -> Ellipse:
+    """Nothing measured in images of leading shape ``lead``."""
     return Ellipse(np.full((*lead, 5), np.nan), np.full((*lead, 5, 5), np.nan), np.full(lead, state))

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationError
 
-from measure.estimators.gradient import GradientLocator
+from measure.estimators.gradient import gradient_along
 from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.layout import Layout
@@ -111,7 +111,7 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straighte
         inside = _room(place, optics)
         if inside.sum() < 3:
             raise InvalidInput(f"side {caliper.name} must have edge points in the image, got none")
-        locator = GradientLocator.along_curve(optics, t[inside], place[inside], toward[inside])
+        locator = gradient_along(optics, t[inside], place[inside], toward[inside])
         found = locator.locate(image[None])
         points = lens.straighten(place[inside] + found.offset[0][:, None] * toward[inside])
         along, offset = caliper.coordinates(points)

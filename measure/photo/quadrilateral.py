@@ -57,7 +57,7 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "strip", lens: Len
     ----------
     image : array_like, shape (height, width)
         Grey levels.
-    estimator : {"strip", "polygon", "gradient", "canny"}
+    estimator : {"strip", "polygon", "isophote", "gradient", "canny"}
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
     lens : Lens, optional
         Intrinsics and distortion.

@@ -35,6 +35,15 @@ def kappa2(scale: float, blur_px):
     return 3 / 8 * (1 + (edge_blur(blur_px) / scale) ** 2) ** 3
 
 
+def isophote_kappa2(scale: float, blur_px):
+    """The same for a level crossing of the smoothed image, the level known.
+
+    The smoothed image's noise has variance s_n^2 / (4 pi s^2), its slope at the crossing is
+    C / sqrt(2 pi (s^2 + s_e^2)). Their ratio is (1 + (s_e / s)^2) / 2.
+    """
+    return (1 + (edge_blur(blur_px) / scale) ** 2) / 2
+
+
 def correlation(distance: np.ndarray, scale: float) -> np.ndarray:
     """Correlation of two edge points' errors that far apart along the edge: exp(-d^2 / (4 s^2))."""
     return np.exp(-((distance / (2 * scale)) ** 2))

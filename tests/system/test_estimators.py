@@ -39,7 +39,8 @@ def test_strip_comes_within_1_6_of_the_bound(rng, degrees):
 
 
 @pytest.mark.parametrize(
-    ("estimator", "limit"), [("strip", 1e-3), ("polygon", 1e-3), ("gradient", 0.02), ("canny", 0.02)]
+    ("estimator", "limit"),
+    [("strip", 1e-3), ("polygon", 1e-3), ("isophote", 5e-3), ("gradient", 0.02), ("canny", 0.02)],
 )
 def test_noise_free_bias(estimator, limit):
     assert worst_bias(estimator, 2) < limit
@@ -156,7 +157,7 @@ def test_contrast_that_varies_along_the_edge(estimator, limit):
     assert np.abs(found.corners[0] - corners).max() < limit
 
 
-@pytest.mark.parametrize("estimator", ["gradient", "canny"])
+@pytest.mark.parametrize("estimator", ["gradient", "canny", "isophote"])
 def test_stated_covariance_where_the_contrast_varies(estimator):
     """Contrast 50 to 100 over 100 px: that of the lines as stated against that of the linear response to the pixels.
 
@@ -183,7 +184,9 @@ def test_contrast_that_changes_sign(estimator):
     assert np.isnan(found.corners).all()
 
 
-@pytest.mark.parametrize(("estimator", "limit"), [("gradient", 0.02), ("strip", 1e-3), ("polygon", 1e-3)])
+@pytest.mark.parametrize(
+    ("estimator", "limit"), [("gradient", 0.02), ("isophote", 5e-3), ("strip", 1e-3), ("polygon", 1e-3)]
+)
 def test_edge_that_leaves_the_image(estimator, limit):
     """Two edges cut by the border: what is visible gives their lines, and the corner outside follows from them."""
     corners = rectangle(100, 60, 8, centre=(110.3, 55.7))

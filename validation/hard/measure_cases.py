@@ -18,7 +18,7 @@ from validation.hard.polygon import polygon_image
 from validation.hard.scenes_for import task1
 
 SENSOR, LIGHT = (31.3, 137.1), (15, 315)
-BIAS = {"gradient": 0.006, "canny": 0.006, "strip": 2e-3, "polygon": 2e-3}  # px, noise free
+BIAS = {"gradient": 0.006, "canny": 0.006, "isophote": 0.003, "strip": 2e-3, "polygon": 2e-3}  # px, noise free
 _TOP = ("v4", "v3", "v7", "v6")
 _BY_ALL = (
     "black image",

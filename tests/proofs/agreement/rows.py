@@ -21,7 +21,7 @@ from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 
 KINDS = "calibrated", "propagated", "reported"
-ESTIMATORS = "gradient", "canny", "strip", "polygon"
+ESTIMATORS = "gradient", "canny", "isophote", "strip", "polygon"
 _BATCH = 50  # pictures held in memory at a time
 
 

@@ -1,0 +1,95 @@
+"""Edge points where the smoothed image takes the mean of the levels on both sides: an isophote at sub-pixel precision.
+
+Each side's level is a straight line along the edge through the pixels beside it, times the face's shading; where that
+is unknown, because the light is, a slope across the edge is fitted too, from a wider band. Smoothed image and levels
+are linear in the pixels, and so is their difference, whose change of sign is the edge point: the levels' own noise is
+in its response. Through the points of an edge goes the line that the contour of the smoothed image at that level gives
+(`skimage.measure.find_contours`), for a whole stack of images at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from measure import status
+from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across
+from measure.estimators.strip import HALF_WIDTH, pixels_beside
+from measure.features.calipers import Caliper, distance_to_segment
+from measure.features.layout import BACKGROUND, Layout
+from planner.features.locator import MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
+
+TRIM = 3.0  # standard deviations of an edge from which 0.1 % of its contrast is left: where corners and levels begin
+_BAND = 3.5  # how far a side's level reaches from the edge, in units of where it starts
+_QUIETEST = 0.7  # a crowded side shows its level no farther from all edges than so much of the farthest that there is
+_FEWEST = 8  # pixels that tell a level
+
+
+def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[CrossingLocator, str]:
+    """Prepare the locator of one edge of a layout; with it ``clutter`` where a side has no level of its own, or ``ok``.
+
+    The function that crosses zero is the level less the smoothed image.
+    """
+    optics = caliper.optics
+    places, normals, gain = caliper.curve()
+    offsets, across, _ = places_across(places, normals, optics.window_px)
+    kernel = -gaussian_rows(across, optics.scale_px, optics.shape)
+    sides = [_side(layout, index, caliper, sign) for sign in (1, -1)]
+    pixels = np.unique(np.concatenate([kernel.indices, *(used for used, *_ in sides)]))
+    level = np.zeros((6, pixels.size))
+    for k, (used, rows, *_) in enumerate(sides):
+        level[3 * k : 3 * k + 3, np.searchsorted(pixels, used)] = rows / 2
+    blur = caliper.blur(caliper.positions) * np.ones(len(places))
+    least = MIN_CONTRAST * np.sqrt(isophote_kappa2(optics.scale_px, blur) / kappa2(optics.scale_px, blur))
+    return CrossingLocator(
+        positions=caliper.positions,
+        offsets=offsets,
+        pixels=pixels,
+        kernel=sparse.csr_array(kernel[:, pixels]),
+        slope_to_contrast=np.sqrt(2 * np.pi) * np.hypot(optics.scale_px, edge_blur(blur)),
+        gain=gain * np.ones(len(places)),
+        basis=np.concatenate([basis for _, _, basis, _ in sides], 1),
+        level=level,
+        least_contrast=float(least.mean()),
+    ), status.OK if all(clear for *_, clear in sides) else status.CLUTTER
+
+
+def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """The level on one side of an edge: pixels (P,) and rows (3, P) that take its mean, its change along and across the
+    edge from them, the basis (m, 3) that takes it to the positions, and whether the pixels are clear of all edges."""
+    face = int(layout.sides[index, (1 - sign) // 2])
+    start = TRIM * edge_blur(layout.optics.blur_px)
+    even = face == BACKGROUND or layout.shadings[face] is not None
+    flat, points, along, across = pixels_beside(caliper, _BAND * start if even else max(HALF_WIDTH, _BAND * start))
+    clearance = sign * across
+    for segment in (*layout.ends[layout.visible], *layout.others):
+        if not np.array_equal(segment, layout.ends[index]):
+            clearance = np.minimum(clearance, distance_to_segment(points, *segment))
+    own = (layout.labels().flat[flat] == face) & (clearance > 0)
+    if own.sum() < _FEWEST:
+        own = clearance > 0  # a face too thin for pixels of its own: what is seen beyond it
+    limit = min(start, _QUIETEST * clearance[own].max(initial=0.0))
+    own &= clearance >= limit
+    lever, away, middle = along[own], sign * across[own], caliper.positions.mean()
+    columns = np.stack([np.ones_like(lever), lever - middle, away], 1)
+    told = [True, _extent(lever) > np.ptp(caliper.positions) / 2, not even and _extent(away) > start]
+    rows = np.linalg.pinv(layout.shade(face, points[own])[:, None] * columns * told)
+    return flat[own], rows, _smoothed(layout, face, caliper, sign), bool(limit >= start and own.sum() >= _FEWEST)
+
+
+def _extent(places: np.ndarray) -> float:
+    return float(np.ptp(places)) if places.size else 0.0
+
+
+def _smoothed(layout: Layout, face: int, caliper: Caliper, sign: int) -> np.ndarray:
+    """Twice what one side's face adds to the smoothed image on the expected edge, by the terms of its level, (m, 3).
+
+    A level P + g u at the distance u within the face gives half of P + g sigma sqrt(2 / pi) on the edge itself.
+    """
+    width = np.hypot(caliper.optics.scale_px, edge_blur(caliper.blur(caliper.positions)))
+    inward = np.sqrt(2 / np.pi) * width * np.ones(caliper.positions.size)
+    there, inside, outside = (
+        layout.shade(face, caliper.at(caliper.positions, np.full(1, float(u)))) for u in (0, sign, -sign)
+    )
+    mean = there + inward * (inside - outside) / 2
+    return np.stack([mean, mean * (caliper.positions - caliper.positions.mean()), there * inward], 1)
