@@ -158,11 +158,14 @@ class ArrangementEstimator:
     shape : tuple of int
         (height, width).
     noise : Noise
+    still : frozenset of int
+        Vertices that follow the required ones, because no piece that ends there is seen in the images.
     """
 
     arrangement: Arrangement
     shape: tuple[int, int]
     noise: Noise
+    still: frozenset[int] = frozenset()
 
     @cached_property
     def model(self) -> BlurredModel:
@@ -180,7 +183,7 @@ class ArrangementEstimator:
     @cached_property
     def known(self) -> Known:
         """What is known of (vertices, levels, blur) before, shapes (q, q) and (q,)."""
-        return known(self.model)
+        return known(self.model, self.still)
 
     @cached_property
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
@@ -315,10 +318,9 @@ class ArrangementEstimator:
         return (2 * np.searchsorted(self.model.free, vertices)[:, None] + [0, 1]).ravel()
 
     def wherever(self, centre: Centre) -> np.ndarray:
-        """Covariance of the parameters (q, q) if nothing is known of any vertex before; large where none is told."""
-        moves, places = slice(2 * self.model.free.size), np.zeros_like(self.known.precision)
-        places[moves, moves] = self.known.precision[moves, moves]
-        inverse, rest = _inverse(_inverse(centre.expansion.inverse) - places), self.known.precision - places
+        """Covariance of the parameters (q, q) if nothing is known of vertices before but of those that are still."""
+        rest = known(self.model, self.still, follows=np.inf).precision
+        inverse = _inverse(_inverse(centre.expansion.inverse) - self.known.precision + rest)
         return inverse - inverse @ rest @ inverse
 
     def derivative(self, centre: Centre) -> np.ndarray:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import replace
+from functools import lru_cache, partial
 
 import numpy as np
 
 from measure import status
 from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Found
 from measure.features.alignment import align
-from measure.features.found import MIN_SINE, Shape
+from measure.features.found import MIN_SINE, Shape, gather
 from measure.features.layout import Layout
 from measure.features.linearity import is_reliable
 from measure.goodness import WORST, p_value
@@ -25,6 +26,51 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     """Lines and corners in images (n, height, width)."""
     if not _is_shown(tool, layout):
         return _nothing(len(images), layout)
+    parts = [(which, _shape(images[which], layout, part)) for which, part in _parts(images, layout, tool)]
+    source, rows = np.zeros(len(images), int), np.zeros(len(images), int)
+    for number, (which, _) in enumerate(parts):
+        source[which], rows[which] = number, np.arange(which.size)
+    return gather([shape for _, shape in parts], source, rows)
+
+
+def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
+    """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
+    probability = np.full(len(images), np.nan)
+    if not _is_shown(tool, layout):
+        return probability
+    for which, part in _parts(images, layout, tool):
+        found, reliable = _find(images[which], layout, part)
+        if reliable:
+            probability[which] = _probabilities(found)
+    return probability
+
+
+def _parts(
+    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
+) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+    """Which images are measured with which tool: where the light is not known, each image tells what is dark.
+
+    A vertex is free where a piece that ends there is seen; the image of a rigid arrangement tells which pieces are.
+    """
+    others = frozenset(tool.model.free.tolist()) - frozenset(tool.arrangement.required.ravel().tolist())
+    if tool.is_lit or not others:
+        return [(np.arange(len(images)), tool)]
+    rigid = _stilled(tool, others)
+    contrast, sigma = _contrasts(rigid, rigid.find(images, partial(locate, rigid, layout)))
+    seen, which = np.unique((np.abs(contrast) > _SEEN * sigma).any(-1), axis=0, return_inverse=True)
+    ends = tool.arrangement.pieces[_moving(tool)]
+    return [
+        (np.flatnonzero(which.ravel() == number), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
+        for number, pattern in enumerate(seen)
+    ]
+
+
+@lru_cache(maxsize=64)
+def _stilled(tool: ArrangementEstimator, still: frozenset[int]) -> ArrangementEstimator:
+    return replace(tool, still=still)
+
+
+def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
     found, reliable = _find(images, layout, tool)
     ends = found.vertices[:, tool.arrangement.required]
     along = ends[:, :, 1] - ends[:, :, 0]
@@ -53,24 +99,13 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     )
 
 
-def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
-    """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
-    if not _is_shown(tool, layout):
-        return np.full(len(images), np.nan)
-    found, reliable = _find(images, layout, tool)
-    return _probabilities(found) if reliable else np.full(len(images), np.nan)
-
-
 def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Found, bool]:
     """What is found in the images, and whether it can be relied on.
 
     Judged where the light says the picture is, so that all images have one answer; else where the first one is. Where
     the answer is no, the first image stands for all: nothing that is found in the others would be told.
     """
-
-    def here(used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
-        return locate(tool, layout, used, image)
-
+    here = partial(locate, tool, layout)
     first = tool.find(images[:1], here)
     reliable = _expected_reliable(tool) if tool.is_lit else is_reliable(tool, first.centres[0])
     if not reliable:
@@ -117,6 +152,7 @@ def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
 
 def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
+    ((_, tool),) = _parts(clean[None], layout, tool)
     _, centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
     rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
     rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]
@@ -142,31 +178,41 @@ def _moved(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
     return np.nan_to_num(np.abs(away), nan=np.inf).max((1, 2))
 
 
+def _moving(tool: ArrangementEstimator) -> np.ndarray:
+    """Pieces that free vertices move."""
+    return np.flatnonzero(np.isin(tool.arrangement.pieces, tool.model.free).any(1))
+
+
+def _contrasts(tool: ArrangementEstimator, found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Contrast at the start, the middle and the end of each moving piece, and its standard deviation, (n, N, 3)."""
+    first = 2 * tool.model.free.size
+    value, sigma = [], []
+    for centre in found.centres:
+        steps = centre.expansion.pieces.contrast[:, :, first:-1]
+        rows = np.einsum("tk,nkl->ntl", [[1, 0, 0], [1, 0.5, 0.25], [1, 1, 1]], steps)
+        value.append(rows)
+        sigma.append(np.sqrt(np.einsum("ntl,lm,ntm->nt", rows, centre.covariance[first:-1, first:-1], rows)))
+    return np.einsum("intl,il->int", np.stack(value)[found.centre], found.levels), np.stack(sigma)[found.centre]
+
+
 def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
     """Contrast in the middle of each required edge and its status, both (n, E)."""
-    arrangement, n = tool.arrangement, len(found.vertices)
-    pieces = np.flatnonzero(np.isin(arrangement.pieces, tool.model.free).any(1))
-    middle, state = np.zeros((n, len(layout.names))), np.full((n, len(layout.names)), status.OK, dtype=object)
+    edges = tool.arrangement.edges[_moving(tool)]
+    contrast, sigma = _contrasts(tool, found)
+    middle, state = (
+        np.zeros((len(contrast), len(layout.names))),
+        np.full((len(contrast), len(layout.names)), status.OK, dtype=object),
+    )
     shown = _shown(tool)
-    for number, centre in enumerate(found.centres):
-        which = found.centre == number
-        first = 2 * tool.model.free.size
-        steps = centre.expansion.pieces.contrast[:, :, first:-1]
-        ends = np.stack([steps[:, 0], steps.sum(1)], 1)
-        levels = found.levels[which]
-        for e in range(len(layout.names)):
-            if not shown[e]:
-                state[which, e] = status.NOT_VISIBLE
-                continue
-            rows = np.concatenate(
-                [ends[arrangement.edges[pieces] == e].mean((0, 1))[None], *ends[arrangement.edges[pieces] == e]]
-            )
-            contrast = levels @ rows.T
-            spread = np.sqrt(np.einsum("kl,lm,km->k", rows, centre.covariance[first:-1, first:-1], rows))
-            faint = np.abs(contrast[:, 0]) < _SEEN * spread[0]
-            turns = (contrast > 2 * spread).any(1) & (contrast < -2 * spread).any(1)
-            middle[which, e] = contrast[:, 0]
-            state[which, e] = np.where(faint, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
+    for e in range(len(layout.names)):
+        if not shown[e]:
+            state[:, e] = status.NOT_VISIBLE
+            continue
+        here, spread = contrast[:, edges == e], sigma[:, edges == e]
+        faint = (np.abs(here[..., 1]) < _SEEN * spread[..., 1]).any(1)
+        turns = (here > 2 * spread).any((1, 2)) & (here < -2 * spread).any((1, 2))
+        middle[:, e] = here[..., 1].mean(1)
+        state[:, e] = np.where(faint, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
     return middle, state.astype(str)
 
 

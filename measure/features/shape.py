@@ -14,7 +14,7 @@ from measure.estimators.registry import CAPTURE, estimator
 from measure.features.alignment import align
 from measure.features.arranged import find_arranged, goodness
 from measure.features.corners import corner_response, intersect, line_equations
-from measure.features.found import MIN_SINE, Shape
+from measure.features.found import MIN_SINE, Shape, gather
 from measure.features.layout import Layout
 from measure.goodness import WORST
 
@@ -83,7 +83,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     for move, which in _expectations(images, layout, offsets, far, lost, passes == _PASSES):
         source[which], rows[which] = len(parts), np.arange(len(which))
         parts.append(_find(images[which], move, name, threshold, passes - 1))
-    return _gather(parts, source, rows)
+    return gather(parts, source, rows)
 
 
 def _expectations(images, layout, offsets, far, lost, first):
@@ -147,14 +147,3 @@ def _refuse(shape: Shape, lost: np.ndarray) -> Shape:
     gone = ~np.isin(state, status.MEASURED)
     corners = np.where(gone[:, None, None], np.nan, shape.corners)
     return Shape(**{**vars(shape), "status": state, "corners": corners})
-
-
-def _gather(parts: list[Shape], source: np.ndarray, rows: np.ndarray) -> Shape:
-    """One Shape of which image i is row ``rows[i]`` of part ``source[i]``."""
-    columns = {}
-    for name in vars(parts[0]):
-        column = np.array(getattr(parts[0], name), dtype=object if name.endswith("status") else None)
-        for k, part in enumerate(parts[1:], 1):
-            column[source == k] = getattr(part, name)[rows[source == k]]
-        columns[name] = column.astype(str) if name.endswith("status") else column
-    return Shape(**columns)

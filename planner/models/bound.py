@@ -9,6 +9,7 @@ elsewhere it changes nothing (`information(..., with_knowledge=False)` is the bo
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ REACH = 32.0  # px from a required edge up to which pixels count; levels are har
 KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
 KNOWN_BLUR = 0.3  # of the blur: how well it is known
 FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
+_STILL = 0.01  # px: the same of vertices about which an image says nothing, so that they simply follow
 _UNTOLD = 1e3  # px, or the size of a level: a standard deviation at which nothing is known
 _LEAST = 1e-12  # information that is none
 _FURTHEST = 100.0  # px^2; what is known no better is not known, for the model is linear
@@ -101,22 +103,23 @@ def information(
     return Information(model, told, known(model).precision if with_knowledge else nothing)
 
 
-def known(model: BlurredModel) -> Known:
+def known(model: BlurredModel, still: Collection[int] = (), follows: float = FOLLOWS) -> Known:
     """What light and pose tell of the parameters without the image.
 
     Levels of lit faces, and their slopes, to `KNOWN_LEVELS` of the level; vertices that end no required edge to
-    `FOLLOWS` px beside the required ones, which may be anywhere; the blur to `KNOWN_BLUR` of it.
+    ``follows`` px beside the required ones, which may be anywhere, and the ``still`` ones of them beyond doubt; the
+    blur to `KNOWN_BLUR` of it.
     """
     arrangement, start = model.arrangement, model.start()
     levels = [np.full(region.count, region.known / KNOWN_LEVELS**2) for region in arrangement.regions]
     mean = [np.eye(region.count)[0] * region.known for region in arrangement.regions]
-    places = _following(model)
+    places = _following(model, still, follows)
     precision = np.diag(np.concatenate([np.zeros(len(places)), *levels, [(KNOWN_BLUR * start.blur) ** -2]]))
     precision[: len(places), : len(places)] = places
     return Known(precision, np.concatenate([arrangement.vertices[model.free].ravel(), *mean, [start.blur]]))
 
 
-def _following(model: BlurredModel) -> np.ndarray:
+def _following(model: BlurredModel, still: Collection[int], follows: float) -> np.ndarray:
     """Precision of the free vertices' places before, (2 F, 2 F), px^-2.
 
     The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
@@ -130,7 +133,9 @@ def _following(model: BlurredModel) -> np.ndarray:
     apart = np.zeros((follow.shape[0], 2 * free.size))
     apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
     apart[:, np.repeat(required, 2)] = -follow
-    return apart.T @ apart / FOLLOWS**2
+    sigma = np.where(np.isin(free[~required], list(still)), _STILL, follows)
+    apart = apart / np.repeat(sigma, 2)[:, None]
+    return apart.T @ apart
 
 
 def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | None = None) -> np.ndarray:
@@ -166,11 +171,11 @@ def bound(pictures: Pictures) -> Errors:
         return alone
     known = alone.measurand
     lead = alone.variance.shape
-    each = [_one(pictures, index, lead) for index in np.ndindex(lead)]
-    lines = np.array([lines for lines, _ in each]).reshape(*lead, *each[0][0].shape)
-    variance = np.array([variance for _, variance in each]).reshape(lead)
-    usable = np.isfinite(alone.variance) & (variance < _FURTHEST * np.maximum(_unit(known), 1e-300))
-    variance = np.where(usable, variance, np.inf)
+    edges = len(known.view.names)
+    lines, variance = np.full((*lead, edges, 2, 2), np.inf), np.full(lead, np.inf)
+    for index in map(tuple, np.argwhere(np.isfinite(alone.variance))):
+        lines[index], variance[index] = _one(pictures, index, lead)
+    variance = np.where(variance < _FURTHEST * np.maximum(_unit(known), 1e-300), variance, np.inf)
 
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
