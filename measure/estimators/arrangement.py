@@ -42,6 +42,8 @@ class Point(NamedTuple):
     Attributes
     ----------
     state : State
+    before : ndarray, shape (q,)
+        What was known of the parameters.
     expected, weight, gain : ndarray, shape (P,)
         Recorded level, one over the variance of its noise, its derivative by the signal.
     jacobian : ndarray, shape (P, q)
@@ -55,6 +57,7 @@ class Point(NamedTuple):
     """
 
     state: State
+    before: np.ndarray
     expected: np.ndarray
     weight: np.ndarray
     gain: np.ndarray
@@ -186,14 +189,21 @@ class ArrangementEstimator:
         return known(self.model, self.still)
 
     @cached_property
-    def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same with next to nothing known of all else, so that everything has a most likely value."""
+    def prior(self) -> np.ndarray:
+        """Its precision, with next to nothing known of all else, so that everything has a most likely value."""
         model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
         levels = [
             np.full(region.count, (1e4 * sigma) ** -2 * (not region.known)) for region in self.arrangement.regions
         ]
         weak = np.concatenate([np.full(2 * model.free.size, _FREE**-2), *levels, [0.0]])
-        return self.known.precision + np.diag(weak), self.known.mean
+        return self.known.precision + np.diag(weak)
+
+    def before(self, used: np.ndarray) -> np.ndarray:
+        """What is known of the parameters before (q,); levels that no light tells are about those of an image (P,)."""
+        mean, middle = self.known.mean.copy(), float(np.median(used)) - self.noise.dark_level
+        for region, levels in zip(self.arrangement.regions, self.arrangement.level_slices, strict=True):
+            mean[2 * self.model.free.size + levels.start] += 0.0 if region.known else middle
+        return mean
 
     def parameters(self, state: State) -> np.ndarray:
         """All parameters as one array (q,)."""
@@ -213,7 +223,7 @@ class ArrangementEstimator:
         """The expected place, or another, with the levels that fit one image (P,) best there."""
         state = self.model.start()
         state = state if vertices is None else state._replace(vertices=vertices)
-        design, (precision, mean) = self.model.design(state).T, self.prior
+        design, precision, mean = self.model.design(state).T, self.prior, self.before(used)
         weight = 1 / response(self.noise, np.maximum(used - self.noise.dark_level, 0))[1]
         first, last = 2 * self.model.free.size, -1
         known = precision[first:last, first:last]
@@ -252,9 +262,9 @@ class ArrangementEstimator:
     def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Fit:
         """Fisher scoring from a state to the likelihood's maximum for one image (P,).
 
-        ``mean`` (q,) is what is known of the parameters before if not the expected state.
+        ``mean`` (q,) is what is known of the parameters before, that of `before` when not given.
         """
-        mean = self.prior[1] if mean is None else mean
+        mean = self.before(used) if mean is None else mean
         point, damping, settled = self._point(used, state, mean), 0.0, False
         for number in range(_STEPS):
             matrix = point.fisher if number < _SCORED else self._newton(point)
@@ -265,11 +275,11 @@ class ArrangementEstimator:
 
     def _point(self, used: np.ndarray, state: State, mean: np.ndarray) -> Point:
         """The likelihood and its derivatives at a state."""
-        precision, before = self.prior[0], mean - self.parameters(state)
+        precision, before = self.prior, mean - self.parameters(state)
         expected, weight, gain, jacobian = self.expected(state)
         away, weighted = used - expected, jacobian * (gain * weight)[:, None]
         return Point(
-            state, expected, weight, gain, jacobian,
+            state, mean, expected, weight, gain, jacobian,
             told=gain * weight * away,
             fisher=weighted.T @ (jacobian * gain[:, None]) + precision,
             score=away @ weighted + precision @ before,
@@ -301,11 +311,11 @@ class ArrangementEstimator:
 
     def centre(self, fit: Fit) -> Centre:
         """Prepare a state for a stack of images."""
-        (precision, mean), point = self.prior, fit.point
+        precision, point = self.prior, fit.point
         first = 2 * self.model.free.size
         expansion = Expansion.of(
             Pieces.of(self.model, fit.state), point.expected, point.weight, point.gain, point.jacobian[:, first:],
-            fit.inverse, precision, mean - self.parameters(fit.state),
+            fit.inverse, precision, point.before - self.parameters(fit.state),
         )  # fmt: skip
         spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)

@@ -25,7 +25,7 @@ from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, edge_blur, reach
 from planner.imaging.appearance import is_plain
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Noise, Scene
 
 ESTIMATORS = ("canny", "gradient", "isophote", "strip", "arrangement")
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
@@ -34,6 +34,7 @@ CAPTURE = {"canny": 1.5, "gradient": 1.5, "isophote": 0.5, "strip": 0.125}
 _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
+_FAINTEST = 1e-3  # grey levels of noise: about what the image of an arrangement is exact to
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
@@ -71,7 +72,7 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator |
     own_reach = CLEARANCE * edge_blur(optics.blur_px)  # a face less than twice as wide has no pixel of its own level
     if name == "arrangement":
         if layout.arrangement is not None:
-            return ArrangementEstimator(layout.arrangement, optics.shape, optics.sensor)
+            return ArrangementEstimator(layout.arrangement, optics.shape, _noisy(optics.sensor))
         name = "strip"  # things hide or shade each other: each edge by itself
     if name == "strip":
         calipers = edge_calipers(layout, own_reach, 0.0, 2 * own_reach)
@@ -246,3 +247,8 @@ class SeparateEstimator:
 
     def respond(self, clean: np.ndarray) -> np.ndarray:
         return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])
+
+
+def _noisy(noise: Noise) -> Noise:
+    """The noise, or the least that a likelihood can be made of."""
+    return noise if noise.variance >= _FAINTEST**2 else noise.model_copy(update={"sigma": _FAINTEST})

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from measure import status
 from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Found
@@ -15,13 +16,16 @@ from measure.features.layout import Layout
 from measure.features.linearity import is_reliable
 from measure.goodness import WORST, p_value
 from planner.features.locator import MIN_USABLE
+from planner.imaging.sensor import full_scale
 
 _FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
 _APART = 0.5  # px between vertices of two different solutions
 _TELLING = 9.0  # of a chi-square: what tells one solution from another
-_SEEN = 4.0  # standard deviations of a required edge's contrast that there must be of it
+_SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it
+_BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
 
 
+@_BLAS.wrap(limits=1)
 def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
     """Lines and corners in images (n, height, width)."""
     if not _is_shown(tool, layout):
@@ -33,6 +37,7 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     return gather([shape for _, shape in parts], source, rows)
 
 
+@_BLAS.wrap(limits=1)
 def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
     """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
     probability = np.full(len(images), np.nan)
@@ -48,9 +53,24 @@ def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> 
 def _parts(
     images: np.ndarray, layout: Layout, tool: ArrangementEstimator
 ) -> list[tuple[np.ndarray, ArrangementEstimator]]:
-    """Which images are measured with which tool: where the light is not known, each image tells what is dark.
+    """Which images are measured with which tool."""
+    used = tool.taken(images)
+    beyond = ((used < 0) | (used > full_scale(tool.noise))).any(1)
+    groups = ((np.flatnonzero(~beyond), tool), (np.flatnonzero(beyond), _unclipped(tool)))
+    return [
+        (which[part], stilled)
+        for which, here in groups
+        if which.size
+        for part, stilled in _seen(images[which], layout, here)
+    ]
 
-    A vertex is free where a piece that ends there is seen; the image of a rigid arrangement tells which pieces are.
+
+def _seen(
+    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
+) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+    """Which images show what: where the light is not known, the images tell which faces are dark.
+
+    A vertex is free where a piece that ends there is seen; an image of a rigid arrangement tells which pieces are.
     """
     others = frozenset(tool.model.free.tolist()) - frozenset(tool.arrangement.required.ravel().tolist())
     if tool.is_lit or not others:
@@ -63,6 +83,13 @@ def _parts(
         (np.flatnonzero(which.ravel() == number), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
         for number, pattern in enumerate(seen)
     ]
+
+
+@lru_cache(maxsize=64)
+def _unclipped(tool: ArrangementEstimator) -> ArrangementEstimator:
+    """For images that go beyond the sensor's scale: they were not recorded by it, and nothing was cut off."""
+    noise = tool.noise
+    return replace(tool, noise=noise.model_copy(update={"bits": None, "sigma": float(np.sqrt(noise.variance))}))
 
 
 @lru_cache(maxsize=64)
@@ -79,7 +106,7 @@ def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Sh
     corners = found.vertices[:, tool.arrangement.corners]
     probability = _probabilities(found)
     contrast, edge_status = _edges(tool, layout, found)
-    state = _states(tool, layout, found, normals, probability, edge_status, reliable)
+    state = _states(tool, layout, found, normals, edge_status, reliable)
     measured = np.isin(state, status.MEASURED)
     covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
     tilts = np.stack([_tilts(tool, centre) for centre in found.centres])[found.centre]
@@ -102,18 +129,34 @@ def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Sh
 def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Found, bool]:
     """What is found in the images, and whether it can be relied on.
 
-    Judged where the light says the picture is, so that all images have one answer; else where the first one is. Where
-    the answer is no, the first image stands for all: nothing that is found in the others would be told.
+    Judged where the light says the picture is, so that all images have one answer; else where the first one is that
+    shows what the model says. Where the answer is no, the first image stands for all: of others nothing else is told.
     """
     here = partial(locate, tool, layout)
     first = tool.find(images[:1], here)
-    reliable = _expected_reliable(tool) if tool.is_lit else is_reliable(tool, first.centres[0])
-    if not reliable:
+    told = tool.is_lit or bool(_shows(tool, layout, first)[0])
+    if told and not _reliable(tool, first, 0):
         each = np.zeros(len(images), int)
         return first._replace(
             **{key: getattr(first, key)[each] for key in first._fields if key not in ("centres", "fit")}
         ), False
-    return tool.find(images, here, first), True
+    found = tool.find(images, here, first)
+    good = np.flatnonzero(_shows(tool, layout, found))
+    return found, bool(told or not good.size or _reliable(tool, found, good[0]))
+
+
+def _reliable(tool: ArrangementEstimator, found: Found, number: int) -> bool:
+    return _expected_reliable(tool) if tool.is_lit else is_reliable(tool, found.centres[found.centre[number]])
+
+
+def _shows(tool: ArrangementEstimator, layout: Layout, found: Found) -> np.ndarray:
+    """Whether each image shows all edges, and is what the model says, bool (n,)."""
+    return _fits(found) & np.isin(_edges(tool, layout, found)[1], status.MEASURED).all(1)
+
+
+def _fits(found: Found) -> np.ndarray:
+    """Whether the model explains each image, bool (n,)."""
+    return found.settled & (_probabilities(found) >= WORST)
 
 
 def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
@@ -150,6 +193,7 @@ def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
     return bool(apart and rest.settled and rest.cost - best.cost < _TELLING)
 
 
+@_BLAS.wrap(limits=1)
 def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
     ((_, tool),) = _parts(clean[None], layout, tool)
@@ -225,7 +269,7 @@ def _shown(tool: ArrangementEstimator) -> np.ndarray:
     return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
 
 
-def _states(tool, layout, found: Found, normals, probability, edge_status, reliable: bool) -> np.ndarray:
+def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) -> np.ndarray:
     """Status of each image."""
     first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
     sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
@@ -233,9 +277,9 @@ def _states(tool, layout, found: Found, normals, probability, edge_status, relia
     told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
     rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
     turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
-    good = found.settled & (_moved(tool, found.vertices) < _FURTHEST) & (probability >= WORST)
-    fits = np.where(good, status.OK, status.MISFIT)
-    runs = np.where(_moved(tool, found.vertices) < _FURTHEST, status.OK, status.LOW_CONTRAST)
+    near = _moved(tool, found.vertices) < _FURTHEST
+    fits = np.where(near & _fits(found), status.OK, status.MISFIT)
+    runs = np.where(near, status.OK, status.LOW_CONTRAST)
     each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
     return np.array([status.worst(*row) for row in each])
 
