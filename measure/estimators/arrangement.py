@@ -27,6 +27,8 @@ _STEPS = 30
 _SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
 _LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum
 _STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
+_BLURRED = 3.0  # times the expected blur at which steps are given up
+_LOST = 40.0  # px from the expected place at which they are
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
@@ -269,9 +271,15 @@ class ArrangementEstimator:
         for number in range(_STEPS):
             matrix = point.fisher if number < _SCORED else self._newton(point)
             point, settled, damping = self._step(used, point, matrix, damping, mean)
-            if settled:
+            if settled or self._is_lost(point.state):
                 break
         return Fit(point, _inverse(point.fisher), settled)
+
+    def _is_lost(self, state: State) -> bool:
+        """Whether the steps have gone where no measurement is."""
+        ends = np.unique(self.arrangement.required[self.arrangement.required >= 0])
+        away = np.abs(state.vertices[ends] - self.arrangement.vertices[ends]).max(initial=0.0)
+        return bool(state.blur > _BLURRED * self.model.start().blur or away > _LOST)
 
     def _point(self, used: np.ndarray, state: State, mean: np.ndarray) -> Point:
         """The likelihood and its derivatives at a state."""
@@ -296,18 +304,22 @@ class ArrangementEstimator:
         return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else point.fisher
 
     def _step(self, used, point: Point, matrix, damping, mean) -> tuple[Point, bool, float]:
-        """The next point, by a step damped until the likelihood grows; whether there is none; the damping."""
+        """The next point, by a step damped until the likelihood grows; whether it is the last; the damping."""
         for _ in range(12):
             step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), point.score)
             size = float(step @ matrix @ step)
-            step = step * min(1.0, _STRIDE / max(np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), 1e-12))
+            there = self._point(used, self.model.moved(point.state, self._held_back(step)), mean)
+            if there.cost <= point.cost + _ROUNDING:
+                return there, size < _SETTLED**2, damping / 10 if damping > 1e-3 else 0.0
             if size < _SETTLED**2:
                 return point, True, 0.0
-            there = self._point(used, self.model.moved(point.state, step), mean)
-            if there.cost <= point.cost + _ROUNDING:
-                return there, False, damping / 10 if damping > 1e-3 else 0.0
             damping = max(10 * damping, 1e-3)
         return point, True, damping
+
+    def _held_back(self, step: np.ndarray) -> np.ndarray:
+        """A step (q,) no longer than what is known of vertices and blur is good for."""
+        vertices, blur = np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), abs(float(step[-1]))
+        return step / max(1.0, vertices / _STRIDE, blur / (0.5 * self.model.start().blur))
 
     def centre(self, fit: Fit) -> Centre:
         """Prepare a state for a stack of images."""

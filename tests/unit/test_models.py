@@ -46,12 +46,13 @@ def test_table_1(scaled):
     assert ours[[0, 2]] == pytest.approx([0.1023, 0.0703], rel=0.03)  # row 2 of the table, 0.0960, is not reproduced
 
 
-@pytest.mark.parametrize("model", ["paper", "calibrated", "bound"])
-def test_variance_falls_with_the_square_of_exposure(task1, model):
+@pytest.mark.parametrize(("model", "tolerance"), [("paper", 1e-3), ("calibrated", 1e-3), ("bound", 5e-3)])
+def test_variance_falls_with_the_square_of_exposure(task1, model, tolerance):
+    """What is known beside the image does not grow with it: the bound falls a little less."""
     analogue = task1.model_copy(update={"noise": scenes.Noise(sigma=2.4)})  # a scale without an end
     brighter = analogue.model_copy(update={"camera": task1.camera.model_copy(update={"exposure": 400.0})})
     before, after = (planner.variances(s, *poses(task1), model, "image") for s in (analogue, brighter))
-    assert after == pytest.approx(before / 4, rel=1e-3)
+    assert after == pytest.approx(before / 4, rel=tolerance)
 
 
 def test_no_price_beats_the_bound(task1):
