@@ -7,6 +7,7 @@ at a time. Optics and noise are estimated from each image, as `ice measure PHOTO
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import cv2
@@ -58,13 +59,18 @@ def _texture(rng):
     return _noisy(_clean() + 10 * grain / grain.std(), rng)
 
 
-def _distorted(rng):
+@lru_cache(maxsize=1)
+def _bent() -> np.ndarray:
     middle = np.array(SHAPE[::-1]) / 2
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     away = np.stack([x, y], -1) - middle
     bent = middle + away * (1 + 0.01 * (away**2).sum(-1, keepdims=True) / (middle**2).sum())
     fine = BACKGROUND + CONTRAST / 100 * polygon_image(4 * CORNERS + 1.5, (4 * SHAPE[0], 4 * SHAPE[1]), 4 * BLUR)
-    return _noisy(cv2.remap(fine, (4 * bent + 1.5).astype(np.float32), None, cv2.INTER_CUBIC), rng)
+    return cv2.remap(fine, (4 * bent + 1.5).astype(np.float32), None, cv2.INTER_CUBIC)
+
+
+def _distorted(rng):
+    return _noisy(_bent(), rng)
 
 
 def _poisson(rng):
