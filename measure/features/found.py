@@ -51,7 +51,8 @@ def gather(parts: list[Shape], source: np.ndarray, rows: np.ndarray) -> Shape:
     """One Shape of which image i is row ``rows[i]`` of part ``source[i]``."""
     columns = {}
     for name in vars(parts[0]):
-        column = np.array(getattr(parts[0], name), dtype=object if name.endswith("status") else None)
+        first = np.array(getattr(parts[0], name), dtype=object if name.endswith("status") else None)
+        column = first[np.where(source == 0, rows, 0)]
         for k, part in enumerate(parts[1:], 1):
             column[source == k] = getattr(part, name)[rows[source == k]]
         columns[name] = column.astype(str) if name.endswith("status") else column

@@ -185,3 +185,16 @@ def test_photographs_that_are_not_what_the_model_says(name):
     found = outcome(name, "arrangement", 12, np.random.default_rng(4))
     assert found.honest
     assert (found.ok == found.count) == (name == "as the model says")
+
+
+def test_each_image_tells_by_itself_what_is_dark(task1):
+    """Without the light, images with lit and with dark side faces in one stack: each as if it were alone."""
+    sensor, rng = (40.8, 342.2), np.random.default_rng(5)
+    lit, dark = (block_image(task1, sensor, light) for light in ((60.0, 341.5), (12.5, 160.0)))
+    stack = np.stack([lit, dark, lit]) + 2.4 * rng.standard_normal((3, *lit.shape))
+    together = measure.distance(stack, task1, sensor, estimator="arrangement")
+    for image, value, variance in zip(stack, together.value_px, together.variance_px2, strict=True):
+        alone = measure.distance(image, task1, sensor, estimator="arrangement")
+        assert alone.status == status.OK
+        assert value == pytest.approx(alone.value_px, abs=0.02 * np.sqrt(alone.variance_px2))
+        assert variance == pytest.approx(alone.variance_px2, rel=0.05)
