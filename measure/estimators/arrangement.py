@@ -23,6 +23,8 @@ from planner.models.bound import Known, known, response
 from scenes import Noise
 
 REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
+_NEAREST = 8.0  # px: the same where edges are so long that `_MANY` pixels are used
+_MANY = 120_000
 _STEPS = 30
 _SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
 _LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum
@@ -175,10 +177,16 @@ class ArrangementEstimator:
     @cached_property
     def model(self) -> BlurredModel:
         """The image at the pixels near the required edges."""
-        y, x = near_pixels(self.arrangement, self.shape, REACH)
-        return BlurredModel(
-            self.arrangement, x, y, near_vertices(self.arrangement, REACH + 6 * self.arrangement.blur_px)
-        )
+        y, x = near_pixels(self.arrangement, self.shape, self._reach)
+        near = near_vertices(self.arrangement, self._reach + 6 * self.arrangement.blur_px)
+        return BlurredModel(self.arrangement, x, y, near)
+
+    @property
+    def _reach(self) -> float:
+        """Distance from a required edge up to which pixels are used, px: less where the edges are long."""
+        ends = self.arrangement.vertices[self.arrangement.required]
+        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+        return float(np.clip(_MANY / (2 * max(length, 1.0)), _NEAREST, REACH))
 
     @cached_property
     def pixels(self) -> np.ndarray:

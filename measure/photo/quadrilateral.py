@@ -76,6 +76,11 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
     corners, noise = find_quadrilateral(image), max(noise_sigma(image), np.sqrt(1 / 12))
     blur = edge_sigma(image, corners)
     optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
+    likeliest = SYNONYMS.get(estimator, estimator) == "arrangement" and lens is None
+    if likeliest:
+        shape = find_shape(image[None], polygon_layout(corners, optics), "arrangement")
+        if shape.status[0] in status.MEASURED:
+            return _reported(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]), shape.p_value[0])
     shape = find_shape(image[None], polygon_layout(corners, optics), "gradient")
     state = str(shape.status[0])
     if state in status.MEASURED and lens is not None:
@@ -85,7 +90,7 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
         return _reported(shape.corners[0], shape.covariance[0], noise, blur, state)
     near = polygon_layout(shape.corners[0], optics)
     whole = find_shape(image[None], near, "arrangement")
-    if SYNONYMS.get(estimator, estimator) == "arrangement":
+    if likeliest:
         shape = whole
     elif estimator != "gradient":
         shape = find_shape(image[None], near, estimator, _threshold(shape))

@@ -97,7 +97,7 @@ class BlurredModel:
     ----------
     arrangement : Arrangement
     x, y : ndarray of int, shape (P,)
-        The pixels.
+        The pixels, row by row and from left to right.
     free : ndarray of int, shape (F,)
         Vertices whose positions are free.
     """
@@ -151,6 +151,15 @@ class BlurredModel:
         slots = np.full(width * height + 1, self.x.size)
         slots[(self.y - top) * width + self.x - left] = np.arange(self.x.size)
         return slots
+
+    @cached_property
+    def _last(self) -> np.ndarray:
+        """Number of the last pixel in the same row up to each place of the window, P for none; flat, as `_slots`."""
+        left, top, width, height = self._window
+        found = np.full((height, width), -1, np.int32)
+        found[self.y - top, self.x - left] = np.arange(self.x.size)
+        found = np.maximum.accumulate(found, 1).ravel()
+        return np.append(np.where(found < 0, self.x.size, found), self.x.size).astype(np.int32)
 
     def start(self, levels: np.ndarray | None = None) -> State:
         """The expected state; levels as the light gives them, 0 where it is not known."""
@@ -252,7 +261,7 @@ class BlurredModel:
         K itself does not end to the left of a node, but K(u) - K(u - 1) does: its sum from the right is K.
         """
         arrangement, (left, top, width, height) = self.arrangement, self._window
-        reach, size = (kernels.x.shape[1] - 1) // 2, height * width + 1
+        reach, size = (kernels.x.shape[1] - 1) // 2, self.x.size
         s = traced.blur[:, None]
         u = kernels.place[:, :1] - kernels.column[:, None] + 1.5 - np.arange(2 * reach + 4)
         edge = _ramp(u / s) * s
@@ -261,14 +270,18 @@ class BlurredModel:
         row = kernels.row[:, None] - top + np.arange(2 * reach + 1)
         value = (kernels.y * (self.nodes.weight * traced.tangent[:, 1])[:, None])[:, :, None] * rise[:, None]
         inside = ((row >= 0) & (row < height))[:, :, None] & (column >= 0)[:, None, :]
-        place = np.where(inside, row[:, :, None] * width + column[:, None, :], size - 1)
-        covered = np.empty((len(arrangement.regions), self.x.size))
-        slot, sides = (self.y - top) * width + self.x - left, arrangement.sides[self.nodes.piece]
+        place = self._last[np.where(inside, row[:, :, None] * width + column[:, None, :], height * width)]
+        covered = np.empty((len(arrangement.regions), size))
+        stop, sides = np.searchsorted(self.y, self.y, side="right"), arrangement.sides[self.nodes.piece]
         for region in range(1, len(arrangement.regions)):
             beside = (sides == region).any(1)
             sign = np.where(sides[beside, :1] == region, 1.0, -1.0)[:, :, None]
-            found = np.bincount(place[beside].ravel(), (sign * value[beside]).ravel(), size)[:-1].reshape(height, width)
-            covered[region] = found[:, ::-1].cumsum(1)[:, ::-1].ravel()[slot]
+            found = np.bincount(place[beside].ravel(), (sign * value[beside]).ravel(), size + 1)
+            found[size] = 0.0
+            total = found[::-1].cumsum()[
+                ::-1
+            ]  # from each pixel to the last: its row's is what it exceeds the next row's by
+            covered[region] = total[:-1] - total[stop]
         covered[BACKGROUND] = 1 - covered[1:].sum(0)
         return covered
 
