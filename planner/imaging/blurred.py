@@ -97,7 +97,7 @@ class BlurredModel:
     ----------
     arrangement : Arrangement
     x, y : ndarray of int, shape (P,)
-        The pixels, row by row and from left to right.
+        The pixels.
     free : ndarray of int, shape (F,)
         Vertices whose positions are free.
     """
@@ -153,11 +153,16 @@ class BlurredModel:
         return slots
 
     @cached_property
+    def _order(self) -> np.ndarray:
+        """The pixels row by row, from left to right."""
+        return np.lexsort((self.x, self.y))
+
+    @cached_property
     def _last(self) -> np.ndarray:
-        """Number of the last pixel in the same row up to each place of the window, P for none; flat, as `_slots`."""
+        """Which of `_order` is the last in the same row up to each place of the window, P for none; flat, as `_slots`."""
         left, top, width, height = self._window
         found = np.full((height, width), -1, np.int32)
-        found[self.y - top, self.x - left] = np.arange(self.x.size)
+        found[(self.y - top)[self._order], (self.x - left)[self._order]] = np.arange(self.x.size)
         found = np.maximum.accumulate(found, 1).ravel()
         return np.append(np.where(found < 0, self.x.size, found), self.x.size).astype(np.int32)
 
@@ -272,7 +277,8 @@ class BlurredModel:
         inside = ((row >= 0) & (row < height))[:, :, None] & (column >= 0)[:, None, :]
         place = self._last[np.where(inside, row[:, :, None] * width + column[:, None, :], height * width)]
         covered = np.empty((len(arrangement.regions), size))
-        stop, sides = np.searchsorted(self.y, self.y, side="right"), arrangement.sides[self.nodes.piece]
+        rows, sides = self.y[self._order], arrangement.sides[self.nodes.piece]
+        stop = np.searchsorted(rows, rows, side="right")
         for region in range(1, len(arrangement.regions)):
             beside = (sides == region).any(1)
             sign = np.where(sides[beside, :1] == region, 1.0, -1.0)[:, :, None]
@@ -281,7 +287,7 @@ class BlurredModel:
             total = found[::-1].cumsum()[
                 ::-1
             ]  # from each pixel to the last: its row's is what it exceeds the next row's by
-            covered[region] = total[:-1] - total[stop]
+            covered[region, self._order] = total[:-1] - total[stop]
         covered[BACKGROUND] = 1 - covered[1:].sum(0)
         return covered
 
