@@ -159,7 +159,7 @@ class BlurredModel:
 
     @cached_property
     def _last(self) -> np.ndarray:
-        """Which of `_order` is the last in the same row up to each place of the window, P for none; flat, as `_slots`."""
+        """Which of `_order` is the row's last up to each place of the window, P for none; flat, as `_slots`."""
         left, top, width, height = self._window
         found = np.full((height, width), -1, np.int32)
         found[(self.y - top)[self._order], (self.x - left)[self._order]] = np.arange(self.x.size)
