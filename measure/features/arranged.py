@@ -227,16 +227,37 @@ def _moving(tool: ArrangementEstimator) -> np.ndarray:
     return np.flatnonzero(np.isin(tool.arrangement.pieces, tool.model.free).any(1))
 
 
+def _steps(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """What the levels make of the contrast at the start, the middle and the end of each moving piece, (N, 3, L)."""
+    steps = centre.expansion.pieces.contrast[:, :, 2 * tool.model.free.size : -1]
+    return np.einsum("tk,nkl->ntl", [[1, 0, 0], [1, 0.5, 0.25], [1, 1, 1]], steps)
+
+
 def _contrasts(tool: ArrangementEstimator, found: Found) -> tuple[np.ndarray, np.ndarray]:
     """Contrast at the start, the middle and the end of each moving piece, and its standard deviation, (n, N, 3)."""
     first = 2 * tool.model.free.size
     value, sigma = [], []
     for centre in found.centres:
-        steps = centre.expansion.pieces.contrast[:, :, first:-1]
-        rows = np.einsum("tk,nkl->ntl", [[1, 0, 0], [1, 0.5, 0.25], [1, 1, 1]], steps)
+        rows = _steps(tool, centre)
         value.append(rows)
         sigma.append(np.sqrt(np.einsum("ntl,lm,ntm->nt", rows, centre.covariance[first:-1, first:-1], rows)))
     return np.einsum("intl,il->int", np.stack(value)[found.centre], found.levels), np.stack(sigma)[found.centre]
+
+
+@lru_cache(maxsize=64)
+def _asked(tool: ArrangementEstimator) -> np.ndarray:
+    """Required edges that must be seen, bool (E,): all but those which the light says are too faint.
+
+    The vertices at the ends of such an edge are told by the other edges there, or `is_reliable` says that they are not.
+    """
+    edges = tool.arrangement.edges[_moving(tool)]
+    if not tool.is_lit:
+        return np.ones(len(tool.arrangement.required), bool)
+    steps = _steps(tool, tool.reference)[:, 1]
+    first = 2 * tool.model.free.size
+    sigma = np.sqrt(np.einsum("nl,lm,nm->n", steps, tool.reference.covariance[first:-1, first:-1], steps))
+    seen = np.abs(steps @ tool.reference.state.levels) >= 2 * _SEEN * sigma  # noise would decide nearer to it
+    return np.array([seen[edges == e].all() for e in range(len(tool.arrangement.required))])
 
 
 def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
@@ -280,6 +301,8 @@ def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) ->
     near = _moved(tool, found.vertices) < _FURTHEST
     fits = np.where(near & _fits(found), status.OK, status.MISFIT)
     runs = np.where(near, status.OK, status.LOW_CONTRAST)
+    faint = ~_asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
+    edge_status = np.where(faint, status.OK, edge_status)
     each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
     return np.array([status.worst(*row) for row in each])
 

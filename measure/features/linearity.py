@@ -10,7 +10,7 @@ import numpy as np
 
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 
-_CHEAP, _FULL = 256, 24  # drawn images
+_CHEAP, _FULL = 256, (24, 96)  # drawn images; of those measured in full more where the first leave it open
 _BEYOND = 0.05  # part of them that may leave the expansion's range
 _OFF = 0.1  # standard deviations by which they have left it
 _BIAS = 0.2  # standard deviations: a larger mean error is no linear effect of the noise
@@ -33,21 +33,35 @@ def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
     )
     if not np.isfinite(here).all() or (wherever > _KNOWN * here).any():
         return False
-    linear, full = _drawn(tool, centre, index, rows)
+    for linear, full in _drawn(tool, centre, index, rows):
+        if _is_linear(linear, full, 0.0):
+            return True
+        if not _is_linear(linear, full, 2 / np.sqrt(len(full))):
+            return False
+    return False
+
+
+def _is_linear(linear: np.ndarray, full: np.ndarray, leeway: float) -> bool:
+    """Whether full errors (n, k) are those to first order, within so many root mean squares of what they differ by."""
     spread, apart = linear.std(0), full - linear
-    unbiased = np.abs(apart.mean(0)) <= _BIAS * spread
-    near = np.sqrt((apart**2).mean(0)) <= _APART * spread
-    alike = np.abs(np.log(full.var(0) / linear.var(0))) <= np.log(_ALIKE)
+    differ = np.sqrt((apart**2).mean(0)) / spread
+    unbiased = np.abs(apart.mean(0)) / spread <= _BIAS + leeway * differ
+    near = differ <= _APART * (1 + leeway)
+    alike = np.abs(np.log(full.var(0) / linear.var(0))) <= np.log(_ALIKE) + 2 * leeway * differ
     return bool((unbiased & near & alike).all())
 
 
-def _drawn(tool, centre: Centre, index: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Errors in drawn images to first order and in full, (n, k)."""
+def _drawn(tool, centre: Centre, index: np.ndarray, rows: np.ndarray):
+    """Errors in drawn images to first order and in full, (n, k): as many as seem enough, then more of them."""
     drawn = centre.expansion.drawn(_CHEAP)
     spread = (drawn.linear[:, index] @ rows.T).std(0)
     beyond = drawn.left[:, index] @ np.abs(rows).T > _OFF * spread
-    linear, full = (drawn.linear, drawn.steps) if beyond.any(1).mean() <= _BEYOND else tool.drawn(centre, _FULL)
-    return linear[:, index] @ rows.T, full[:, index] @ rows.T
+    if beyond.any(1).mean() <= _BEYOND:
+        yield drawn.linear[:, index] @ rows.T, drawn.steps[:, index] @ rows.T
+        return
+    for count in _FULL:
+        linear, full = tool.drawn(centre, count)
+        yield linear[:, index] @ rows.T, full[:, index] @ rows.T
 
 
 def _directions(corners: np.ndarray) -> np.ndarray:
