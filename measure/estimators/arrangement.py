@@ -35,7 +35,7 @@ _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
 _VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
-_AROUND = 0.8  # of the blur: how far an end of a required edge may be from an expansion's centre, if it holds there
+_AROUND = 0.3  # of the blur: how far an end of a required edge may be from an expansion's centre
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
 _ROUNDS = 4  # expansions before each image is measured alone
 
