@@ -8,8 +8,8 @@ import numpy as np
 
 from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
-from measure.features.arranged import locate
 from measure.features.layout import Layout, layout_of
+from measure.features.locating import locate
 from measure.features.shape import prepared
 from measure.measurement import distance, separation
 from planner import predict
@@ -57,9 +57,9 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
     clean = one_picture(clean)
     if str(distance(clean, scene, sensor, light, "arrangement").status) not in status.MEASURED:
         return float("inf")
-    fit, _ = locate(tool, layout, tool.taken(clean[None])[0], clean)
-    covariance = _corners(layout, fit.state, scene.noise)
-    _, gradient = separation(fit.state.vertices[tool.arrangement.corners][None])
+    state = locate(tool, layout, tool.taken(clean[None])[0], clean).state
+    covariance = _corners(layout, state, scene.noise)
+    _, gradient = separation(state.vertices[tool.arrangement.corners][None])
     return float(gradient[0] @ covariance @ gradient[0])
 
 

@@ -2,20 +2,19 @@
 
 Unknown are the image positions of all vertices near the required edges, a level on each face, the background and the
 blur; `planner.imaging.blurred` says what image they make. From the expected place Fisher scoring climbs to the
-likelihood's maximum, with the model evaluated anew at each step. Other images of the same stack are solved around the
-place found for one of them, to where an expansion of fourth order holds (`measure.estimators.expansion`).
+likelihood's maximum, with the model evaluated anew at each step. `measure.estimators.stack` solves the other images of
+a stack around the place found for one of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from measure.estimators.expansion import Expansion, Pieces, Solved
+from measure.estimators.expansion import Expansion, Pieces
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.sensor import recorded
@@ -34,10 +33,6 @@ _LOST = 40.0  # px from the expected place at which they are
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _FREE = 1e3  # px: a standard deviation at which nothing is known
-_VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
-_AROUND = 0.3  # of the blur: how far an end of a required edge may be from an expansion's centre
-_BATCH = 40  # images at a time, so that they stay in the processor's cache
-_ROUNDS = 4  # expansions before each image is measured alone
 
 
 class Point(NamedTuple):
@@ -100,34 +95,6 @@ class Fit(NamedTuple):
         return self.point.cost
 
 
-class Found(NamedTuple):
-    """Most likely parameters in n images.
-
-    Attributes
-    ----------
-    vertices : ndarray, shape (n, V, 2)
-    levels : ndarray, shape (n, L)
-    blur : ndarray, shape (n,)
-    squares : ndarray, shape (n, 3)
-        Chi-square near the pieces, elsewhere, and of bows in the pieces.
-    centre : ndarray of int, shape (n,)
-        Which of ``centres`` was expanded about.
-    settled : ndarray of bool, shape (n,)
-    centres : tuple of Centre
-    fit : Fit
-        Of the first image.
-    """
-
-    vertices: np.ndarray
-    levels: np.ndarray
-    blur: np.ndarray
-    squares: np.ndarray
-    centre: np.ndarray
-    settled: np.ndarray
-    centres: tuple[Centre, ...]
-    fit: Fit
-
-
 @dataclass(frozen=True, eq=False)
 class Centre:
     """A state with what images near it need.
@@ -140,7 +107,7 @@ class Centre:
         Of the parameters' errors.
     freedom : tuple of float
         Degrees of freedom of each chi-square.
-    rivalled : bool
+    settled, rivalled : bool
         As in `Fit`.
     """
 
@@ -148,11 +115,8 @@ class Centre:
     expansion: Expansion
     covariance: np.ndarray
     freedom: tuple[float, float, float]
+    settled: bool
     rivalled: bool
-
-
-Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
-"""The maximum in one image, from its used pixels (P,) and the whole of it (height, width)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,7 +242,7 @@ class ArrangementEstimator:
         point, damping, settled = self._point(used, state, mean), 0.0, False
         for number in range(_STEPS):
             matrix = point.fisher if number < _SCORED else self._newton(point)
-            point, settled, damping = self._step(used, point, matrix, damping, mean)
+            point, settled, damping = self._step(used, point, matrix, damping)
             if settled or self._is_lost(point.state):
                 break
         return Fit(point, _inverse(point.fisher), settled)
@@ -311,12 +275,12 @@ class ArrangementEstimator:
         matrix, scale = point.fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(point.fisher))
         return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else point.fisher
 
-    def _step(self, used, point: Point, matrix, damping, mean) -> tuple[Point, bool, float]:
+    def _step(self, used, point: Point, matrix, damping) -> tuple[Point, bool, float]:
         """The next point, by a step damped until the likelihood grows; whether it is the last; the damping."""
         for _ in range(12):
             step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), point.score)
             size = float(step @ matrix @ step)
-            there = self._point(used, self.model.moved(point.state, self._held_back(step)), mean)
+            there = self._point(used, self.model.moved(point.state, self._held_back(step)), point.before)
             if there.cost <= point.cost + _ROUNDING:
                 return there, size < _SETTLED**2, damping / 10 if damping > 1e-3 else 0.0
             if size < _SETTLED**2:
@@ -341,7 +305,8 @@ class ArrangementEstimator:
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
         fitted = len(precision) - (precision * fit.inverse).sum() - taken
         near, far, bows = expansion.near, self.pixels.size - expansion.near, float(len(expansion.bows[1]))
-        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0), bows), fit.rivalled)
+        freedom = near - fitted, max(far - taken, 0.0), bows
+        return Centre(fit.state, expansion, spread, freedom, fit.settled, fit.rivalled)
 
     def index(self, vertices: np.ndarray) -> np.ndarray:
         """Where free vertices' x and y stand among the parameters."""
@@ -357,72 +322,6 @@ class ArrangementEstimator:
         """Derivative of the parameters by the pixels at a state, (q, P)."""
         _, weight, gain, jacobian = self.expected(centre.state)
         return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
-
-    def find(self, images: np.ndarray, locate: Locate | None = None, known: Found | None = None) -> Found:
-        """Most likely parameters in images (n, height, width).
-
-        The first image is measured by itself; the others around it, as far as the expansion holds; the first that is
-        left by itself, and so on. ``known`` is what was found in the first image alone, if it was.
-        """
-        collected, left, centres, first_fit = _Collected(self, len(images)), np.arange(len(images)), [], None
-        while left.size:
-            image = images[left[0]]
-            used = self.taken(image[None])[0]
-            if known and not centres:
-                fit, centre = known.fit, known.centres[0]
-            else:
-                fit, centre = locate(used, image) if locate else self._locate(used)
-            first_fit = first_fit or fit
-            tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
-            done = [self._around(images, tried[at : at + _BATCH], fit, centre, collected, len(centres), at == 0)
-                    for at in range(0, tried.size, _BATCH)]  # fmt: skip
-            centres.append(centre)
-            left = np.setdiff1d(left, np.concatenate(done))
-        return collected.found(tuple(centres), first_fit)
-
-    def _locate(self, used: np.ndarray) -> tuple[Fit, Centre]:
-        fit = self.climb(used, self.start(used))
-        return fit, self.centre(fit)
-
-    def _around(self, images, part, fit, centre, collected, number, first) -> np.ndarray:
-        """Solve some images around a centre and collect those for which it holds: which they are."""
-        solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
-        good, settled = self._good(solved, centre), np.ones(part.size, bool)
-        if first:
-            good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
-        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.squares[good])
-        collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
-        return part[good]
-
-    def _good(self, solved: Solved, centre: Centre) -> np.ndarray:
-        """Where an expansion holds: required edges hardly move, and what is left out moves no measured corner."""
-        index, ends = self.index(self.arrangement.corners), self.index(np.unique(self.arrangement.required))
-        sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
-        near = np.abs(solved.steps[:, ends]) < _AROUND * np.hypot(centre.state.blur, np.sqrt(1 / 12))
-        return near.all(1) & (solved.left[:, index] < _VALID * sigma).all(1)
-
-
-class _Collected:
-    """What is found in n images, as it comes."""
-
-    def __init__(self, tool: ArrangementEstimator, count: int) -> None:
-        self.tool = tool
-        self.parameters = np.full((count, tool.model.count), np.nan)
-        self.squares = np.full((count, 3), np.nan)
-        self.owner, self.settled = np.zeros(count, int), np.zeros(count, bool)
-
-    def add(self, which: np.ndarray, parameters: np.ndarray, squares: np.ndarray) -> None:
-        self.parameters[which], self.squares[which] = parameters, squares
-
-    def found(self, centres: tuple[Centre, ...], fit: Fit) -> Found:
-        arrangement, free = self.tool.arrangement, self.tool.model.free
-        count, first = len(self.parameters), 2 * free.size
-        vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
-        vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
-        return Found(
-            vertices, self.parameters[:, first:-1], self.parameters[:, -1], self.squares, self.owner, self.settled,
-            centres, fit,
-        )  # fmt: skip
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

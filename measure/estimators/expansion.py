@@ -67,7 +67,7 @@ class Pieces:
     @classmethod
     def of(cls, model: BlurredModel, state: State) -> Pieces:
         arrangement = model.arrangement
-        moving = np.flatnonzero(np.isin(arrangement.pieces, model.free).any(1))
+        moving = model.moving
         ends = state.vertices[arrangement.pieces[moving]]
         away = ends[:, 1] - ends[:, 0]
         lengths = np.linalg.norm(away, axis=1)

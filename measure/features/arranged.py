@@ -9,20 +9,20 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from measure import status
-from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Found
-from measure.features.alignment import align
+from measure.estimators.arrangement import ArrangementEstimator, Centre
+from measure.estimators.stack import Found, find
+from measure.features.contrasts import SEEN, asked, contrasts, seen_edges
 from measure.features.found import MIN_SINE, Shape, gather
 from measure.features.layout import Layout
 from measure.features.linearity import is_reliable
+from measure.features.locating import FURTHEST, locate, moved
 from measure.goodness import WORST, p_value
-from planner.features.locator import MIN_USABLE
 from planner.imaging.sensor import full_scale
 
-_FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
-_APART = 0.5  # px between vertices of two different solutions
-_TELLING = 9.0  # of a chi-square: what tells one solution from another
-_SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it
 _BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
+
+Part = tuple[np.ndarray, np.ndarray, ArrangementEstimator]
+"""Numbers of some images, (m,), those images, and the tool that measures them."""
 
 
 @_BLAS.wrap(limits=1)
@@ -50,10 +50,6 @@ def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> 
         if reliable:
             probability[which] = _probabilities(found)
     return probability
-
-
-Part = tuple[np.ndarray, np.ndarray, ArrangementEstimator]
-"""Numbers of some images, (m,), those images, and the tool that measures them."""
 
 
 def _parts(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> list[Part]:
@@ -90,9 +86,9 @@ def _seen(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> lis
     if tool.is_lit or not others:
         return [(np.arange(len(images)), images, tool)]
     rigid = _stilled(tool, others)
-    contrast, sigma = _contrasts(rigid, rigid.find(images, partial(locate, rigid, layout)))
-    seen, which = np.unique((np.abs(contrast) > _SEEN * sigma).any(-1), axis=0, return_inverse=True)
-    ends = tool.arrangement.pieces[_moving(tool)]
+    contrast, sigma = contrasts(rigid, find(rigid, images, partial(locate, rigid, layout)))
+    seen, which = np.unique((np.abs(contrast) > SEEN * sigma).any(-1), axis=0, return_inverse=True)
+    ends = tool.arrangement.pieces[tool.model.moving]
     groups = [np.flatnonzero(which.ravel() == number) for number in range(len(seen))]
     return [
         (group, _some(images, group), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
@@ -120,7 +116,7 @@ def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Sh
     normals = np.stack([-along[..., 1], along[..., 0]], -1) / lengths[..., None]
     corners = found.vertices[:, tool.arrangement.corners]
     probability = _probabilities(found)
-    contrast, edge_status = _edges(tool, layout, found)
+    contrast, edge_status = seen_edges(tool, layout, found)
     state = _states(tool, layout, found, normals, edge_status, reliable)
     measured = np.isin(state, status.MEASURED)
     covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
@@ -148,14 +144,12 @@ def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tup
     shows what the model says. Where the answer is no, the first image stands for all: of others nothing else is told.
     """
     here = partial(locate, tool, layout)
-    first = tool.find(images[:1], here)
+    first = find(tool, images[:1], here)
     told = tool.is_lit or bool(_shows(tool, layout, first)[0])
     if told and not _reliable(tool, first, 0):
         each = np.zeros(len(images), int)
-        return first._replace(
-            **{key: getattr(first, key)[each] for key in first._fields if key not in ("centres", "fit")}
-        ), False
-    found = tool.find(images, here, first)
+        return first._replace(**{key: getattr(first, key)[each] for key in first._fields if key != "centres"}), False
+    found = find(tool, images, here, first.centres[0])
     good = np.flatnonzero(_shows(tool, layout, found))
     return found, bool(told or not good.size or _reliable(tool, found, good[0]))
 
@@ -166,7 +160,7 @@ def _reliable(tool: ArrangementEstimator, found: Found, number: int) -> bool:
 
 def _shows(tool: ArrangementEstimator, layout: Layout, found: Found) -> np.ndarray:
     """Whether each image shows all edges, and is what the model says, bool (n,)."""
-    return _fits(found) & np.isin(_edges(tool, layout, found)[1], status.MEASURED).all(1)
+    return _fits(found) & np.isin(seen_edges(tool, layout, found)[1], status.MEASURED).all(1)
 
 
 def _fits(found: Found) -> np.ndarray:
@@ -182,127 +176,14 @@ def _probabilities(found: Found) -> np.ndarray:
     return p_value(found.squares, np.array([centre.freedom for centre in found.centres])[found.centre])
 
 
-def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
-    """The likelihood's maximum in one image: from the expected place, or from where the layout is sought anew.
-
-    The second is tried only where the first does not explain the image; the more likely one is taken.
-    """
-    fit = tool.climb(used, tool.start(used))
-    centre = tool.centre(fit)
-    if fit.settled and _near(tool, fit) and _probability(centre, used) >= WORST:
-        return fit, centre
-    x, y, turn = align(image[None], layout)[0]
-    if not (x or y or turn):
-        return fit, centre
-    moved = tool.arrangement.moved((x, y), turn, layout.ends.reshape(-1, 2).mean(0)).vertices
-    other = tool.climb(used, tool.start(used, moved))
-    best, rest = (other, fit) if (other.settled, -other.cost) > (fit.settled, -fit.cost) else (fit, other)
-    best = best._replace(rivalled=_rivals(tool, best, rest))
-    return best, tool.centre(best)
-
-
-def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
-    """Whether two maxima lie apart and the noise does not tell which is the right one."""
-    away = tool.parameters(rest.state) - tool.parameters(best.state)
-    apart = np.abs(away[: 2 * tool.model.free.size]).max(initial=0.0) > _APART
-    return bool(apart and rest.settled and rest.cost - best.cost < _TELLING)
-
-
 @_BLAS.wrap(limits=1)
 def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
     ((_, _, tool),) = _parts(clean[None], layout, tool)
-    _, centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
+    centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
     rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
     rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]
     return rows
-
-
-def _probability(centre: Centre, used: np.ndarray) -> float:
-    solved = centre.expansion.solve(used[None, centre.expansion.order])
-    return float(p_value(solved.squares, np.array(centre.freedom)[None])[0])
-
-
-def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
-    return bool(_moved(tool, fit.state.vertices[None])[0] < _FURTHEST)
-
-
-def _moved(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
-    """Farthest way that an end of a required edge is from its expected line, px, (n,)."""
-    required = tool.arrangement.required
-    expected = tool.arrangement.vertices[required]
-    along = expected[:, 1] - expected[:, 0]
-    normals = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1, keepdims=True)
-    away = np.einsum("neki,ei->nek", vertices[:, required] - expected, normals)
-    return np.nan_to_num(np.abs(away), nan=np.inf).max((1, 2))
-
-
-def _moving(tool: ArrangementEstimator) -> np.ndarray:
-    """Pieces that free vertices move."""
-    return np.flatnonzero(np.isin(tool.arrangement.pieces, tool.model.free).any(1))
-
-
-def _steps(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
-    """What the levels make of the contrast at the start, the middle and the end of each moving piece, (N, 3, L)."""
-    steps = centre.expansion.pieces.contrast[:, :, 2 * tool.model.free.size : -1]
-    return np.einsum("tk,nkl->ntl", [[1, 0, 0], [1, 0.5, 0.25], [1, 1, 1]], steps)
-
-
-def _contrasts(tool: ArrangementEstimator, found: Found) -> tuple[np.ndarray, np.ndarray]:
-    """Contrast at the start, the middle and the end of each moving piece, and its standard deviation, (n, N, 3)."""
-    first = 2 * tool.model.free.size
-    value, sigma = [], []
-    for centre in found.centres:
-        rows = _steps(tool, centre)
-        value.append(rows)
-        sigma.append(np.sqrt(np.einsum("ntl,lm,ntm->nt", rows, centre.covariance[first:-1, first:-1], rows)))
-    return np.einsum("intl,il->int", np.stack(value)[found.centre], found.levels), np.stack(sigma)[found.centre]
-
-
-@lru_cache(maxsize=64)
-def _asked(tool: ArrangementEstimator) -> np.ndarray:
-    """Required edges that must be seen, bool (E,): all but those which the light says are too faint.
-
-    The vertices at the ends of such an edge are told by the other edges there, or `is_reliable` says that they are not.
-    """
-    edges = tool.arrangement.edges[_moving(tool)]
-    if not tool.is_lit:
-        return np.ones(len(tool.arrangement.required), bool)
-    steps = _steps(tool, tool.reference)[:, 1]
-    first = 2 * tool.model.free.size
-    sigma = np.sqrt(np.einsum("nl,lm,nm->n", steps, tool.reference.covariance[first:-1, first:-1], steps))
-    seen = np.abs(steps @ tool.reference.state.levels) >= 2 * _SEEN * sigma  # noise would decide nearer to it
-    return np.array([seen[edges == e].all() for e in range(len(tool.arrangement.required))])
-
-
-def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
-    """Contrast in the middle of each required edge and its status, both (n, E)."""
-    edges = tool.arrangement.edges[_moving(tool)]
-    contrast, sigma = _contrasts(tool, found)
-    middle, state = (
-        np.zeros((len(contrast), len(layout.names))),
-        np.full((len(contrast), len(layout.names)), status.OK, dtype=object),
-    )
-    shown = _shown(tool)
-    for e in range(len(layout.names)):
-        if not shown[e]:
-            state[:, e] = status.NOT_VISIBLE
-            continue
-        here, spread = contrast[:, edges == e], sigma[:, edges == e]
-        faint = (np.abs(here[..., 1]) < _SEEN * spread[..., 1]).any(1)
-        turns = (here > 2 * spread).any((1, 2)) & (here < -2 * spread).any((1, 2))
-        middle[:, e] = here[..., 1].mean(1)
-        state[:, e] = np.where(faint, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
-    return middle, state.astype(str)
-
-
-def _shown(tool: ArrangementEstimator) -> np.ndarray:
-    """Whether enough of each required edge lies within the image, bool (E,)."""
-    arrangement, t = tool.arrangement, np.linspace(0, 1, 257)[:, None, None]
-    start, stop = arrangement.vertices[arrangement.required].swapaxes(0, 1)
-    places = arrangement.recorded(start + t * (stop - start))
-    inside = ((places >= 0) & (places <= np.array(tool.shape[::-1]) - 1)).all(-1)
-    return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
 
 
 def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) -> np.ndarray:
@@ -313,10 +194,10 @@ def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) ->
     told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
     rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
     turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
-    near = _moved(tool, found.vertices) < _FURTHEST
+    near = moved(tool, found.vertices) < FURTHEST
     fits = np.where(near & _fits(found), status.OK, status.MISFIT)
     runs = np.where(near, status.OK, status.LOW_CONTRAST)
-    faint = ~_asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
+    faint = ~asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
     edge_status = np.where(faint, status.OK, edge_status)
     each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
     return np.array([status.worst(*row) for row in each])

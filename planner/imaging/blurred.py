@@ -113,6 +113,11 @@ class BlurredModel:
         return 2 * self.free.size + self.arrangement.level_slices[-1].stop + 1
 
     @cached_property
+    def moving(self) -> np.ndarray:
+        """The pieces that free vertices move, shape (N,)."""
+        return np.flatnonzero(np.isin(self.arrangement.pieces, self.free).any(1))
+
+    @cached_property
     def points(self) -> np.ndarray:
         """The pixels' centres, recorded px, shape (P, 2)."""
         return np.stack([self.x, self.y], 1).astype(float)
@@ -156,6 +161,12 @@ class BlurredModel:
     def _order(self) -> np.ndarray:
         """The pixels row by row, from left to right."""
         return np.lexsort((self.x, self.y))
+
+    @cached_property
+    def _below(self) -> np.ndarray:
+        """Where in `_order` the next row begins, for each pixel of it."""
+        rows = self.y[self._order]
+        return np.searchsorted(rows, rows, side="right")
 
     @cached_property
     def _last(self) -> np.ndarray:
@@ -277,17 +288,14 @@ class BlurredModel:
         inside = ((row >= 0) & (row < height))[:, :, None] & (column >= 0)[:, None, :]
         place = self._last[np.where(inside, row[:, :, None] * width + column[:, None, :], height * width)]
         covered = np.empty((len(arrangement.regions), size))
-        rows, sides = self.y[self._order], arrangement.sides[self.nodes.piece]
-        stop = np.searchsorted(rows, rows, side="right")
+        sides = arrangement.sides[self.nodes.piece]
         for region in range(1, len(arrangement.regions)):
             beside = (sides == region).any(1)
             sign = np.where(sides[beside, :1] == region, 1.0, -1.0)[:, :, None]
             found = np.bincount(place[beside].ravel(), (sign * value[beside]).ravel(), size + 1)
             found[size] = 0.0
-            total = found[::-1].cumsum()[
-                ::-1
-            ]  # from each pixel to the last: its row's is what it exceeds the next row's by
-            covered[region, self._order] = total[:-1] - total[stop]
+            total = found[::-1].cumsum()[::-1]  # of this row and all below
+            covered[region, self._order] = total[:-1] - total[self._below]
         covered[BACKGROUND] = 1 - covered[1:].sum(0)
         return covered
 
