@@ -14,8 +14,8 @@ import numpy as np
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 from measure.estimators.expansion import Solved
 
-_VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
-_AROUND = 0.3  # of the blur: how far an end of a required edge may be from an expansion's centre
+_VALID = 0.003  # of a standard deviation: how large the effect of an expansion's highest order may be
+_AROUND = 0.45  # of the blur: how far an end of a required edge may be from an expansion's centre
 _BATCH = 40  # images at a time, so that they stay in the processor's cache
 _ROUNDS = 4  # expansions before each image is measured alone
 
