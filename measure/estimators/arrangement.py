@@ -22,8 +22,8 @@ from planner.models.bound import Known, known, response
 from scenes import Noise
 
 REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
-_NEAREST = 8.0  # px: the same where edges are so long that `_MANY` pixels are used
-_MANY = 120_000
+_NEAREST = 6.0  # px: the same where edges are so long that `_MANY` pixels are used
+_MANY = 72_000
 _STEPS = 50
 _SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
 _LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum

@@ -307,13 +307,8 @@ class Expansion:
             np.ascontiguousarray((rows * scale[pixels]).T)
             for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)
         )
-        count = linear.shape[1]
-        columns = np.zeros((near, count + len(rows) * ROWS))
-        columns[:, :count] = linear[:near]
-        for n, (pixels, images) in enumerate(zip(pieces.pixels, rows, strict=True)):
-            columns[pixels, count + n * ROWS : count + (n + 1) * ROWS] = images
-        gram, gram_far = columns.T @ columns, linear[near:].T @ linear[near:]
-        gram[:count, :count] += gram_far
+        gram, gram_far = _gram(linear[:near], pieces.pixels, rows), linear[near:].T @ linear[near:]
+        gram[: len(gram_far), : len(gram_far)] += gram_far
         return cls(order, pieces, expected, root, linear, rows, near, gram, gram_far, inverse, prior, offset)
 
     def solve(self, used: np.ndarray) -> Solved:
@@ -408,3 +403,24 @@ class Expansion:
         top[_ACROSS3] = True
         which = np.concatenate([np.zeros(self.linear.shape[1], bool), np.tile(top, len(self.pieces.rows))])
         return self._effect(np.where(which, self._columns(steps), 0.0))
+
+
+def _gram(linear: np.ndarray, pixels: tuple[np.ndarray, ...], rows: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Products of all columns: ``linear`` (p, l), and each piece's ``rows`` at its ``pixels``, 0 elsewhere."""
+    count, pieces = linear.shape[1], len(rows)
+    gram = np.zeros((count + pieces * ROWS,) * 2)
+    gram[:count, :count] = linear.T @ linear
+    place = np.full((pieces, len(linear)), -1, np.int32)
+    for n, here in enumerate(pixels):
+        place[n, here] = np.arange(here.size)
+        at = slice(count + n * ROWS, count + (n + 1) * ROWS)
+        gram[at, :count] = rows[n].T @ linear[here]
+        gram[:count, at] = gram[at, :count].T
+        for m in range(n + 1):
+            also = place[m, here]
+            shared = also >= 0
+            if shared.any():
+                to = slice(count + m * ROWS, count + (m + 1) * ROWS)
+                gram[at, to] = rows[n][shared].T @ rows[m][also[shared]]
+                gram[to, at] = gram[at, to].T
+    return gram

@@ -49,6 +49,24 @@ def recorded(noise: Noise, level: np.ndarray) -> Levels:
     return Levels(level, variance)
 
 
+def sensitivity(noise: Noise, level: np.ndarray) -> np.ndarray:
+    """Derivative of the `recorded` level by the noise-free one (grey levels): below 1 where the scale ends.
+
+    Of the mean of a normal distribution N(level, v(level)) that is cut off at the full scale F:
+    Phi(b) - phi(b) v' / (2 sqrt(v)) with b = (F - level) / sqrt(v).
+
+    Examples
+    --------
+    >>> sensitivity(Noise(sigma=2.0, bits=8), np.array([100.0, 255.0]))
+    array([1. , 0.5])
+    """
+    level = np.asarray(level, float)
+    sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level), 1e-300))
+    below = (full_scale(noise) - level) / sigma
+    grows = np.where(level > noise.dark_level, noise.gain, 0.0) / (2 * sigma)
+    return ndtr(below) - np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi) * grows
+
+
 def full_scale(noise: Noise) -> float:
     """The highest grey level; infinite without digits."""
     return np.inf if noise.bits is None else 2.0**noise.bits - 1

@@ -19,7 +19,7 @@ from planner.imaging.appearance import is_plain
 from planner.imaging.arrangement import arrangement_of, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.pictures import Pictures
-from planner.imaging.sensor import recorded
+from planner.imaging.sensor import recorded, sensitivity
 from planner.models.edge_bound import edge_bound
 from planner.models.errors import Errors
 from scenes import Centre, Noise
@@ -154,11 +154,8 @@ def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | No
 def response(noise: Noise, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Derivative of the recorded level by the signal, and variance of the noise, at signals above darkness."""
     level = image + noise.dark_level
-    step = 1e-3 * np.sqrt(noise.variance + noise.gain * np.maximum(image, 0) + 1e-12)
-    high, low = (recorded(noise, level + sign * step).level for sign in (1, -1))
-    gain = np.ones_like(level) if noise.bits is None else (high - low) / (2 * step)  # nothing is cut off without bits
     variance = np.broadcast_to(recorded(noise, level).noise_variance, level.shape)
-    return gain, np.maximum(variance, 1e-6 * noise.variance + 1e-300)
+    return sensitivity(noise, level), np.maximum(variance, 1e-6 * noise.variance + 1e-300)
 
 
 def bound(pictures: Pictures) -> Errors:
