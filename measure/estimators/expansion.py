@@ -222,6 +222,24 @@ def _sum(x: list[np.ndarray], y: list[np.ndarray], terms) -> np.ndarray:
     )
 
 
+class Seen(NamedTuple):
+    """All that n images tell an expansion.
+
+    Attributes
+    ----------
+    told : ndarray, shape (n, l + N ROWS)
+        Products of the pixels, less what was expected, with all columns; in standard deviations of the noise.
+    far_told : ndarray, shape (n, l)
+        The part of it that the pixels far from the pieces make.
+    squares : ndarray, shape (n, 2)
+        Chi-square at the state, of the pixels near the pieces and of the others.
+    """
+
+    told: np.ndarray
+    far_told: np.ndarray
+    squares: np.ndarray
+
+
 class Solved(NamedTuple):
     """Most likely steps of the parameters in n images, from an expansion.
 
@@ -311,21 +329,25 @@ class Expansion:
         gram[: len(gram_far), : len(gram_far)] += gram_far
         return cls(order, pieces, expected, root, linear, rows, near, gram, gram_far, inverse, prior, offset)
 
-    def solve(self, used: np.ndarray) -> Solved:
-        """Most likely steps for pixels (n, P) of n images, which are used up."""
+    def see(self, used: np.ndarray) -> Seen:
+        """What pixels (n, P) of n images, which are used up, tell."""
         away = np.subtract(used, self.expected, out=used)
         away *= self.root
-        near, count = self.near, self.linear.shape[1]
-        far_told = away[:, near:] @ self.linear[near:]
-        told = np.concatenate([away[:, :near] @ self.linear[:near] + far_told] + [
-            away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)
-        ], 1)  # fmt: skip
+        near, far = away[:, : self.near], away[:, self.near :]
+        far_told = far @ self.linear[self.near :]
+        told = [near @ self.linear[: self.near] + far_told]
+        told += [away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)]
+        squares = [np.einsum("np,np->n", part, part) for part in (near, far)]
+        return Seen(np.concatenate(told, 1), far_told, np.stack(squares, 1))
+
+    def solve(self, seen: Seen) -> Solved:
+        """Most likely steps for what n images tell."""
+        told, count = seen.told, self.linear.shape[1]
         steps, change = self._climb(told, self.offset)
         columns, level = self._columns(steps), steps[:, -count:]
-        squares = [np.einsum("np,np->n", part, part) for part in (away[:, :near], away[:, near:])]
-        far = squares[1] + ((level @ self.gram_far - 2 * far_told) * level).sum(1)
+        far = seen.squares[:, 1] + ((level @ self.gram_far - 2 * seen.far_told) * level).sum(1)
         explained = columns @ self.gram
-        whole = sum(squares) + ((explained - 2 * told) * columns).sum(1)
+        whole = seen.squares.sum(1) + ((explained - 2 * told) * columns).sum(1)
         bows, information = self.bows
         scores = (told - explained) @ bows
         bowed = np.einsum("ni,ij,nj->n", scores, np.linalg.pinv(information, hermitian=True), scores)

@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from measure.estimators.arrangement import ArrangementEstimator, Centre
-from measure.estimators.expansion import Solved
+from measure.estimators.expansion import Seen, Solved
 
 _VALID = 0.003  # of a standard deviation: how large the effect of an expansion's highest order may be
 _AROUND = 0.45  # of the blur: how far an end of a required edge may be from an expansion's centre
-_BATCH = 40  # images at a time, so that they stay in the processor's cache
+_BATCH = 40  # images looked at together, so that they stay in the processor's cache
+_SOLVED = 1000  # images solved together
 _ROUNDS = 4  # expansions before each image is measured alone
 
 
@@ -60,8 +61,8 @@ def find(tool: ArrangementEstimator, images: np.ndarray, locate: Locate, first: 
         image = images[left[0]]
         centre = first if first and not centres else locate(tool.taken(image[None])[0], image)
         tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
-        done = [_around(tool, images, tried[at : at + _BATCH], centre, collected, len(centres), at == 0)
-                for at in range(0, tried.size, _BATCH)]  # fmt: skip
+        done = [_around(tool, images, tried[at : at + _SOLVED], centre, collected, len(centres), at == 0)
+                for at in range(0, tried.size, _SOLVED)]  # fmt: skip
         centres.append(centre)
         left = np.setdiff1d(left, np.concatenate(done))
     return collected.found(tuple(centres))
@@ -69,7 +70,9 @@ def find(tool: ArrangementEstimator, images: np.ndarray, locate: Locate, first: 
 
 def _around(tool, images, part, centre, collected, number, first) -> np.ndarray:
     """Solve some images around a centre and collect those for which it holds: which they are."""
-    solved = centre.expansion.solve(tool.taken(images[part], centre.expansion.order))
+    expansion, batches = centre.expansion, np.split(part, range(_BATCH, part.size, _BATCH))
+    seen = [expansion.see(tool.taken(images[batch], expansion.order)) for batch in batches]
+    solved = expansion.solve(Seen(*map(np.concatenate, zip(*seen, strict=True))))
     good, settled = _good(tool, solved, centre), np.ones(part.size, bool)
     if first:
         good[0], settled[0], solved.steps[0] = True, centre.settled, 0.0
