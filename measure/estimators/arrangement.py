@@ -17,7 +17,7 @@ import numpy as np
 from measure.estimators.expansion import Expansion, Pieces
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
-from planner.imaging.sensor import recorded
+from planner.imaging.sensor import Levels, recorded, squared_errors
 from planner.models.bound import Known, known, response
 from scenes import Noise
 
@@ -32,6 +32,7 @@ _BLURRED = 3.0  # times the expected blur at which steps are given up
 _LOST = 40.0  # px from the expected place at which they are
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
+_WHOLE = 1 - 1e-9  # of the sensor's sensitivity: less where the scale ends
 _FREE = 1e3  # px: a standard deviation at which nothing is known
 
 
@@ -105,8 +106,8 @@ class Centre:
     expansion : Expansion
     covariance : ndarray, shape (q, q)
         Of the parameters' errors.
-    freedom : tuple of float
-        Degrees of freedom of each chi-square.
+    freedom, scale : tuple of float
+        Degrees of freedom of each chi-square, and the factor on it (1, but where the scale cuts noise off).
     settled, rivalled : bool
         As in `Fit`.
     """
@@ -115,6 +116,7 @@ class Centre:
     expansion: Expansion
     covariance: np.ndarray
     freedom: tuple[float, float, float]
+    scale: tuple[float, float, float]
     settled: bool
     rivalled: bool
 
@@ -304,9 +306,19 @@ class ArrangementEstimator:
         spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse
         taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
         fitted = len(precision) - (precision * fit.inverse).sum() - taken
-        near, far, bows = expansion.near, self.pixels.size - expansion.near, float(len(expansion.bows[1]))
-        freedom = near - fitted, max(far - taken, 0.0), bows
-        return Centre(fit.state, expansion, spread, freedom, fit.settled, fit.rivalled)
+        squares = [part[expansion.order] for part in self._squares(point)]
+        near, far = slice(None, expansion.near), slice(expansion.near, None)
+        parts = [_chi_square(*(part[which].sum() for part in squares), less)
+                 for which, less in ((near, fitted), (far, taken))]  # fmt: skip
+        freedom, scale = zip(*parts, (float(len(expansion.bows[1])), 1.0), strict=True)
+        return Centre(fit.state, expansion, spread, freedom, scale, fit.settled, fit.rivalled)
+
+    def _squares(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance of each pixel's squared residual in standard deviations, without a fit, both (P,)."""
+        level = point.expected
+        if (point.gain < _WHOLE).any():
+            level = self.model.evaluate(point.state, False)[0] + self.noise.dark_level
+        return squared_errors(self.noise, level, Levels(point.expected, 1 / point.weight))
 
     def index(self, vertices: np.ndarray) -> np.ndarray:
         """Where free vertices' x and y stand among the parameters."""
@@ -322,6 +334,15 @@ class ArrangementEstimator:
         """Derivative of the parameters by the pixels at a state, (q, P)."""
         _, weight, gain, jacobian = self.expected(centre.state)
         return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
+
+
+def _chi_square(mean: float, variance: float, fitted: float) -> tuple[float, float]:
+    """Degrees of freedom, and the factor on it, of the chi-square with the mean and variance of a sum of squares.
+
+    Fitted parameters take 1 each from the mean and 2 from the variance.
+    """
+    mean, variance = mean - fitted, variance - 2 * fitted
+    return (2 * mean**2 / variance, variance / (2 * mean)) if min(mean, variance) > 0 else (0.0, 1.0)
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

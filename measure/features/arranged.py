@@ -173,7 +173,8 @@ def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
 
 
 def _probabilities(found: Found) -> np.ndarray:
-    return p_value(found.squares, np.array([centre.freedom for centre in found.centres])[found.centre])
+    freedom, scale = (np.array([getattr(c, key) for c in found.centres])[found.centre] for key in ("freedom", "scale"))
+    return p_value(found.squares / scale, freedom)
 
 
 @_BLAS.wrap(limits=1)

@@ -54,7 +54,7 @@ def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
 
 def _probability(centre: Centre, used: np.ndarray) -> float:
     solved = centre.expansion.solve(centre.expansion.see(used[None, centre.expansion.order]))
-    return float(p_value(solved.squares, np.array(centre.freedom)[None])[0])
+    return float(p_value(solved.squares / centre.scale, np.array(centre.freedom)[None])[0])
 
 
 def moved(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:

@@ -67,6 +67,28 @@ def sensitivity(noise: Noise, level: np.ndarray) -> np.ndarray:
     return ndtr(below) - np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi) * grows
 
 
+def squared_errors(noise: Noise, level: np.ndarray, like: Levels) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance of (x - m)^2 / v over pictures, of what is recorded (x) of noise-free levels (n,).
+
+    ``like`` holds m and v. Normal noise with that mean and variance has 1 and 2; near the end of the scale both are
+    sums over the grey levels, or over an eighth of a standard deviation where that is more.
+    """
+    mean, variance, full = np.ones(level.shape), np.full(level.shape, 2.0), full_scale(noise)
+    sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level) - 1 / 12, 1e-12))
+    near = level > full - _MARGIN * sigma
+    if np.isinf(full) or not near.any():
+        return mean, variance
+    widest = float(sigma[near].max())
+    cell = max(1.0, widest / 8)
+    values = full - cell * np.arange(np.ceil(2 * _MARGIN * widest / cell) + 2)
+    below = ndtr((values - cell / 2 - level[near, None]) / sigma[near, None])
+    probability = -np.diff(below, axis=1, prepend=1.0)
+    squares = (values - like.level[near, None]) ** 2 / like.noise_variance[near, None]
+    mean[near] = (probability * squares).sum(1)
+    variance[near] = (probability * squares**2).sum(1) - mean[near] ** 2
+    return mean, variance
+
+
 def full_scale(noise: Noise) -> float:
     """The highest grey level; infinite without digits."""
     return np.inf if noise.bits is None else 2.0**noise.bits - 1

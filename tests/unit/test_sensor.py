@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import render
-from planner.imaging.sensor import recorded
+from planner.imaging.sensor import full_scale, recorded, shot_noise, squared_errors
 from scenes import InvalidInput, Noise
 
 
@@ -87,3 +87,23 @@ def test_mean_and_variance_at_the_end_of_the_scale():
     assert mean == pytest.approx(pictures.mean(0), abs=5 * sigma / np.sqrt(len(pictures)) + 0.01)
     assert render.variance(image, noise)[0] == pytest.approx(pictures.var(0), rel=0.05, abs=1e-3)
     assert mean[0] == 128.0
+
+
+@pytest.mark.parametrize("noise", [Noise(sigma=2.4, bits=8, dark_level=20), Noise(sigma=40.0, bits=10, gain=0.5)])
+def test_squared_errors_are_those_of_drawn_pictures(noise):
+    """Mean and variance of squared errors near the end of the scale; those of normal noise are far off there."""
+    level = full_scale(noise) + np.array([-3.0, -1.0, 0.0, 1.0]) * np.sqrt(noise.variance)
+    sigma = np.sqrt(noise.variance - 1 / 12 + shot_noise(noise, level - noise.dark_level))
+    drawn = np.clip(
+        np.rint(level + sigma * np.random.default_rng(1).standard_normal((200_000, 4))), None, full_scale(noise)
+    )
+    like = recorded(noise, level)
+    squares = (drawn - like.level) ** 2 / like.noise_variance
+    mean, variance = squared_errors(noise, level, like)
+    error = squares.std(0) / np.sqrt(len(squares))
+    assert np.all(np.abs(squares.mean(0) - mean) < 5 * error)
+    fourth = np.sqrt(np.var((squares - squares.mean(0)) ** 2, axis=0) / len(squares))
+    assert np.all(np.abs(squares.var(0) - variance) < 5 * fourth)
+    assert np.abs(squares.var(0) - 2)[-1] > 20 * fourth[-1]
+    far = np.array([full_scale(noise) / 2])
+    assert np.concatenate(squared_errors(noise, far, recorded(noise, far))).tolist() == [1.0, 2.0]
