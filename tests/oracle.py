@@ -35,13 +35,15 @@ def shaded_image(faces, shape, blur):
         t = (np.arange(panels)[:, None] + (1 + _FEW) / 2).ravel() / panels
         x = left[:, None] + (right - left)[:, None] * t
         value = shade(x, lines[:, None]) * (right - left)[:, None] * np.tile(_FEW_WEIGHTS / 2, panels) / panels
-        rows = np.zeros((lines.size, shape[1]))
-        reach, nearest, line = int(np.ceil(7 * blur)) + 1, np.rint(x).astype(int), np.arange(lines.size)[:, None]
+        reach, nearest = int(np.ceil(7 * blur)) + 1, np.rint(x).astype(int)
+        rows = np.zeros(lines.size * (shape[1] + 1))  # one pixel more for what falls outside
+        first, lower = np.arange(lines.size)[:, None] * (shape[1] + 1), ndtr((nearest - reach - 0.5 - x) / blur)
         for step in range(-reach, reach + 1):
-            pixel = nearest + step
-            part = value * (ndtr((pixel + 0.5 - x) / blur) - ndtr((pixel - 0.5 - x) / blur))
-            inside = (pixel >= 0) & (pixel < shape[1])
-            np.add.at(rows, (np.broadcast_to(line, x.shape)[inside], pixel[inside]), part[inside])
+            pixel, upper = nearest + step, ndtr((nearest + step + 0.5 - x) / blur)
+            place = first + np.where((pixel >= 0) & (pixel < shape[1]), pixel, shape[1])
+            rows += np.bincount(place.ravel(), (value * (upper - lower)).ravel(), rows.size)
+            lower = upper
+        rows = rows.reshape(lines.size, -1)[:, :-1]
         away = lines - np.arange(shape[0])[:, None]
         picture += (ndtr((away + 0.5) / blur) - ndtr((away - 0.5) / blur)) * weights @ rows
     return picture
