@@ -157,7 +157,7 @@ def main(count: int = 2000) -> None:
     """Print all tables."""
     console, rng = Console(width=110), np.random.default_rng(1)
     standard = np.sqrt(2 / (count - 1))
-    table = _table(
+    table = aligned_table(
         f"Variance / Cramer-Rao bound (numerical Fisher matrix), n = {count}, standard error {standard:.1%}",
         "rectangle px", "degrees", "contrast/noise", *ESTIMATORS,
     )  # fmt: skip
@@ -166,7 +166,7 @@ def main(count: int = 2000) -> None:
             cells = [trial(rectangle(*size, degrees), name, ratio, count, rng) for name in ESTIMATORS]
             table.add_row(f"{size[0]} x {size[1]}", str(degrees), str(ratio), *map(_efficiency, cells))
     console.print(table)
-    table = _table(
+    table = aligned_table(
         "Predicted / empirical variance over 10 random perspective blocks, contrast/noise 10-100", "", *ESTIMATORS
     )
     ratios = {name: [] for name in ESTIMATORS}
@@ -179,10 +179,10 @@ def main(count: int = 2000) -> None:
     table.add_row("standard deviation", *(f"{np.std(ratios[name]):.3f}" for name in ESTIMATORS))
     table.add_row("expected from n alone", *(f"{standard:.3f}" for _ in ESTIMATORS))
     console.print(table)
-    table = _table("Noise-free error of a corner, worst of 45 angles and phases, px", *ESTIMATORS)
+    table = aligned_table("Noise-free error of a corner, worst of 45 angles and phases, px", *ESTIMATORS)
     table.add_row(*(f"{worst_bias(name):.1e}" for name in ESTIMATORS))
     console.print(table)
-    table = _table("Images a second and core, 100 x 60 px quadrilateral", "", "images/s")
+    table = aligned_table("Images a second and core, 100 x 60 px quadrilateral", "", "images/s")
     for name, rate in rates().items():
         table.add_row(name, f"{rate:.0f}")
     console.print(table)
@@ -193,7 +193,8 @@ def _efficiency(done: Trial) -> str:
     return "-" if np.isnan(done.empirical) else f"{done.empirical / done.bound:.2f}{lost}"
 
 
-def _table(title: str, *columns: str) -> Table:
+def aligned_table(title: str, *columns: str) -> Table:
+    """A table without lines, columns to the right."""
     table = Table(title=title, title_justify="left", box=None, padding=(0, 2))
     for name in columns:
         table.add_column(name, justify="right")

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 import measure
 from measure import status
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
+from tests.benchmarks.estimators import aligned_table
 from tests.galsim_images import box, box_corners, corner_bound, ellipse, ellipse_bound
 from tests.oracle import polygon_image
 
@@ -124,7 +124,7 @@ def main(count: int = 1000) -> None:
     """Print both tables."""
     console, rng = Console(width=130), np.random.default_rng(1)
     standard = np.sqrt(2 / (count - 1))
-    table = _table(
+    table = aligned_table(
         f"Variance / Cramer-Rao bound of a square's diagonal, width; n = {count}, standard error {standard:.1%}",
         "side px", "degrees", "contrast/noise", *ESTIMATORS,
     )  # fmt: skip
@@ -133,7 +133,7 @@ def main(count: int = 1000) -> None:
             found = rectangle(side, degrees, ratio, ESTIMATORS, count, rng)
             table.add_row(*map(str, (side, degrees, ratio)), *(_said(found[name]) for name in ESTIMATORS))
     console.print(table)
-    table = _table(
+    table = aligned_table(
         "Ellipses; centre and axes: variance / bound", "semi-axes px", "contrast/noise", "blur told px", "centre",
         "axes", "radius bias px", "status", "ms/image",
     )  # fmt: skip
@@ -155,13 +155,6 @@ def _said(done: Efficiency) -> str:
         return f"- ({done.failed} failed)"
     lost = f" ({done.failed} failed)" if done.failed else ""
     return f"{done.empirical[0]:.2f}, {done.empirical[1]:.2f}{lost}"
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2))
-    for name in columns:
-        table.add_column(name, justify="right")
-    return table
 
 
 if __name__ == "__main__":
