@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement clean
+.PHONY: validate test fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement crowded clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -48,6 +48,11 @@ proof: $(VENV)/.installed
 # Is every variance that is said the one that 1000 pictures show, in every scene and by every estimator? (10 minutes)
 agreement: $(VENV)/.test-installed
 	$(BIN)/python -m tests.proofs.agreement
+
+# Does the arrangement estimator stand at the bound, unbiased, where edges crowd? (random poses, small images, blocks)
+crowded: $(VENV)/.test-installed
+	$(BIN)/python -m tests.proofs crowded
+	$(BIN)/python -m tests.proofs conditions
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

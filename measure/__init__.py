@@ -1,7 +1,7 @@
 """An image becomes edge points, lines, corners and a distance, each with its covariance and a status."""
 
 from measure.bounds import bound, image_bound
-from measure.estimators.registry import ESTIMATORS
+from measure.estimators.registry import ESTIMATORS, best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
 from measure.find.ellipse import find_ellipse
@@ -19,6 +19,7 @@ __all__ = [
     "Measurement",
     "Propagated",
     "Quadrilateral",
+    "best_estimator",
     "bound",
     "distance", "distances",
     "find_ellipse",

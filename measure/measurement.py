@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,14 @@ import numpy as np
 from measure import status
 from measure.features.layout import Layout, layout_of
 from measure.features.shape import find_shape
+from planner.imaging.pictures import Pictures
+from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
 
 DEFAULT_ESTIMATOR = "gradient"
+PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _DARK = 1e-200  # squared grey levels
-_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -26,11 +28,14 @@ class Measurement:
     Attributes
     ----------
     value_px : ndarray, shape (...)
-        Distance, px; NaN where `status` is neither ``ok`` nor ``clutter``.
+        Distance, px; NaN where `status` is neither ``ok`` nor ``clutter`` nor ``misfit``.
     variance_px2 : ndarray, shape (...)
         Its variance (not sigma), px^2, from the estimator's own linear response at the contrast measured in the image.
     status : ndarray of str, shape (...)
-        ``ok``, ``clutter``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or ``ill_conditioned``.
+        ``ok``, ``clutter``, ``misfit``, ``ambiguous``, ``short``, ``low_contrast``, ``sign_change``, ``not_visible`` or
+        ``ill_conditioned``.
+    bias_px : ndarray, shape (...)
+        Predicted bias that has been subtracted from the distance, px; 0 where none was asked for.
     corners : ndarray, shape (..., 2, 2)
         Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
     covariance : ndarray, shape (..., 4, 4)
@@ -40,12 +45,16 @@ class Measurement:
     edge_contrast : ndarray, shape (..., E)
         Measured contrast at the middle of the edge, grey levels.
     used, rejected : ndarray of int, shape (..., E)
-        Number of edge points (pixels, for ``strip`` and ``polygon``).
+        Number of edge points (pixels, for ``strip`` and ``arrangement``).
+    p_value : ndarray, shape (...)
+        Goodness of fit: probability of a residual at least as unlikely, if the image is what the model says and the
+        noise the sensor's; NaN for estimators that have no model of the image.
     """
 
     value_px: np.ndarray
     variance_px2: np.ndarray
     status: np.ndarray
+    bias_px: np.ndarray
     corners: np.ndarray
     covariance: np.ndarray
     edge_names: tuple[str, ...]
@@ -53,6 +62,7 @@ class Measurement:
     edge_contrast: np.ndarray
     used: np.ndarray
     rejected: np.ndarray
+    p_value: np.ndarray
 
 
 def distance(
@@ -62,6 +72,8 @@ def distance(
     light: Any = None,
     estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
+    *,
+    correct_bias: bool = False,
 ) -> Measurement:
     """Measure the task's distance.
 
@@ -74,23 +86,55 @@ def distance(
     sensor : Pose or pair of float
         Where the image was taken from; edges are sought where this pose projects them, up to 4 px and 2 degrees away.
     light : Pose or pair of float, optional
-        Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``polygon``.
-    estimator : {"gradient", "isophote", "canny", "strip", "polygon"}
+        Where the light is, if known: then the shading of the faces is known, which helps ``strip`` and ``arrangement``.
+    estimator : {"gradient", "isophote", "canny", "strip", "arrangement"}
         ``gradient``: zero crossing of the Gaussian second derivative. ``isophote``: where the smoothed image takes the
         mean of both sides' levels. ``canny``: the classic pipeline, edge pixels
         above a gradient threshold, each moved to where the gradient across the edge is largest. ``strip``: maximum
-        likelihood along each edge. ``polygon``: all edges of the face together, corners included; the most precise.
+        likelihood along each edge. ``arrangement``: of all visible faces around the edges together; the most precise.
     threshold : float, optional
         Gradient threshold of ``canny``, grey levels a pixel; the scene's first when not given. ``low_contrast`` where
         noise decides whether more than a tenth of an edge passes it.
+    correct_bias : bool
+        Subtract the bias that the planner predicts from corners and distance (``gradient`` and ``canny``, the light
+        being known). What was ``clutter`` for its bias is then ``ok``; where the bias is not to be trusted nothing is
+        subtracted, and ``clutter`` stays.
 
     Raises
     ------
     InvalidInput
         If the image has not the camera's size or holds a number that is not finite, or another argument is bad.
     """
-    (found,) = distances(image, Picture.of(scene, sensor, light), ((estimator, threshold),))
-    return found
+    picture = Picture.of(scene, sensor, light)
+    if correct_bias:
+        _check_known(picture, estimator)
+    (found,) = distances(image, picture, ((estimator, threshold),))
+    return _corrected(found, picture) if correct_bias else found
+
+
+def _check_known(picture: Picture, estimator: str) -> None:
+    if not picture.lights:
+        raise InvalidInput("light must be a pose to correct the bias, got nothing")
+    if estimator not in PREDICTED:
+        raise InvalidInput(f"estimator must be one of {', '.join(PREDICTED)} to correct the bias, got {estimator!r}")
+
+
+def _corrected(found: Measurement, picture: Picture) -> Measurement:
+    """With the predicted bias subtracted, unless it is not to be trusted."""
+    predicted = bias(Pictures.of(picture))
+    if predicted.disturbed.any():
+        return found
+    corners = found.corners - predicted.corners
+    value = separation(corners.reshape(-1, 2, 2))[0].reshape(found.value_px.shape)
+    value = np.where(np.isnan(found.value_px), np.nan, value)
+    return replace(
+        found,
+        value_px=value,
+        bias_px=np.nan_to_num(found.value_px - value),
+        corners=corners,
+        status=np.where(found.status == status.CLUTTER, status.OK, found.status),
+        edge_status=np.where(found.edge_status == status.CLUTTER, status.OK, found.edge_status),
+    )
 
 
 def distances(
@@ -121,8 +165,7 @@ def _check_method(estimator: Any, threshold: Any) -> None:
 
 def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    parts = [_measure(stack[i : i + _BATCH], layout, estimator, threshold) for i in range(0, len(stack), _BATCH)]
-    whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    whole = _measure(stack, layout, estimator, threshold)
     return Measurement(
         edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
     )
@@ -147,7 +190,7 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
 
 
 def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:
-    """All columns of a Measurement for a small stack (n, height, width)."""
+    """All columns of a Measurement for a stack (n, height, width)."""
     shape = find_shape(images, layout, estimator, threshold)
     measured = np.isin(shape.status, status.MEASURED)
     value, gradient = separation(shape.corners)
@@ -158,12 +201,14 @@ def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> di
         "value_px": np.where(measured, value, np.nan),
         "variance_px2": variance,
         "status": shape.status,
+        "bias_px": np.zeros(len(value)),
         "corners": shape.corners,
         "covariance": shape.covariance,
         "edge_status": shape.edge_status,
         "edge_contrast": shape.edge_contrast,
         "used": shape.used,
         "rejected": shape.rejected,
+        "p_value": shape.p_value,
     }
 
 

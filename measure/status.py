@@ -1,15 +1,17 @@
-"""What a measurement can say of itself. Only `OK` and `CLUTTER` come with a value."""
+"""What a measurement can say of itself. Only those in `MEASURED` come with a value."""
 
 OK = "ok"
-CLUTTER = "clutter"  # a second edge is too near: the value may be biased
+CLUTTER = "clutter"  # what lies around an edge (another edge, shading, the end of the scale) biases the value
 SHORT = "short"  # too little of an edge is left to fit a line
 LOW_CONTRAST = "low_contrast"  # too little of the edge stands out of the noise
 SIGN_CHANGE = "sign_change"  # the contrast changes sign along the edge
 NOT_VISIBLE = "not_visible"  # hidden, or outside the image
-ILL_CONDITIONED = "ill_conditioned"  # the lines of a corner are nearly parallel
+ILL_CONDITIONED = "ill_conditioned"  # nearly parallel lines at a corner, or the image tells too little of what is near
+AMBIGUOUS = "ambiguous"  # another solution explains the image as well
+MISFIT = "misfit"  # the image is not what the model says within its noise: neither value nor variance can be trusted
 
-MEASURED = (OK, CLUTTER)
-_WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, CLUTTER, OK)
+MEASURED = (OK, CLUTTER, MISFIT)
+_WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, AMBIGUOUS, MISFIT, CLUTTER, OK)
 ALL = frozenset(_WORST_FIRST)
 
 

@@ -8,10 +8,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.features.locator import MIN_CONTRAST, MIN_USABLE
-from planner.features.measurand import normals
+from planner.features.measurand import measurand, normals
 from planner.features.propagation import corner_covariance
 from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
 from scenes import Corner, InvalidInput, Picture, Scene
 
@@ -22,12 +23,23 @@ _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that
 
 @dataclass(frozen=True)
 class EdgePrediction:
-    """A required edge as the sensor will see it: image length (px), contrast (rms along it, grey levels), status."""
+    """A required edge as the sensor will see it.
+
+    Attributes
+    ----------
+    name : str
+    length_px, contrast : float
+        Length of its image, px, and contrast, rms along it, grey levels.
+    status : str
+    bias_px : tuple of float
+        How far the classic locators' line is off at the edge's two ends, along the normal (-t_y, t_x), px.
+    """
 
     name: str
     length_px: float
     contrast: float
     status: str
+    bias_px: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -46,6 +58,9 @@ class Prediction:
         Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
         cannot be measured. The ``paper`` model is right only up to one factor common to all settings, and infinite
         only where an edge is hidden or without any contrast.
+    bias_image : float
+        Value that the classic locators (``gradient``; ``canny`` nearly) find without noise, less `value_image`; px, or
+        degrees. NaN where it is not known (circles). 0 for the ``bound``, which is about unbiased estimators.
     corners : ndarray, shape (2, 2)
         Start and end feature (x, y), px; (0, 0) is the centre of the first pixel. For an angle, a point on each line.
     covariances : ndarray, shape (2, 2, 2)
@@ -53,7 +68,8 @@ class Prediction:
     edges : tuple of EdgePrediction
         The straight edges.
     status : str
-        ``ok``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``.
+        ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
+        is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
     """
 
     model: str
@@ -62,6 +78,7 @@ class Prediction:
     value_object: float
     variance_image: float
     variance_object: float
+    bias_image: float
     corners: np.ndarray
     covariances: np.ndarray
     edges: tuple[EdgePrediction, ...]
@@ -81,6 +98,11 @@ class Prediction:
     def variance_cm2(self) -> float:
         """Variance of the physical length, cm^2."""
         return self._of_a_distance("variance_cm2", self.variance_object)
+
+    @property
+    def bias_px(self) -> float:
+        """Bias of the distance in the image, px; `measure.distance` subtracts it on request."""
+        return self._of_a_distance("bias_px", self.bias_image)
 
     def _of_a_distance(self, name: str, value: float) -> float:
         if self.kind != "distance":
@@ -152,11 +174,18 @@ def predict(
     picture = Picture.of(scene, sensor, light)
     if not picture.lights:
         raise InvalidInput("light must be a pose, got nothing")
-    scene, evaluated = picture.scene, variance_model(model)(Pictures.of(picture))
-    known = evaluated.measurand
+    scene, pictures = picture.scene, Pictures.of(picture)
+    evaluated, known = variance_model(model)(pictures), measurand(pictures)
+    biased, off, clutter = _of_locator(pictures, model)
     edges = tuple(
-        EdgePrediction(name, float(length), float(step), _edge_status(noise, seen, whole, usable, step))
-        for name, length, whole, usable, step, noise, seen in zip(
+        EdgePrediction(
+            name,
+            float(length),
+            float(step),
+            _edge_status(noise, seen, whole, usable, step, crowded),
+            tuple(line.tolist()),
+        )
+        for name, length, whole, usable, step, noise, seen, crowded, line in zip(
             known.view.names,
             known.view.lengths,
             known.view.lengths - known.view.trims.sum(-1),
@@ -164,6 +193,8 @@ def predict(
             evaluated.contrast,
             evaluated.noise_variance,
             known.view.visible,
+            clutter,
+            off,
             strict=True,
         )
     )
@@ -174,11 +205,21 @@ def predict(
         value_object=float(known.value_object),
         variance_image=float(evaluated.variance),
         variance_object=float(evaluated.variance_object),
+        bias_image=biased,
         corners=known.points,
         covariances=_covariances(scene, evaluated),
         edges=edges,
         status=_status(scene, evaluated, edges),
     )
+
+
+def _of_locator(pictures: Pictures, model: str) -> tuple[float, np.ndarray, np.ndarray]:
+    """Bias of the measurand and of the lines (E, 2), and which edges are cluttered (E,)."""
+    if model == "bound":
+        edges = len(measurand(pictures).view.names)
+        return 0.0, np.zeros((edges, 2)), np.zeros(edges, bool)
+    found = bias(pictures)
+    return float(found.value), found.lines, cluttered(pictures)
 
 
 def minimised(errors: Errors, objective: str) -> np.ndarray:
@@ -212,12 +253,14 @@ def _covariances(scene: Scene, evaluated: Errors) -> np.ndarray:
     return np.stack(found)
 
 
-def _edge_status(noise: float, visible: bool, whole: float, usable: float, step: float) -> str:
+def _edge_status(noise: float, visible: bool, whole: float, usable: float, step: float, crowded: bool) -> str:
     if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
         return "not_visible"
     if usable < MIN_USABLE:  # first, for where nothing is left there is no contrast either
         return "short"
-    return "ok" if step > MIN_CONTRAST * np.sqrt(noise) else "low_contrast"
+    if not step > MIN_CONTRAST * np.sqrt(noise):
+        return "low_contrast"
+    return "clutter" if crowded else "ok"
 
 
 def _status(scene: Scene, evaluated: Errors, edges: tuple[EdgePrediction, ...]) -> str:
@@ -229,4 +272,6 @@ def _status(scene: Scene, evaluated: Errors, edges: tuple[EdgePrediction, ...]) 
     sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
     if min(sines, default=1.0) < _MIN_SINE:
         return "ill_conditioned"
-    return "ok" if np.isfinite(evaluated.variance) else "not_visible"
+    if not np.isfinite(evaluated.variance):
+        return "not_visible"
+    return "clutter" if any(edge.status == "clutter" for edge in edges) else "ok"

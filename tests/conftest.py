@@ -1,3 +1,7 @@
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: each of the tests' processes has one core
+
 import numpy as np
 import pytest
 

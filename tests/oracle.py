@@ -6,9 +6,9 @@ Projection and shading are written out here: nothing is shared with the model of
 import numpy as np
 from scipy.special import ndtr
 
-from validation.hard.polygon import _scan_lines, _spans, polygon_image
+from validation.hard.polygon import polygon_image, scan_lines, spans
 
-__all__ = ["axes", "block_image", "pinhole", "polygon_image", "shaded_image"]
+__all__ = ["axes", "block_image", "pinhole", "polygon_image", "shaded_image", "torrance_sparrow"]
 
 _FEW, _FEW_WEIGHTS = np.polynomial.legendre.leggauss(4)
 
@@ -29,8 +29,8 @@ def shaded_image(faces, shape, blur):
     picture = np.zeros(shape)
     for corners, shade in faces:
         corners = np.asarray(corners, float)
-        lines, weights = _scan_lines(np.unique(corners[:, 1]))
-        left, right = _spans(corners, lines)
+        lines, weights = scan_lines(corners)
+        left, right = spans(corners, lines)
         panels = max(int(np.ceil(2 * np.max(right - left))), 1)
         t = (np.arange(panels)[:, None] + (1 + _FEW) / 2).ravel() / panels
         x = left[:, None] + (right - left)[:, None] * t
@@ -100,3 +100,22 @@ def block_image(scene, sensor, light, gloss=None):
         if normal @ (eye - corners[0]) > 0:
             faces.append((pinhole(corners, sensor, camera), shading(normal, corners[0])))
     return scene.noise.dark_level + shaded_image(faces, (camera.height, camera.width), camera.blur_px)
+
+
+def torrance_sparrow(material):
+    """N.L times the paper's reflectance for unpolarised light, as printed; ``gloss`` of `block_image`."""
+    index, m = complex(material.refractive_index, -material.extinction), material.roughness
+
+    def gloss(normal, to_light, to_sensor):
+        nl, nv, half = to_light @ normal, to_sensor @ normal, to_light + to_sensor
+        half = half / np.linalg.norm(half, axis=-1, keepdims=True)
+        nh, vh = half @ normal, (to_sensor * half).sum(-1)
+        inside = np.sqrt(1 - (1 - vh**2) / index**2 + 0j)
+        amplitudes = (index * vh - inside) / (index * vh + inside), (vh - index * inside) / (vh + index * inside)
+        fresnel = sum(np.abs(amplitude) ** 2 for amplitude in amplitudes) / 2
+        facets = np.exp(-(1 / nh**2 - 1) / m**2) / (m**2 * nh**4)
+        facets = facets * np.minimum(1, 2 * nh * np.minimum(nv, nl) / vh)
+        diffuse = (1 - material.specular_fraction) * material.diffuse_reflectance
+        return np.where(nl > 0, material.specular_fraction * facets * fresnel / (np.pi * nv) + diffuse * nl, 0.0)
+
+    return gloss

@@ -151,7 +151,7 @@ def _checked(
 ) -> CheckedSetting:
     scene = _with_edges(found.scene, edges)
     picture = render.image(scene, sensor, light, quality)
-    measured = measure.propagate(picture, scene, sensor, None, ESTIMATOR)
+    measured = measure.propagate(picture, scene, sensor, light, ESTIMATOR)
     planned, calibrated = (planner.predict(scene, sensor, light, model) for model in (found.model, "calibrated"))
     to_unit = planned.variance_object / planned.variance_image if found.objective == "object" else 1.0
     return CheckedSetting(

@@ -106,7 +106,7 @@ class CrossingLocator:
 
     @property
     def _common(self) -> sparse.csr_array:
-        return sparse.csr_array(self.basis @ self.level)
+        return sparse.csr_array(self.basis) @ sparse.csr_array(self.level)
 
 
 def places_across(places: np.ndarray, normals: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,13 +10,13 @@ import numpy as np
 from scipy import sparse
 
 from measure import status
+from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.estimate import Estimate, Estimator, noisy
 from measure.estimators.gradient import gradient_locator
 from measure.estimators.isophote import TRIM, isophote_locator
 from measure.estimators.likelihood import LikelihoodEstimator
-from measure.estimators.polygon import polygon_estimator
 from measure.estimators.profile import TRUNCATE
 from measure.estimators.strip import strip_estimator
 from measure.estimators.thinning import Thinned, Thinning
@@ -24,24 +24,37 @@ from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, edge_blur, reach
-from scenes import InvalidInput
+from planner.imaging.appearance import is_plain
+from scenes import InvalidInput, Noise, Scene
 
-ESTIMATORS = ("canny", "gradient", "isophote", "strip", "polygon")
-CAPTURE = {"canny": 1.5, "gradient": 1.5, "isophote": 0.5, "strip": 0.125, "polygon": 0.125}
+ESTIMATORS = ("canny", "gradient", "isophote", "strip", "arrangement")
+SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
+CAPTURE = {"canny": 1.5, "gradient": 1.5, "isophote": 0.5, "strip": 0.125}
 """Largest offset from the expected edge, px, at which the result is as good as at none."""
 _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
+_FAINTEST = 1e-3  # grey levels of noise: about what the image of an arrangement is exact to
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
-def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
+def best_estimator(scene: Scene) -> str:
+    """What an image of a scene is best measured by: ``arrangement`` where one convex body stands before darkness.
+
+    There it is the most precise, and tells by its goodness of fit whether the image is what it takes it for. Where
+    things hide or shade each other, ``gradient``, whose errors and bias the planner knows.
+    """
+    return "arrangement" if is_plain(scene) else "gradient"
+
+
+def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator | ArrangementEstimator:
     """Prepare an estimator.
 
     Parameters
     ----------
     layout : Layout
-    name : {"canny", "gradient", "isophote", "strip", "polygon"}
+    name : {"canny", "gradient", "isophote", "strip", "arrangement"}
+        ``polygon`` is a synonym of ``arrangement``.
     threshold : float
         Gradient threshold of ``canny``, grey levels a pixel.
 
@@ -50,18 +63,17 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     InvalidInput
         If the name is unknown or the threshold not positive.
     """
+    name = SYNONYMS.get(name, name)
     if name not in ESTIMATORS:
         raise InvalidInput(f"estimator must be one of {', '.join(ESTIMATORS)}, got {name!r}")
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
     optics = layout.optics
     own_reach = CLEARANCE * edge_blur(optics.blur_px)  # a face less than twice as wide has no pixel of its own level
-    if name == "polygon":
-        whole = edge_calipers(layout, 0.0, 0.0, 2 * own_reach)
-        found = polygon_estimator(layout, whole, own_reach) if _all_measurable(whole) else None
-        if found is not None:
-            return found
-        name = "strip"  # no closed ring around one face: each edge by itself
+    if name == "arrangement":
+        if layout.arrangement is not None:
+            return ArrangementEstimator(layout.arrangement, optics.shape, _noisy(optics.sensor))
+        name = "strip"  # things hide or shade each other: each edge by itself
     if name == "strip":
         calipers = edge_calipers(layout, own_reach, 0.0, 2 * own_reach)
         parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(calipers)]
@@ -116,10 +128,6 @@ def _thinned(caliper: Caliper, scale: float) -> Caliper:
 
 def _measurable(caliper: Caliper) -> bool:
     return caliper.status in status.MEASURED
-
-
-def _all_measurable(calipers: tuple[Caliper, ...]) -> bool:
-    return all(caliper.status != status.NOT_VISIBLE for caliper in calipers)
 
 
 @dataclass(frozen=True)
@@ -239,3 +247,8 @@ class SeparateEstimator:
 
     def respond(self, clean: np.ndarray) -> np.ndarray:
         return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])
+
+
+def _noisy(noise: Noise) -> Noise:
+    """The noise, or the least that a likelihood can be made of."""
+    return noise if noise.variance >= _FAINTEST**2 else noise.model_copy(update={"sigma": _FAINTEST})

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from planner.imaging.appearance import signal
+from planner.imaging.arrangement import spread
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project_ideal
 
 _DEGREE = 3
-_GRID = np.linspace(0.02, 0.98, 7)
 
 
 class Shading:
@@ -33,7 +31,7 @@ class Shading:
     @classmethod
     def uniform(cls, corners: np.ndarray) -> Shading:
         """No shading at all on a convex polygon (k, 2)."""
-        points = _spread(corners)
+        points = spread(corners)
         return cls(points, np.ones(len(points)))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -49,15 +47,8 @@ def face_shadings(pictures: Pictures) -> list[Shading | None]:
     """The shading of each face of object and obstacles; None for one that the lights or the sensor do not reach."""
     scene, found = pictures.scene, []
     for normal, face in zip(scene.bodies.normals, scene.bodies.faces, strict=True):
-        points = _spread(scene.bodies.vertices[list(face)])
+        points = spread(scene.bodies.vertices[list(face)])
         levels = signal(pictures, points, normal, 1)
         image = project_ideal(points, pictures.sensors, scene.camera)
         found.append(Shading(image, levels) if levels.min() > 0 and np.isfinite(image).all() else None)
     return found
-
-
-def _spread(corners: np.ndarray) -> np.ndarray:
-    """Points spread over a convex polygon: each triangle of a fan, on a grid."""
-    u, v = (part.ravel() for part in np.meshgrid(_GRID, _GRID))
-    first, u, v = corners[0], u[:, None], v[:, None]
-    return np.concatenate([first + u * ((1 - v) * (a - first) + v * (b - first)) for a, b in pairwise(corners[1:])])

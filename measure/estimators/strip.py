@@ -49,8 +49,16 @@ def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) 
     at_ends = np.array([[1, -0.5, 0], [1, 0.5, 0]])
     contrast = np.concatenate([layout.shade(layout.sides[index, 0], ends)[:, None] * at_ends,
                                -layout.shade(layout.sides[index, 1], ends)[:, None] * at_ends], 1)  # fmt: skip
+    # blurring a step between sloping levels adds the blur's variance times the slope across times the step's density
+    rising = (
+        np.eye(3)[2]
+        / HALF_WIDTH
+        * ((sigma**2 + 1 / 12 * (slopes[0] ** 2).sum(-1, keepdims=True)) * thin).sum(1)[:, None]
+    )
     columns = Columns(
-        levels=np.concatenate([basis * plus * inside[:, None], basis * minus * (1 - inside)[:, None]], 1),
+        levels=np.concatenate(
+            [(basis * inside[:, None] + rising) * plus, (basis * (1 - inside)[:, None] - rising) * minus], 1
+        ),
         start=contrast[:1],
         stop=contrast[1:],
         offsets=-np.stack([thin.sum(1), (thin * lever).sum(1)], 1),

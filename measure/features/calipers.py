@@ -86,13 +86,13 @@ def edge_calipers(layout: Layout, clear: float, margin: float, crowd: float | No
     margin : float
         How far from the image's border a position must be, px.
     crowd : float, optional
-        How near an edge that shares no corner makes it ``clutter``, px; ``clear`` when not given.
+        How near an edge that shares no corner makes it ``clutter``, px. When not given, what the planner says, or
+        ``clear`` where the light is not known.
     """
-    crowd = clear if crowd is None else crowd
     return tuple(_caliper(layout, i, clear, margin, crowd) for i in range(len(layout.names)))
 
 
-def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float) -> Caliper:
+def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float | None) -> Caliper:
     start, stop = layout.ends[i]
     length = float(np.linalg.norm(stop - start))
     if not layout.visible[i] or not length > 0:
@@ -114,9 +114,16 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float) 
     elif inside.sum() < MIN_POSITIONS:
         state = status.NOT_VISIBLE
     else:
-        crowded = any(distance_to_segment(places[inside], *other).min() < crowd for other in layout.apart[i])
+        crowded = _crowded(layout, i, places[inside], clear if crowd is None else crowd)
+        if crowd is None and layout.clutter is not None:
+            crowded = layout.clutter[i]
         state = status.CLUTTER if crowded else status.OK
     return Caliper(layout.names[i], start, along, length, positions[inside], state, layout.optics, layout.defocus[i])
+
+
+def _crowded(layout: Layout, i: int, places: np.ndarray, near: float) -> bool:
+    """Whether an edge that shares no corner with the i-th is nearer than ``near`` to places (m, 2)."""
+    return any(distance_to_segment(places, *other).min() < near for other in layout.apart[i])
 
 
 def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:

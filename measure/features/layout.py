@@ -11,9 +11,12 @@ from skimage.draw import polygon2mask
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
 from planner.features.projected_edges import projected_edges, straight
+from planner.imaging.appearance import is_plain
+from planner.imaging.arrangement import Arrangement, arrangement_of, polygon_arrangement
 from planner.imaging.lens import signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
+from planner.models.bias import cluttered
 from scenes import Corner, InvalidInput, Picture, Scene
 
 BACKGROUND = -1
@@ -50,6 +53,10 @@ class Layout:
     optics : Optics
     defocus : ndarray, shape (E, 2)
         Signed radius of the circle of confusion at both ends of each edge, px; it changes linearly in between.
+    arrangement : Arrangement, optional
+        All that is seen around the edges; None where things hide or shade each other.
+    clutter : ndarray of bool, shape (E,), optional
+        Where the light is known, for which edges the planner predicts ``clutter`` of the classic locators.
     """
 
     names: tuple[str, ...]
@@ -66,6 +73,8 @@ class Layout:
     shadings: tuple[Shading | None, ...]
     optics: Optics
     defocus: np.ndarray
+    arrangement: Arrangement | None = None
+    clutter: np.ndarray | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -82,6 +91,7 @@ class Layout:
             apart=tuple(move(segments) for segments in self.apart),
             others=move(self.others),
             faces=tuple(move(face) for face in self.faces),
+            arrangement=self.arrangement and self.arrangement.moved(shift, turn, middle),
         )
 
     def shifted(self, offsets: np.ndarray) -> Layout:
@@ -161,6 +171,7 @@ def layout_of(picture: Picture) -> Layout:
     points = project_ideal(solid.vertices, pose, scene.camera)
     seen = facing(solid, pictures.sensor_at)
     shadings = face_shadings(pictures) if picture.lights else [None] * len(solid.faces)
+    turned = [edge for edge in solid.edges if seen[list(edge.faces)].any()]  # trimmed for whatever the light may be
     if any(shadings):
         seen = seen & np.array([shading is not None for shading in shadings])
     required = [solid.edge(name) for name in view.names]
@@ -178,7 +189,7 @@ def layout_of(picture: Picture) -> Layout:
         shown=view.shown,
         corners=tuple(tuple(names.index(name) for name in corner.edges) for corner in scene.task.corners),
         joints=_joints([edge.ends for edge in required]),
-        beside=tuple(tuple(_away(points, edge, end, shown) for end in (0, 1)) for edge in required),
+        beside=tuple(tuple(_away(points, edge, end, turned) for end in (0, 1)) for edge in required),
         apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),
         others=_segments(points, [e for e in shown if e not in required]),
         faces=faces,
@@ -186,6 +197,8 @@ def layout_of(picture: Picture) -> Layout:
         shadings=tuple(shadings[f] for f in order),
         optics=Optics.of(scene),
         defocus=_defocus(scene, pose, required),
+        arrangement=arrangement_of(pictures) if is_plain(scene) else None,
+        clutter=cluttered(pictures) if picture.lights else None,
     )
 
 
@@ -216,6 +229,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         shadings=(Shading.uniform(corners),),
         optics=optics,
         defocus=np.zeros((count, 2)),
+        arrangement=polygon_arrangement(corners, optics.blur_px),
     )
 
 

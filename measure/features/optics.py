@@ -28,6 +28,8 @@ class Optics:
         Smoothing scale and half search window of the point locators, px.
     noise : Noise, optional
         How the noise depends on the light; everywhere ``noise_variance`` when not given.
+    dark_level : float
+        Grey level of darkness.
     camera : Camera, optional
         Whose lens bends straight edges; straight edges are recorded straight when not given.
     """
@@ -39,6 +41,7 @@ class Optics:
     window_px: float = 3.0
     noise: Noise | None = None
     camera: Camera | None = None
+    dark_level: float = 0.0
 
     @classmethod
     def of(cls, scene: Scene) -> Optics:
@@ -47,7 +50,9 @@ class Optics:
         uneven = noise if noise.gain > 0 or noise.bits is not None else None
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
-        return cls(shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent)
+        return cls(
+            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level
+        )
 
     @property
     def sagitta(self) -> float:
@@ -57,6 +62,11 @@ class Optics:
         height, width = self.shape
         border = np.array([[0, 0], [width / 2, 0], [width, 0], [width, height / 2], [width, height]], float)
         return float(np.nan_to_num(np.abs(self.ideal(border) - border), nan=max(self.shape)).max())
+
+    @property
+    def sensor(self) -> Noise:
+        """The sensor's noise as a whole."""
+        return self.noise or Noise(sigma=float(np.sqrt(self.noise_variance)), dark_level=self.dark_level)
 
     def noise_at(self, levels: np.ndarray) -> np.ndarray | None:
         """Variance of the noise at grey levels; None where it is ``noise_variance`` for all of them."""

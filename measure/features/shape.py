@@ -2,60 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from measure import status
+from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
 from measure.estimators.registry import CAPTURE, estimator
 from measure.features.alignment import align
+from measure.features.arranged import find_arranged, goodness
 from measure.features.corners import corner_response, intersect, line_equations
+from measure.features.found import MIN_SINE, Shape, gather
 from measure.features.layout import Layout
+from measure.goodness import WORST
 
-_MIN_SINE = 0.02  # of the angle between the lines of a corner: about a degree
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
+_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
-@dataclass(frozen=True)
-class Shape:
-    """Lines and corners in n images.
-
-    Attributes
-    ----------
-    corners : ndarray, shape (n, C, 2)
-        (x, y), px; NaN where `status` is neither ``ok`` nor ``clutter``.
-    covariance : ndarray, shape (n, 2 C, 2 C)
-        Joint covariance of all corners' (x, y), px^2.
-    normals, points : ndarray, shape (n, E, 2)
-        Unit normal and one point of each line, px.
-    tilt_covariance : ndarray, shape (n, E, E)
-        Covariance of the lines' angles, rad^2.
-    status : ndarray of str, shape (n,)
-    edge_status : ndarray of str, shape (n, E)
-    edge_contrast : ndarray, shape (n, E)
-        Contrast at the middle of the edge, absolute, grey levels.
-    used, rejected : ndarray of int, shape (n, E)
-        Edge points, or pixels for the likelihood estimators.
-    """
-
-    corners: np.ndarray
-    covariance: np.ndarray
-    normals: np.ndarray
-    points: np.ndarray
-    tilt_covariance: np.ndarray
-    status: np.ndarray
-    edge_status: np.ndarray
-    edge_contrast: np.ndarray
-    used: np.ndarray
-    rejected: np.ndarray
-
-
 @lru_cache(maxsize=64)
-def prepared(layout: Layout, name: str, threshold: float) -> Estimator:
+def prepared(layout: Layout, name: str, threshold: float) -> Estimator | ArrangementEstimator:
     """The estimator of a layout, made once."""
     return estimator(layout, name, threshold)
 
@@ -76,7 +46,20 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     Each image is measured by itself: its result does not depend on the others of the stack. Where the edges are not
     within the estimator's capture of their expected place, the layout is moved there first.
     """
-    return _find(images, layout, name, threshold, _PASSES)
+    tool = prepared(layout, name, threshold)
+    if isinstance(tool, ArrangementEstimator):
+        return find_arranged(images, layout, tool)
+    parts = [_find(images[i : i + _BATCH], layout, name, threshold, _PASSES) for i in range(0, len(images), _BATCH)]
+    found = Shape(**{key: np.concatenate([vars(part)[key] for part in parts]) for key in vars(parts[0])})
+    return _judged(found, images, layout) if name == "strip" and layout.arrangement else found
+
+
+def _judged(found: Shape, images: np.ndarray, layout: Layout) -> Shape:
+    """With the goodness of fit of the whole picture: a strip by itself has too few pixels to tell."""
+    p_value = goodness(images, layout, prepared(layout, "arrangement", 1.0))
+    fits = np.where(p_value < WORST, status.MISFIT, status.OK)
+    state = np.array([status.worst(*pair) for pair in zip(found.status, fits, strict=True)])
+    return replace(found, status=state, p_value=p_value)
 
 
 def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passes: int) -> Shape:
@@ -100,7 +83,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     for move, which in _expectations(images, layout, offsets, far, lost, passes == _PASSES):
         source[which], rows[which] = len(parts), np.arange(len(which))
         parts.append(_find(images[which], move, name, threshold, passes - 1))
-    return _gather(parts, source, rows)
+    return gather(parts, source, rows)
 
 
 def _expectations(images, layout, offsets, far, lost, first):
@@ -133,7 +116,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
     fixed = np.array([caliper.status for caliper in calipers])
     edge_status = np.where(fixed == status.OK, estimate.state, np.where(
         (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
-    joint = np.where(sines < _MIN_SINE, status.ILL_CONDITIONED, status.OK)
+    joint = np.where(sines < MIN_SINE, status.ILL_CONDITIONED, status.OK)
     state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
     measured = np.isin(state, status.MEASURED)
     covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
@@ -152,6 +135,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
         edge_contrast=np.abs(middle),
         used=estimate.used,
         rejected=estimate.rejected,
+        p_value=np.full(len(state), np.nan),
     )
 
 
@@ -163,14 +147,3 @@ def _refuse(shape: Shape, lost: np.ndarray) -> Shape:
     gone = ~np.isin(state, status.MEASURED)
     corners = np.where(gone[:, None, None], np.nan, shape.corners)
     return Shape(**{**vars(shape), "status": state, "corners": corners})
-
-
-def _gather(parts: list[Shape], source: np.ndarray, rows: np.ndarray) -> Shape:
-    """One Shape of which image i is row ``rows[i]`` of part ``source[i]``."""
-    columns = {}
-    for name in vars(parts[0]):
-        column = np.array(getattr(parts[0], name), dtype=object if name.endswith("status") else None)
-        for k, part in enumerate(parts[1:], 1):
-            column[source == k] = getattr(part, name)[rows[source == k]]
-        columns[name] = column.astype(str) if name.endswith("status") else column
-    return Shape(**columns)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure import status
+from measure.estimators.registry import SYNONYMS
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
@@ -40,6 +41,9 @@ class Quadrilateral:
     noise, blur_px : float
         Standard deviation of a grey level and of the lens blur, px, as estimated from the image.
     status : str
+    p_value : float
+        Goodness of fit of straight sides, smooth faces, Gaussian blur and white noise, whichever estimator measured:
+        where it is below 1e-4 the status is ``misfit``. NaN where a lens bends the sides.
     """
 
     corners: np.ndarray
@@ -48,16 +52,17 @@ class Quadrilateral:
     noise: float
     blur_px: float
     status: str
+    p_value: float
 
 
-def measure_quadrilateral(image: np.ndarray, estimator: str = "strip", lens: Lens | None = None) -> Quadrilateral:
+def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", lens: Lens | None = None) -> Quadrilateral:
     """Find the most prominent quadrilateral and measure it.
 
     Parameters
     ----------
     image : array_like, shape (height, width)
         Grey levels.
-    estimator : {"strip", "polygon", "isophote", "gradient", "canny"}
+    estimator : {"strip", "arrangement", "isophote", "gradient", "canny"}
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
     lens : Lens, optional
         Intrinsics and distortion.
@@ -71,15 +76,28 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "strip", lens: Len
     corners, noise = find_quadrilateral(image), max(noise_sigma(image), np.sqrt(1 / 12))
     blur = edge_sigma(image, corners)
     optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
+    likeliest = SYNONYMS.get(estimator, estimator) == "arrangement" and lens is None
+    if likeliest:
+        shape = find_shape(image[None], polygon_layout(corners, optics), "arrangement")
+        if shape.status[0] in status.MEASURED:
+            return _reported(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]), shape.p_value[0])
     shape = find_shape(image[None], polygon_layout(corners, optics), "gradient")
     state = str(shape.status[0])
     if state in status.MEASURED and lens is not None:
         found = straight_corners(image, polygon_layout(lens.straighten(shape.corners[0]), optics), lens)
         return _reported(found.corners, found.covariance, noise, blur, state)
-    if state in status.MEASURED and estimator != "gradient":
-        near = polygon_layout(shape.corners[0], optics)
+    if state not in status.MEASURED:
+        return _reported(shape.corners[0], shape.covariance[0], noise, blur, state)
+    near = polygon_layout(shape.corners[0], optics)
+    whole = find_shape(image[None], near, "arrangement")
+    if likeliest:
+        shape = whole
+    elif estimator != "gradient":
         shape = find_shape(image[None], near, estimator, _threshold(shape))
-    return _reported(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]))
+    fits = status.MISFIT if status.MISFIT in whole.status else status.OK
+    return _reported(
+        shape.corners[0], shape.covariance[0], noise, blur, status.worst(str(shape.status[0]), fits), whole.p_value[0]
+    )
 
 
 def _threshold(shape) -> float:
@@ -87,9 +105,9 @@ def _threshold(shape) -> float:
     return float(max(shape.edge_contrast[0].min() / 9, 1e-6))
 
 
-def _reported(corners, covariance, noise: float, blur: float, state: str) -> Quadrilateral:
+def _reported(corners, covariance, noise: float, blur: float, state: str, p: float = float("nan")) -> Quadrilateral:
     values = _values(corners, covariance) if np.isfinite(corners).all() else ()
-    return Quadrilateral(corners, covariance, values, noise, blur, state)
+    return Quadrilateral(corners, covariance, values, noise, blur, state, float(p))
 
 
 def _values(corners: np.ndarray, covariance: np.ndarray) -> tuple[MeasuredValue, ...]:

@@ -1,37 +1,222 @@
-"""The Cramer-Rao bound: the smallest variance that any unbiased estimator can have."""
+"""The Cramer-Rao bound: the smallest variance that any unbiased estimator can have, given the whole picture.
+
+Free are the image positions of all visible vertices near the required edges (faces stay polygons), a linear level on
+each face, the background and, on request, the blur; each pixel near the required edges counts with its own noise.
+Besides the image something is `known`: a lit face's level is that of the light within its own size, and other vertices
+move with the required ones within a pixel. That decides in slivers, whose levels and ends an image hardly tells;
+elsewhere it changes nothing (`information(..., with_knowledge=False)` is the bound of the image alone).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from typing import NamedTuple
+
 import numpy as np
 
-from planner.features.circles import fisher_centre
-from planner.features.locator import information_bound
+from planner.features.measurand import Measurand, measurand, normals
+from planner.imaging.appearance import is_plain
+from planner.imaging.arrangement import arrangement_of, near_pixels, near_vertices
+from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.pictures import Pictures
-from planner.models.along import Along, integral
-from planner.models.errors import Errors, combined
+from planner.imaging.sensor import recorded
+from planner.models.edge_bound import edge_bound
+from planner.models.errors import Errors
+from scenes import Centre, Noise
+
+REACH = 32.0  # px from a required edge up to which pixels count; levels are hardly better known from more
+KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
+KNOWN_BLUR = 0.3  # of the blur: how well it is known
+FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
+_STILL = 0.01  # px: the same of vertices about which an image says nothing, so that they simply follow
+_UNTOLD = 1e3  # px, or the size of a level: a standard deviation at which nothing is known
+_LEAST = 1e-12  # information that is none
+_FURTHEST = 100.0  # px^2; what is known no better is not known, for the model is linear
+
+
+class Known(NamedTuple):
+    """What is known of a model's parameters before its image is seen: precision (q, q) and mean (q,)."""
+
+    precision: np.ndarray
+    mean: np.ndarray
+
+
+class Information(NamedTuple):
+    """What an image tells of the parameters of a model, and what is known of them without it.
+
+    Attributes
+    ----------
+    model : BlurredModel
+    fisher : ndarray, shape (q, q)
+        Fisher information of the image; a row and column of zeros where a parameter is held.
+    known : ndarray, shape (q, q)
+        Precision of what is known before.
+    """
+
+    model: BlurredModel
+    fisher: np.ndarray
+    known: np.ndarray
+
+    def covariance(self) -> np.ndarray:
+        """Smallest covariance of all parameters (q, q) over repeated images; large where nothing tells them.
+
+        That of the most likely parameters given image and knowledge, to first order: knowledge does not scatter.
+        """
+        held = np.diag(self.fisher) == 0
+        whole = self.fisher + np.where(held[:, None] | held, 0.0, self.known)
+        told = np.diag(whole)
+        some = told > _LEAST
+        scale = 1 / np.sqrt(np.where(some, told, 1.0))
+        weak = np.where(some, (scale / _UNTOLD) ** 2, 1.0)
+        inverse = np.linalg.inv(whole * scale[:, None] * scale + np.diag(weak))
+        inverse = inverse * scale[:, None] * scale * (some[:, None] & some)
+        return inverse - inverse @ (whole - self.fisher) @ inverse
+
+    def vertices(self) -> np.ndarray:
+        """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free."""
+        free, count = self.model.free, len(self.model.arrangement.vertices)
+        index = (2 * free[:, None] + [0, 1]).ravel()
+        whole = np.zeros((2 * count, 2 * count))
+        whole[np.ix_(index, index)] = self.covariance()[: index.size, : index.size]
+        return whole
+
+
+def information(
+    pictures: Pictures, *, free_blur: bool = False, reach: float = REACH, with_knowledge: bool = True
+) -> Information:
+    """What one picture tells of its arrangement.
+
+    Parameters
+    ----------
+    free_blur : bool
+        Whether the blur is unknown.
+    reach : float
+        How far from a required edge pixels count, px.
+    with_knowledge : bool
+        Whether `known` counts; the Cramer-Rao bound of the image alone if not.
+    """
+    scene, arrangement = pictures.scene, arrangement_of(pictures)
+    y, x = near_pixels(arrangement, (scene.camera.height, scene.camera.width), reach)
+    model = BlurredModel(arrangement, x, y, near_vertices(arrangement, reach + 6 * arrangement.blur_px))
+    nothing = np.zeros((model.count, model.count))
+    told = fisher(model, scene.noise, free_blur) if x.size else nothing
+    return Information(model, told, known(model).precision if with_knowledge else nothing)
+
+
+def known(model: BlurredModel, still: Collection[int] = (), follows: float = FOLLOWS) -> Known:
+    """What light and pose tell of the parameters without the image.
+
+    Levels of lit faces, and their slopes, to `KNOWN_LEVELS` of the level; vertices that end no required edge to
+    ``follows`` px beside the required ones, which may be anywhere, and the ``still`` ones of them beyond doubt; the
+    blur to `KNOWN_BLUR` of it.
+    """
+    arrangement, start = model.arrangement, model.start()
+    levels = [np.full(region.count, region.known / KNOWN_LEVELS**2) for region in arrangement.regions]
+    mean = [np.eye(region.count)[0] * region.known for region in arrangement.regions]
+    places = _following(model, still, follows)
+    precision = np.diag(np.concatenate([np.zeros(len(places)), *levels, [(KNOWN_BLUR * start.blur) ** -2]]))
+    precision[: len(places), : len(places)] = places
+    return Known(precision, np.concatenate([arrangement.vertices[model.free].ravel(), *mean, [start.blur]]))
+
+
+def _following(model: BlurredModel, still: Collection[int], follows: float) -> np.ndarray:
+    """Precision of the free vertices' places before, (2 F, 2 F), px^-2.
+
+    The ends of required edges may be anywhere; the others follow them as one shift, turn and scale would have it.
+    """
+    free, places = model.free, model.arrangement.vertices[model.free]
+    required = np.isin(free, model.arrangement.required)
+    x, y = (places - places.mean(0)).T if free.size else places.T
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    motion = np.stack([np.stack([one, zero, x, -y], -1), np.stack([zero, one, y, x], -1)], 1)  # (F, 2, 4)
+    follow = motion[~required].reshape(-1, 4) @ np.linalg.pinv(motion[required].reshape(-1, 4))
+    apart = np.zeros((follow.shape[0], 2 * free.size))
+    apart[:, np.repeat(~required, 2)] = np.eye(follow.shape[0])
+    apart[:, np.repeat(required, 2)] = -follow
+    sigma = np.where(np.isin(free[~required], list(still)), _STILL, follows)
+    apart = apart / np.repeat(sigma, 2)[:, None]
+    return apart.T @ apart
+
+
+def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | None = None) -> np.ndarray:
+    """Fisher matrix (q, q) at a state, the expected one when not given.
+
+    What the change of the noise's variance tells of the levels is left out.
+    """
+    image, jacobian = model.evaluate(state or model.start())
+    gain, variance = response(noise, image)
+    weighted = jacobian * (gain / np.sqrt(variance))[:, None]
+    if not free_blur:
+        weighted[:, -1] = 0
+    return weighted.T @ weighted
+
+
+def response(noise: Noise, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivative of the recorded level by the signal, and variance of the noise, at signals above darkness."""
+    level = image + noise.dark_level
+    step = 1e-3 * np.sqrt(noise.variance + noise.gain * np.maximum(image, 0) + 1e-12)
+    high, low = (recorded(noise, level + sign * step).level for sign in (1, -1))
+    variance = np.broadcast_to(recorded(noise, level).noise_variance, level.shape)
+    return (high - low) / (2 * step), np.maximum(variance, 1e-6 * noise.variance + 1e-300)
 
 
 def bound(pictures: Pictures) -> Errors:
-    """Information C^2 / (2 sqrt(pi) s_e s_n^2) per recorded px of each whole visible edge about its offset and tilt.
+    """The bound for arrays of pictures, one after the other.
 
-    s_n^2 is the mean of both sides' noise, which differs from the truth by second order in their difference.
+    Where things hide or shade each other, and of circles, it is that of each edge by itself.
     """
-    scene = pictures.scene
-    along = Along.of(pictures, trimmed=False)
-    nodes = along.nodes
-    with np.errstate(divide="ignore", invalid="ignore"):
-        density = information_bound(np.sqrt(along.squared), along.noise_variance, nodes.blur)
-        density = density * nodes.along / np.square(nodes.across)
-        total, first, second = (integral(density * nodes.t**power, nodes.length) for power in (0, 1, 2))
-        mean = first / total
+    alone = edge_bound(pictures)
+    features = pictures.scene.task.corners
+    if not is_plain(pictures.scene) or any(isinstance(feature, Centre) for feature in features):
+        return alone
+    known = alone.measurand
+    lead = alone.variance.shape
+    edges = len(known.view.names)
+    lines, variance = np.full((*lead, edges, 2, 2), np.inf), np.full(lead, np.inf)
+    for index in map(tuple, np.argwhere(np.isfinite(alone.variance))):
+        lines[index], variance[index] = _one(pictures, index, lead)
+    variance = np.where(variance < _FURTHEST * np.maximum(_unit(known), 1e-300), variance, np.inf)
 
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        lever = b - a * (nodes.middle[..., 0] + mean)
-        return a**2 / total + lever**2 / (second - first * mean)
+        return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
-    def centre(circle) -> np.ndarray:
-        density = information_bound(np.sqrt(circle.squared), circle.noise_variance, scene.camera.blur_px)
-        return fisher_centre(circle, density * circle.arc, None)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        in_object = variance / known.scale**2
+    in_object = np.where(np.isfinite(in_object), in_object, np.inf)
+    return Errors(known, variance, in_object, line_variance, alone.contrast, alone.noise_variance, ())
 
-    noise = np.mean(along.noise_variance * np.ones(1), -1)
-    return combined(pictures, line_variance, along.squared.mean(-1), noise, centre)
+
+def _unit(known: Measurand) -> np.ndarray:
+    """Largest squared derivative of the measurand by an edge's displacement at its ends: px^2 make units of it."""
+    lengths = np.where(known.view.lengths > 0, known.view.lengths, np.inf)
+    return np.maximum(known.offset**2, (known.tilt / lengths) ** 2).max(-1, initial=0.0)
+
+
+def _one(pictures: Pictures, index: tuple[int, ...], lead: tuple[int, ...]) -> tuple[np.ndarray, float]:
+    """Covariance of (displacement, rotation) of each line, (E, 2, 2), and variance of the measurand in one picture."""
+    pick = [np.broadcast_to(poses, (*lead, 2))[index] for poses in (pictures.sensors, *pictures.lights)]
+    one = Pictures(pictures.scene, pick[0], tuple(pick[1:]))
+    known = measurand(one)
+    edges = len(known.view.names)
+    if not known.view.visible.all():
+        return np.full((edges, 2, 2), np.inf), np.inf
+    told = information(one)
+    required = told.model.arrangement.required
+    if (required < 0).any():
+        return np.full((edges, 2, 2), np.inf), np.inf
+    rows = line_rows(known, required, len(told.model.arrangement.vertices))
+    covariance = told.vertices()
+    gradient = known.offset @ rows[:, 0] + known.tilt @ rows[:, 1]
+    lines = np.einsum("eki,ij,elj->ekl", rows, covariance, rows)
+    return lines, float(gradient @ covariance @ gradient)
+
+
+def line_rows(known: Measurand, required: np.ndarray, count: int) -> np.ndarray:
+    """Derivative of each line's displacement at its first end and of its rotation by all vertices, (E, 2, 2 count)."""
+    rows = np.zeros((len(required), 2, count, 2))
+    for e, (normal, length, (start, stop)) in enumerate(
+        zip(normals(known.view), known.view.lengths, required, strict=True)
+    ):
+        rows[e, 0, start] = normal
+        rows[e, 1, stop], rows[e, 1, start] = normal / length, -normal / length
+    return rows.reshape(len(required), 2, 2 * count)

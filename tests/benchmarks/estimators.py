@@ -84,7 +84,7 @@ def trial(corners, estimator: str, ratio: float, count: int, rng, blur: float = 
         shape = find_shape(noisy, layout, estimator, threshold)
         values.append(np.where(np.isin(shape.status, ("ok", "clutter")), diagonal(shape)[0], np.nan))
     values = np.concatenate(values)
-    covariance = corner_bound(layout, np.full(4, ratio * SIGMA), SIGMA**2)[np.ix_([0, 1, 4, 5], [0, 1, 4, 5])]
+    covariance = corner_bound(layout, ratio * SIGMA, SIGMA**2)[np.ix_([0, 1, 4, 5], [0, 1, 4, 5])]
     _, gradient = separation(corners[None, [0, 2]])
     good = values[np.isfinite(values)]
     return Trial(

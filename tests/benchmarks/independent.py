@@ -22,7 +22,7 @@ from tests.benchmarks.estimators import aligned_table
 from tests.galsim_images import box, box_corners, corner_bound, ellipse, ellipse_bound
 from tests.oracle import polygon_image
 
-ESTIMATORS = "polygon", "strip", "isophote", "gradient", "canny"
+ESTIMATORS = "arrangement", "strip", "isophote", "gradient", "canny"
 CONTRAST, BLUR = 100.0, 0.7
 _BATCH = 50
 

@@ -1,13 +1,17 @@
-"""``python -m tests.proofs kill`` and ``python -m tests.proofs rate``."""
+"""``python -m tests.proofs conditions``, ``crowded``, ``kill`` and ``rate``."""
 
 from __future__ import annotations
 
 import typer
 
+from tests.proofs.conditions import conditions
+from tests.proofs.crowded import crowded
 from tests.proofs.kill import kill
 from tests.proofs.rate import rate
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command()(conditions)
+app.command()(crowded)
 app.command()(kill)
 app.command()(rate)
 

@@ -123,13 +123,16 @@ def test_bad_scene_value_names_file_and_key(tmp_path):
 
 
 def test_calibrate_agrees_with_the_closed_form(tmp_path):
-    """kappa^2 of `gradient` within 10 % of the closed form; polygon within 12 % of the bound; a picture is written."""
-    done = ice("calibrate", "task1", "--images", "40", "-o", tmp_path / "c.png", "--json")
+    """kappa^2 of `gradient` within 10 % of the closed form; a picture is written.
+
+    `arrangement` has 0.87 of the bound of an edge by itself, all else known (400 images); 20 tell it to 4 %.
+    """
+    done = ice("calibrate", "task1", "--images", "20", "-o", tmp_path / "c.png", "--json")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     curves = {curve["name"]: curve for curve in document["curves"]}
     assert curves["gradient"]["kappa2"] == pytest.approx(document["closed_kappa2"], rel=0.1)
     assert curves["gradient"]["correlation_px"] == pytest.approx(document["closed_correlation_px"], rel=0.15)
-    assert 0.85 < curves["polygon"]["efficiency"] < 1.1
-    assert curves["canny"]["efficiency"] < curves["polygon"]["efficiency"]
+    assert 0.80 < curves["arrangement"]["efficiency"] < 1.1
+    assert curves["canny"]["efficiency"] < curves["arrangement"]["efficiency"]
     assert cv2.imread(str(tmp_path / "c.png")).std() > 10  # drawn, not blank

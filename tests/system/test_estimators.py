@@ -13,16 +13,16 @@ from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
 from scenes import Picture
 from tests.benchmarks.estimators import SHAPE, random_block, rectangle, trial, worst_bias
-from tests.oracle import polygon_image
+from tests.oracle import polygon_image, shaded_image
 
 
 @pytest.mark.parametrize(
     ("size", "ratio", "limit"),
     [((100, 60), 5, 1.10), ((100, 60), 20, 1.10), ((100, 60), 200, 1.10), ((40, 40), 20, 1.25), ((15, 15), 20, 1.25)],
 )
-def test_polygon_reaches_the_bound(rng, size, ratio, limit):
+def test_arrangement_reaches_the_bound(rng, size, ratio, limit):
     """Predicted and empirical variance over the bound; 1500 images, standard error 3.7 %."""
-    done = trial(rectangle(*size, 22), "polygon", ratio, 1500, rng)
+    done = trial(rectangle(*size, 22), "arrangement", ratio, 1500, rng)
     within = 4 * np.sqrt(2 / 1499)
     assert done.failed == 0
     assert 0.98 < done.predicted / done.bound < limit
@@ -40,7 +40,7 @@ def test_strip_comes_within_1_6_of_the_bound(rng, degrees):
 
 @pytest.mark.parametrize(
     ("estimator", "limit"),
-    [("strip", 1e-3), ("polygon", 1e-3), ("isophote", 5e-3), ("gradient", 0.02), ("canny", 0.02)],
+    [("strip", 1e-3), ("arrangement", 1e-3), ("isophote", 5e-3), ("gradient", 0.02), ("canny", 0.02)],
 )
 def test_noise_free_bias(estimator, limit):
     assert worst_bias(estimator, 2) < limit
@@ -88,31 +88,34 @@ def test_wrong_pose_is_absorbed(task1, estimator, shift, turn):
     image = polygon_image(corners, layout.optics.shape, 0.6, 150.0)[None]
     here, there = (find_shape(image, where, estimator) for where in (layout, layout.moved(shift, np.radians(turn))))
     assert there.status[0] in status.MEASURED
-    assert np.abs(there.corners - here.corners).max() < (0.001 if estimator in ("strip", "polygon") else 0.01)
+    assert np.abs(there.corners - here.corners).max() < (0.001 if estimator in ("strip", "arrangement") else 0.01)
 
 
 def test_each_image_is_measured_by_itself(rng):
-    """A stack in which every image is shifted otherwise gives what each image gives alone."""
+    """A stack in which every image is shifted otherwise gives what each image gives alone.
+
+    `arrangement` solves images around the place of another, to a fiftieth of a standard deviation.
+    """
     corners = rectangle(100, 60, 22)
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
     images = np.stack([polygon_image(corners + rng.uniform(-2.5, 2.5, 2), SHAPE, 0.7, 80.0) for _ in range(8)])
     images += 2 * rng.standard_normal(images.shape)
     for estimator in ESTIMATORS:
-        together = find_shape(images, layout, estimator).corners
+        together = find_shape(images, layout, estimator)
         alone = np.concatenate([find_shape(image[None], layout, estimator).corners for image in images])
-        assert together == pytest.approx(alone, abs=1e-9, nan_ok=True)
-        assert np.isfinite(together).all()
+        sigma = np.sqrt(np.diagonal(together.covariance, axis1=1, axis2=2)).reshape(alone.shape)
+        assert np.abs(together.corners - alone).max() < (0.02 * sigma.min() if estimator == "arrangement" else 1e-9)
 
 
 @pytest.mark.parametrize(("degrees", "limit"), [(30, 0.01), (20, 0.01), (10, 0.05)])
 def test_sharp_corner_is_trimmed_by_its_angle(degrees, limit):
-    """Noise-free error: `gradient` trims 3.5 sigma / sin(angle), `polygon` models the corner itself."""
+    """Noise-free error: `gradient` trims 3.5 sigma / sin(angle), `arrangement` models the corner itself."""
     a = np.radians(degrees)
     corners = np.array([[15.3, 20.2], [135.0, 20.2], [15.3 + 118 * np.cos(a), 20.2 + 118 * np.sin(a)]])
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
     image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
     assert np.abs(find_shape(image, layout, "gradient").corners[0, 0] - corners[0]).max() < limit
-    assert np.abs(find_shape(image, layout, "polygon").corners[0, 0] - corners[0]).max() < 1e-3
+    assert np.abs(find_shape(image, layout, "arrangement").corners[0, 0] - corners[0]).max() < 1e-3
 
 
 def test_flat_corner_is_ill_conditioned():
@@ -134,20 +137,19 @@ def test_very_short_edge(length):
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
     image = polygon_image(corners, SHAPE, 0.7, 100.0)[None]
     assert find_shape(image, layout, "gradient").status[0] == status.SHORT
-    found = find_shape(image, layout, "polygon")
+    found = find_shape(image, layout, "arrangement")
     assert found.status[0] in status.MEASURED
     assert np.abs(found.corners[0] - corners).max() < 0.02
 
 
 def ramped(start, stop, corners):
     """A face whose contrast changes linearly from left to right across the polygon."""
-    covered = polygon_image(corners, SHAPE, 0.7, 1.0)
-    x = np.arange(SHAPE[1])
-    level = np.interp(x, [corners[:, 0].min(), corners[:, 0].max()], [start, stop])
-    return 100 + covered * level
+    low, high = corners[:, 0].min(), corners[:, 0].max()
+    shade = [(corners, lambda x, y: start + (stop - start) * (x - low) / (high - low) + 0 * y)]
+    return 100 + shaded_image(shade, SHAPE, 0.7)
 
 
-@pytest.mark.parametrize(("estimator", "limit"), [("gradient", 0.06), ("strip", 0.01), ("polygon", 0.005)])
+@pytest.mark.parametrize(("estimator", "limit"), [("gradient", 0.06), ("strip", 0.01), ("arrangement", 0.005)])
 def test_contrast_that_varies_along_the_edge(estimator, limit):
     """Contrast 30 to 100 over 100 px; the slope of 0.7 grey levels a px moves the zero crossing, not the fits."""
     corners = rectangle(100, 60, 3)
@@ -185,7 +187,7 @@ def test_contrast_that_changes_sign(estimator):
 
 
 @pytest.mark.parametrize(
-    ("estimator", "limit"), [("gradient", 0.02), ("isophote", 5e-3), ("strip", 1e-3), ("polygon", 1e-3)]
+    ("estimator", "limit"), [("gradient", 0.02), ("isophote", 5e-3), ("strip", 1e-3), ("arrangement", 1e-3)]
 )
 def test_edge_that_leaves_the_image(estimator, limit):
     """Two edges cut by the border: what is visible gives their lines, and the corner outside follows from them."""
@@ -214,7 +216,7 @@ def test_any_kind_of_number(task1, kind):
     layout = layout_of(Picture.of(task1, (31, 137)))
     corners = np.array([layout.ends[0, 1], layout.ends[0, 0], layout.ends[1, 1], layout.ends[2, 0]])
     image = np.rint(polygon_image(corners, layout.optics.shape, 0.6, 150.0)).astype(kind)
-    assert measure.distance(image, task1, (31, 137), estimator="polygon").status == status.OK
+    assert measure.distance(image, task1, (31, 137), estimator="arrangement").status == status.OK
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
@@ -241,7 +243,7 @@ def test_an_edge_found_only_at_anothers_place_has_no_prediction(task1):
     """A block so small in the image that a required edge lies within the window of another: infinite, not NaN."""
     camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
     scene = task1.model_copy(update={"camera": camera})
-    image = render.image(scene, (20, 160), (40, 180))
-    found = measure.propagate(image, scene, (20, 160), (40, 180))
+    image = render.image(scene, (20, 150), (40, 180))
+    found = measure.propagate(image, scene, (20, 150), (40, 180))
     assert found.variance_px2 == np.inf
     assert found.status == status.ILL_CONDITIONED

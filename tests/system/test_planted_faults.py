@@ -72,7 +72,7 @@ def test_both_corners_errors_are_those_of_many_pictures(estimator, task1, clean)
     """
     count = 1500
     pictures = render.expose(clean, task1.noise, np.random.default_rng(7), count)
-    found = measure.distance(pictures, task1, SENSOR, estimator=estimator)
+    found = measure.distance(pictures, task1, SENSOR, LIGHT, estimator)
     assert (found.status == "ok").all()
     corners = found.corners.reshape(count, 4)
     told = found.covariance.mean(0)

@@ -34,7 +34,7 @@ def true_distance(corners):
 @pytest.mark.parametrize("sensor", [(20, 100), (31.3, 137.1), (45, 222.2), (12, 10), (52, 300), (0, 0)])
 @pytest.mark.parametrize(
     ("estimator", "tolerance"),
-    [("gradient", 0.006), ("canny", 0.006), ("isophote", 0.003), ("strip", 1e-3), ("polygon", 1e-3)],
+    [("gradient", 0.006), ("canny", 0.006), ("isophote", 0.003), ("strip", 1e-3), ("arrangement", 1e-3)],
 )
 def test_distance_at_subpixel_positions(task1, sensor, estimator, tolerance):
     """Noise-free error of the distance at edge positions and angles that fall anywhere between pixels."""
@@ -264,7 +264,7 @@ def test_bad_image(task1, image, line):
 
 def test_bad_locator(task1):
     with pytest.raises(
-        InvalidInput, match="estimator must be one of canny, gradient, isophote, strip, polygon, got 'sobel'"
+        InvalidInput, match="estimator must be one of canny, gradient, isophote, strip, arrangement, got 'sobel'"
     ):
         measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="sobel")
     with pytest.raises(InvalidInput, match="threshold must be greater than 0, got -1"):

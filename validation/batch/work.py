@@ -87,7 +87,8 @@ class Clean:
     propagated : dict
         Variance (px^2), distance in the image (px) and status, by method.
     predicted : dict
-        Variances that need no image, px^2 (``paper`` without its free scale), and the model's distance ``value_px``.
+        Variances that need no image, px^2 (``paper`` without its free scale), the model's distance ``value_px`` and the
+        classic locators' ``predicted_bias``, px.
     """
 
     image: Packed
@@ -191,15 +192,15 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     scene, picture = case.scene, case.picture
     predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
     numbers = {model: found.variance_px2 for model, found in predicted.items()}
-    numbers["value_px"] = predicted["calibrated"].value_px
+    numbers |= {"value_px": predicted["calibrated"].value_px, "predicted_bias": predicted["calibrated"].bias_px}
     clock.lap("predict")
     image = render.image(picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance)
     clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
     spread = float(planner.pose_spread(shaken, np.array([list(picture.sensor)])).variance[0])
-    propagated, measured = {}, picture.unlit()  # as it is measured
+    propagated = {}
     for method in methods(scene):
-        found = measure.propagate(image, measured, estimator=method.locator, threshold=method.threshold)
+        found = measure.propagate(image, picture, estimator=method.locator, threshold=method.threshold)
         propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
     clock.lap("propagate")
     return Clean(Packed.of(image), propagated, numbers, clock.seconds)
@@ -217,7 +218,7 @@ def measure_chunk(
     """
     cv2.setNumThreads(1)  # workers share the cores among themselves
     clock = _Clock()
-    scene, picture = case.scene, case.picture.unlit()
+    scene, picture = case.scene, case.picture
     where = measure.region_of_interest(picture)
     clock.lap("prepare")
     parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}

@@ -77,7 +77,7 @@ def measure_command(
         str | None, typer.Argument(metavar="[SCENE]", help="Scene that the image shows, if known.")
     ] = None,
     sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None,
-    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; helps strip and polygon.")] = None,
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; tells how bright each face is.")] = None,
     estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
@@ -92,7 +92,7 @@ def measure_command(
 
     picture = picture_file.read(file)
     if scene is None:
-        found = measure.measure_quadrilateral(picture, estimator or "strip", lens and measure.load_lens(lens))
+        found = measure.measure_quadrilateral(picture, estimator or "arrangement", lens and measure.load_lens(lens))
         say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
         raise typer.Exit(0 if found.measurands else 1)
     if sensor is None:
@@ -100,7 +100,8 @@ def measure_command(
     if lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
-    distance = measure.distance(picture, scenes.load(scene), *poses, estimator or "gradient", threshold)
+    known = scenes.load(scene)
+    distance = measure.distance(picture, known, *poses, estimator or measure.best_estimator(known), threshold)
     facts = {"file": str(file), **_distance_facts(distance)}
     say(facts, as_json, _distance_text(distance, facts["edges"]))
     raise typer.Exit(0 if np.isfinite(distance.value_px) else 1)
@@ -112,6 +113,7 @@ def _distance_facts(found: measure.Measurement) -> dict:
         "value_px": float(found.value_px) if good else None,
         "variance_px2": float(found.variance_px2) if good else None,
         "status": str(found.status),
+        "p_value": float(found.p_value) if np.isfinite(found.p_value) else None,
         "corners": found.corners.tolist() if good else None,
         "edges": [
             {
@@ -130,12 +132,17 @@ def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
     good = np.isfinite(found.value_px)
     value = f"{found.value_px:.4f} +- {np.sqrt(found.variance_px2):.4f} px (1 sigma)" if good else "not measured"
     told = ", ".join(f"{e['name']} {e['status']} ({e['used']} used, contrast {e['contrast']:.0f})" for e in edges)
-    return f"{value}, {found.status}\nedges: {told}"
+    return f"{value}, {found.status}{_fit(found.p_value)}\nedges: {told}"
+
+
+def _fit(p_value: float) -> str:
+    return f" (goodness of fit: p = {p_value:.2g})" if np.isfinite(p_value) else ""
 
 
 def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
     return {
         "status": found.status,
+        "p_value": found.p_value if np.isfinite(found.p_value) else None,
         "corners": found.corners.tolist() if found.measurands else None,
         "noise": found.noise,
         "blur_px": found.blur_px,
@@ -144,7 +151,8 @@ def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
 
 
 def _quadrilateral_text(found: measure.Quadrilateral) -> str:
-    lines = [f"quadrilateral: {found.status}; noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px"]
+    seen = f"noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px{_fit(found.p_value)}"
+    lines = [f"quadrilateral: {found.status}; {seen}"]
     if found.measurands:
         sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
         for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):

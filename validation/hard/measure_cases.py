@@ -18,7 +18,7 @@ from validation.hard.polygon import polygon_image
 from validation.hard.scenes_for import task1
 
 SENSOR, LIGHT = (31.3, 137.1), (15, 315)
-BIAS = {"gradient": 0.006, "canny": 0.006, "isophote": 0.003, "strip": 2e-3, "polygon": 2e-3}  # px, noise free
+BIAS = {"gradient": 0.006, "canny": 0.006, "isophote": 0.003, "strip": 2e-3, "arrangement": 2e-3}  # px, noise free
 _TOP = ("v4", "v3", "v7", "v6")
 _BY_ALL = (
     "black image",
@@ -109,7 +109,7 @@ def _refused() -> list[Case]:
     found = [
         distance(name, plain, image, estimator, False)
         for name, image in images.items()
-        for estimator in (measure.ESTIMATORS if name in _BY_ALL else ("gradient", "polygon"))
+        for estimator in (measure.ESTIMATORS if name in _BY_ALL else ("gradient", "arrangement"))
     ]
     one = task1(camera={"width": 1, "height": 1})
     found.append(distance("camera of 1 x 1 px", one, lambda: np.ones((1, 1)), "gradient", False))
@@ -155,12 +155,14 @@ def _shapes() -> list[Case]:
     found = []
     for pixels in (1, 2, 4, 8):
         corners = _quadrilateral(60.0, pixels, 90.0)
-        found += [_polygon(f"side of {pixels} px", corners, e, True) for e in ("gradient", "strip", "polygon")]
+        found += [_polygon(f"side of {pixels} px", corners, e, True) for e in ("gradient", "strip", "arrangement")]
     for degrees, right in ((30.0, True), (0.01, False)):
         corners = _quadrilateral(70.0, 40.0, degrees)
-        found += [_polygon(f"corner of {degrees:g} deg", corners, e, right) for e in ("gradient", "strip", "polygon")]
+        found += [
+            _polygon(f"corner of {degrees:g} deg", corners, e, right) for e in ("gradient", "strip", "arrangement")
+        ]
     blunt = _blunt(179.99)
-    found += [_polygon("corner of 179.99 deg", blunt, e, False) for e in ("gradient", "strip", "polygon")]
+    found += [_polygon("corner of 179.99 deg", blunt, e, False) for e in ("gradient", "strip", "arrangement")]
     return found
 
 

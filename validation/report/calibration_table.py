@@ -28,7 +28,7 @@ def table(found: Calibration) -> Table:
         f"calibrated model uses it. Bound of kappa^2 x length: {found.bound:.3f} px.\n"
         f"The paper's kappa^2 is {found.paper_kappa2}; the closed form gives that at a lens blur of "
         f"{blur_for(found.paper_kappa2, found.scale_px):.2f} px instead of {found.blur_px:g}.\n"
-        "floor: noise-free error of the points. strip and polygon find none: theirs is the variance "
+        "floor: noise-free error of the points. strip and arrangement find none: theirs is the variance "
         "of a line's middle, told at gradient's length."
     )
     made = Table(title=f"{found.scene}: position noise of the locators", caption=caption, box=None, padding=(0, 2))

@@ -13,11 +13,10 @@ from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.report import diagnostics, figures
-from validation.report.table import errors, failed, far, names, number, ratio, small
+from validation.report.table import errors, failed, far, names, number, ratio, shift, small
 from validation.statistics import ALLOWANCE, LEVEL, Verdict
 
 _ROWS = 64  # rows of the table of settings without a result
-_ERRORS = "bias, px", "rmse, px"
 
 
 @dataclass(frozen=True)
@@ -113,10 +112,20 @@ def _key(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found)
-    columns = [*key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", *_ERRORS, "status"]
+    columns = [
+        *key,
+        f"{rows[0].main.method}: measured / predicted [95 %]",
+        "images",
+        "failed",
+        "bias, px: predicted",
+        "measured",
+        "rmse, px",
+        "status",
+    ]
     lines = [
         [
-            *cells[row.index], ratio(row.main), str(row.main.n), failed(row), *errors(row.main), row.main.status,
+            *cells[row.index], ratio(row.main), str(row.main.n), failed(row),
+            shift(row.main.predicted_bias), *errors(row.main), row.main.status,
         ]
         for row in rows
     ]  # fmt: skip

@@ -112,16 +112,21 @@ def _ratios(found: Validation) -> Table:
     )
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
-        *headings, main, *others, "n", "failed", "bias px", "rmse px", "status",
+        *headings, main, *others, "n", "failed", "bias px\npred.", "\nmeas.", "rmse px", "status",
         caption="\n".join(filter(None, [caption, which])),
     )  # fmt: skip
     for row in rows:
         judged = {j.method: j for j in (row.main, *row.classic)}
         table.add_row(
             *cells[row.index], *(ratio(judged[name]) if name in judged else "-" for name in (main, *others)),
-            str(row.main.n), failed(row), *errors(row.main), row.main.status,
+            str(row.main.n), failed(row), shift(row.main.predicted_bias), *errors(row.main), row.main.status,
         )  # fmt: skip
     return table
+
+
+def shift(px: float | None) -> str:
+    """A bias, px."""
+    return "-" if px is None or math.isnan(px) else f"{px:+.4f}"
 
 
 def _search(found: Validation) -> Table:

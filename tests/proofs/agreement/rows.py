@@ -21,7 +21,7 @@ from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 
 KINDS = "calibrated", "propagated", "reported"
-ESTIMATORS = "gradient", "canny", "isophote", "strip", "polygon"
+ESTIMATORS = "gradient", "canny", "isophote", "strip", "arrangement"
 _BATCH = 50  # pictures held in memory at a time
 
 
@@ -99,7 +99,7 @@ class _Values(NamedTuple):
 def rows_of(place: Place, renders: int, seed: int, variant: str) -> list[Row]:
     """Render a setting, expose it ``renders`` times, measure by every estimator; one thread, at most 50 pictures held.
 
-    As `ice validate` measures: nobody tells the estimators where the light is.
+    As `ice validate` measures: the light is known.
     """
     cv2.setNumThreads(1)
     try:
@@ -116,7 +116,7 @@ def _rows(place: Place, renders: int, seed: int, variant: str) -> list[Row]:
     unknown, found = without_formula(scene, sensor, light), _measured(place, clean, renders, seed)
     rows = []
     for estimator in ESTIMATORS:
-        propagated = measure.propagate(clean, scene, sensor, None, estimator)
+        propagated = measure.propagate(clean, scene, sensor, light, estimator)
         values = found[estimator]
         good = np.isfinite(values.distance)
         several, any_ = good.sum() > 1, good.any()
@@ -148,7 +148,7 @@ def _measured(place: Place, clean: np.ndarray, renders: int, seed: int) -> dict[
         count = min(_BATCH, renders - first)
         pictures = render.expose(clean, place.scene.noise, place.rng(seed, batch), count)
         for estimator, found in parts.items():
-            found.append(measure.distance(pictures, place.scene, place.sensor, None, estimator))
+            found.append(measure.distance(pictures, place.scene, place.sensor, place.light, estimator))
     columns = "value_px", "variance_px2", "status"
     return {
         estimator: _Values(*(np.concatenate([getattr(part, column) for part in found]) for column in columns))

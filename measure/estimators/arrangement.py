@@ -1,0 +1,431 @@
+"""Maximum likelihood of all visible faces around the required edges together.
+
+Unknown are the image positions of all vertices near the required edges, a level on each face, the background and the
+blur; `planner.imaging.blurred` says what image they make. From the expected place Fisher scoring climbs to the
+likelihood's maximum, with the model evaluated anew at each step. Other images of the same stack are solved around the
+place found for one of them, to where an expansion of fourth order holds (`measure.estimators.expansion`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from measure.estimators.expansion import Expansion, Pieces, Solved
+from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
+from planner.imaging.blurred import BlurredModel, State
+from planner.imaging.sensor import recorded
+from planner.models.bound import Known, known, response
+from scenes import Noise
+
+REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
+_NEAREST = 8.0  # px: the same where edges are so long that `_MANY` pixels are used
+_MANY = 120_000
+_STEPS = 50
+_SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
+_LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum
+_STRIDE = 0.7  # px that a vertex may go in one step: about the width of an edge
+_BLURRED = 3.0  # times the expected blur at which steps are given up
+_LOST = 40.0  # px from the expected place at which they are
+_SETTLED = 1e-3  # of a standard deviation
+_ROUNDING = 1e-5  # of a chi-square: what is less is no difference
+_FREE = 1e3  # px: a standard deviation at which nothing is known
+_VALID = 0.02  # of a standard deviation: how large the highest order of an expansion may be
+_AROUND = 0.3  # of the blur: how far an end of a required edge may be from an expansion's centre
+_BATCH = 40  # images at a time, so that they stay in the processor's cache
+_ROUNDS = 4  # expansions before each image is measured alone
+
+
+class Point(NamedTuple):
+    """The likelihood at one state for one image.
+
+    Attributes
+    ----------
+    state : State
+    before : ndarray, shape (q,)
+        What was known of the parameters.
+    expected, weight, gain : ndarray, shape (P,)
+        Recorded level, one over the variance of its noise, its derivative by the signal.
+    jacobian : ndarray, shape (P, q)
+        Derivative of the signal by the parameters.
+    told : ndarray, shape (P,)
+        Derivative of the log likelihood by the signal.
+    fisher, score : ndarray, shape (q, q) and (q,)
+        Information and derivative of the log likelihood, what was known before included.
+    cost : float
+        Chi-square, and what the parameters' distance from what was known before adds.
+    """
+
+    state: State
+    before: np.ndarray
+    expected: np.ndarray
+    weight: np.ndarray
+    gain: np.ndarray
+    jacobian: np.ndarray
+    told: np.ndarray
+    fisher: np.ndarray
+    score: np.ndarray
+    cost: float
+
+
+class Fit(NamedTuple):
+    """The likelihood's maximum in one image.
+
+    Attributes
+    ----------
+    point : Point
+    inverse : ndarray, shape (q, q)
+        Of the information there.
+    settled : bool
+        Whether the steps ended.
+    rivalled : bool
+        Whether another maximum, elsewhere, explains the image within the noise as well.
+    """
+
+    point: Point
+    inverse: np.ndarray
+    settled: bool
+    rivalled: bool = False
+
+    @property
+    def state(self) -> State:
+        return self.point.state
+
+    @property
+    def cost(self) -> float:
+        return self.point.cost
+
+
+class Found(NamedTuple):
+    """Most likely parameters in n images.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, V, 2)
+    levels : ndarray, shape (n, L)
+    blur : ndarray, shape (n,)
+    squares : ndarray, shape (n, 3)
+        Chi-square near the pieces, elsewhere, and of bows in the pieces.
+    centre : ndarray of int, shape (n,)
+        Which of ``centres`` was expanded about.
+    settled : ndarray of bool, shape (n,)
+    centres : tuple of Centre
+    fit : Fit
+        Of the first image.
+    """
+
+    vertices: np.ndarray
+    levels: np.ndarray
+    blur: np.ndarray
+    squares: np.ndarray
+    centre: np.ndarray
+    settled: np.ndarray
+    centres: tuple[Centre, ...]
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """A state with what images near it need.
+
+    Attributes
+    ----------
+    state : State
+    expansion : Expansion
+    covariance : ndarray, shape (q, q)
+        Of the parameters' errors.
+    freedom : tuple of float
+        Degrees of freedom of each chi-square.
+    rivalled : bool
+        As in `Fit`.
+    """
+
+    state: State
+    expansion: Expansion
+    covariance: np.ndarray
+    freedom: tuple[float, float, float]
+    rivalled: bool
+
+
+Locate = Callable[[np.ndarray, np.ndarray], tuple[Fit, Centre]]
+"""The maximum in one image, from its used pixels (P,) and the whole of it (height, width)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArrangementEstimator:
+    """Prepared for one expected arrangement in images of one shape.
+
+    Attributes
+    ----------
+    arrangement : Arrangement
+    shape : tuple of int
+        (height, width).
+    noise : Noise
+    still : frozenset of int
+        Vertices that follow the required ones, because no piece that ends there is seen in the images.
+    """
+
+    arrangement: Arrangement
+    shape: tuple[int, int]
+    noise: Noise
+    still: frozenset[int] = frozenset()
+
+    @cached_property
+    def model(self) -> BlurredModel:
+        """The image at the pixels near the required edges."""
+        y, x = near_pixels(self.arrangement, self.shape, self._reach)
+        near = near_vertices(self.arrangement, self._reach + 6 * self.arrangement.blur_px)
+        return BlurredModel(self.arrangement, x, y, near)
+
+    @property
+    def _reach(self) -> float:
+        """Distance from a required edge up to which pixels are used, px: less where the edges are long."""
+        ends = self.arrangement.vertices[self.arrangement.required]
+        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+        return float(np.clip(_MANY / (2 * max(length, 1.0)), _NEAREST, REACH))
+
+    @cached_property
+    def pixels(self) -> np.ndarray:
+        """Flat indices of the pixels that it looks at."""
+        return self.model.y * self.shape[1] + self.model.x
+
+    @cached_property
+    def known(self) -> Known:
+        """What is known of (vertices, levels, blur) before, shapes (q, q) and (q,)."""
+        return known(self.model, self.still)
+
+    @cached_property
+    def prior(self) -> np.ndarray:
+        """Its precision, with next to nothing known of all else, so that everything has a most likely value."""
+        model, sigma = self.model, np.sqrt(max(self.noise.variance, 1e-12))
+        levels = [
+            np.full(region.count, (1e4 * sigma) ** -2 * (not region.known)) for region in self.arrangement.regions
+        ]
+        weak = np.concatenate([np.full(2 * model.free.size, _FREE**-2), *levels, [0.0]])
+        return self.known.precision + np.diag(weak)
+
+    def before(self, used: np.ndarray) -> np.ndarray:
+        """What is known of the parameters before (q,); levels that no light tells are about those of an image (P,)."""
+        mean, middle = self.known.mean.copy(), float(np.median(used)) - self.noise.dark_level
+        for region, levels in zip(self.arrangement.regions, self.arrangement.level_slices, strict=True):
+            mean[2 * self.model.free.size + levels.start] += 0.0 if region.known else middle
+        return mean
+
+    def parameters(self, state: State) -> np.ndarray:
+        """All parameters as one array (q,)."""
+        return np.concatenate([state.vertices[self.model.free].ravel(), state.levels, [state.blur]])
+
+    def taken(self, images: np.ndarray, order: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """The used pixels of images (n, height, width), (n, P)."""
+        return np.take(images.reshape(len(images), -1), self.pixels[order], 1).astype(float, copy=False)
+
+    def expected(self, state: State, derivatives: bool = True):
+        """Recorded level (P,), one over its noise's variance, its derivative by the signal, the signal's Jacobian."""
+        image, jacobian = self.model.evaluate(state, derivatives)
+        gain, variance = response(self.noise, image)
+        return recorded(self.noise, image + self.noise.dark_level).level, 1 / variance, gain, jacobian
+
+    def start(self, used: np.ndarray, vertices: np.ndarray | None = None) -> State:
+        """The expected place, or another, with the levels that fit one image (P,) best there."""
+        state = self.model.start()
+        state = state if vertices is None else state._replace(vertices=vertices)
+        design, precision, mean = self.model.design(state).T, self.prior, self.before(used)
+        weight = 1 / response(self.noise, np.maximum(used - self.noise.dark_level, 0))[1]
+        first, last = 2 * self.model.free.size, -1
+        known = precision[first:last, first:last]
+        matrix = design.T @ (design * weight[:, None]) + known
+        told = design.T @ (weight * (used - self.noise.dark_level)) + known @ mean[first:last]
+        return state._replace(levels=np.linalg.solve(matrix, told))
+
+    @property
+    def is_lit(self) -> bool:
+        """Whether the light says how bright each face is."""
+        return all(region.known for region in self.arrangement.regions[1:])
+
+    @cached_property
+    def reference(self) -> Centre:
+        """The expected state, where the light is known."""
+        state = self.model.start()
+        return self.centre(self.climb(self.expected(state, derivatives=False)[0], state))
+
+    def drawn(self, centre: Centre, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Errors of the parameters in ``count`` drawn images of a state, to first order and in full, both (n, q).
+
+        Always the same draws. NaN from the first on in which the steps do not end.
+        """
+        expected, weight, gain, jacobian = self.expected(centre.state)
+        half = np.random.default_rng(0).standard_normal((count // 2, len(expected)))
+        noise, truth = np.concatenate([half, -half]), self.parameters(centre.state)
+        linear = (noise * np.sqrt(weight) * gain) @ jacobian @ centre.expansion.inverse
+        full = np.full_like(linear, np.nan)
+        for row, part in zip(full, noise, strict=True):
+            fit = self.climb(expected + part / np.sqrt(weight), centre.state, truth)
+            if not fit.settled:
+                break
+            row[:] = self.parameters(fit.state) - truth
+        return linear, full
+
+    def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Fit:
+        """Fisher scoring from a state to the likelihood's maximum for one image (P,).
+
+        ``mean`` (q,) is what is known of the parameters before, that of `before` when not given.
+        """
+        mean = self.before(used) if mean is None else mean
+        point, damping, settled = self._point(used, state, mean), 0.0, False
+        for number in range(_STEPS):
+            matrix = point.fisher if number < _SCORED else self._newton(point)
+            point, settled, damping = self._step(used, point, matrix, damping, mean)
+            if settled or self._is_lost(point.state):
+                break
+        return Fit(point, _inverse(point.fisher), settled)
+
+    def _is_lost(self, state: State) -> bool:
+        """Whether the steps have gone where no measurement is."""
+        ends = np.unique(self.arrangement.required[self.arrangement.required >= 0])
+        away = np.abs(state.vertices[ends] - self.arrangement.vertices[ends]).max(initial=0.0)
+        return bool(state.blur > _BLURRED * self.model.start().blur or away > _LOST)
+
+    def _point(self, used: np.ndarray, state: State, mean: np.ndarray) -> Point:
+        """The likelihood and its derivatives at a state."""
+        precision, before = self.prior, mean - self.parameters(state)
+        expected, weight, gain, jacobian = self.expected(state)
+        away, weighted = used - expected, jacobian * (gain * weight)[:, None]
+        return Point(
+            state, mean, expected, weight, gain, jacobian,
+            told=gain * weight * away,
+            fisher=weighted.T @ (jacobian * gain[:, None]) + precision,
+            score=away @ weighted + precision @ before,
+            cost=float(away @ (weight * away) + before @ precision @ before),
+        )  # fmt: skip
+
+    def _newton(self, point: Point) -> np.ndarray:
+        """Second derivative of the cost (q, q) where it is positive: the residual bends it in slivers."""
+        pieces, small = Pieces.of(self.model, point.state), 1e-4 * np.eye(self.model.count)
+        rows = np.stack([rows @ point.told[pixels] for pixels, rows in zip(pieces.pixels, pieces.rows, strict=True)])
+        rows = np.broadcast_to(rows, (len(small), *rows.shape))
+        bent = (pieces.gradient(pieces.displaced(small), rows) - pieces.gradient(pieces.displaced(-small), rows)) / 2e-4
+        matrix, scale = point.fisher - (bent + bent.T) / 2, 1 / np.sqrt(np.diag(point.fisher))
+        return matrix if np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0] > _LEAST else point.fisher
+
+    def _step(self, used, point: Point, matrix, damping, mean) -> tuple[Point, bool, float]:
+        """The next point, by a step damped until the likelihood grows; whether it is the last; the damping."""
+        for _ in range(12):
+            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), point.score)
+            size = float(step @ matrix @ step)
+            there = self._point(used, self.model.moved(point.state, self._held_back(step)), mean)
+            if there.cost <= point.cost + _ROUNDING:
+                return there, size < _SETTLED**2, damping / 10 if damping > 1e-3 else 0.0
+            if size < _SETTLED**2:
+                return point, True, 0.0
+            damping = max(10 * damping, 1e-3)
+        return point, True, damping
+
+    def _held_back(self, step: np.ndarray) -> np.ndarray:
+        """A step (q,) no longer than what is known of vertices and blur is good for."""
+        vertices, blur = np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), abs(float(step[-1]))
+        return step / max(1.0, vertices / _STRIDE, blur / (0.5 * self.model.start().blur))
+
+    def centre(self, fit: Fit) -> Centre:
+        """Prepare a state for a stack of images."""
+        precision, point = self.prior, fit.point
+        first = 2 * self.model.free.size
+        expansion = Expansion.of(
+            Pieces.of(self.model, fit.state), point.expected, point.weight, point.gain, point.jacobian[:, first:],
+            fit.inverse, precision, point.before - self.parameters(fit.state),
+        )  # fmt: skip
+        spread = fit.inverse - fit.inverse @ self.known.precision @ fit.inverse
+        taken = np.trace(fit.inverse[first:, first:] @ expansion.gram_far)
+        fitted = len(precision) - (precision * fit.inverse).sum() - taken
+        near, far, bows = expansion.near, self.pixels.size - expansion.near, float(len(expansion.bows[1]))
+        return Centre(fit.state, expansion, spread, (near - fitted, max(far - taken, 0.0), bows), fit.rivalled)
+
+    def index(self, vertices: np.ndarray) -> np.ndarray:
+        """Where free vertices' x and y stand among the parameters."""
+        return (2 * np.searchsorted(self.model.free, vertices)[:, None] + [0, 1]).ravel()
+
+    def wherever(self, centre: Centre) -> np.ndarray:
+        """Covariance of the parameters (q, q) if nothing is known of vertices before but of those that are still."""
+        rest = known(self.model, self.still, follows=np.inf).precision
+        inverse = _inverse(_inverse(centre.expansion.inverse) - self.known.precision + rest)
+        return inverse - inverse @ rest @ inverse
+
+    def derivative(self, centre: Centre) -> np.ndarray:
+        """Derivative of the parameters by the pixels at a state, (q, P)."""
+        _, weight, gain, jacobian = self.expected(centre.state)
+        return centre.expansion.inverse @ (jacobian * (gain * weight)[:, None]).T
+
+    def find(self, images: np.ndarray, locate: Locate | None = None, known: Found | None = None) -> Found:
+        """Most likely parameters in images (n, height, width).
+
+        The first image is measured by itself; the others around it, as far as the expansion holds; the first that is
+        left by itself, and so on. ``known`` is what was found in the first image alone, if it was.
+        """
+        collected, left, centres, first_fit = _Collected(self, len(images)), np.arange(len(images)), [], None
+        while left.size:
+            image = images[left[0]]
+            used = self.taken(image[None])[0]
+            if known and not centres:
+                fit, centre = known.fit, known.centres[0]
+            else:
+                fit, centre = locate(used, image) if locate else self._locate(used)
+            first_fit = first_fit or fit
+            tried = left[: 1 if len(centres) >= _ROUNDS else left.size]
+            done = [self._around(images, tried[at : at + _BATCH], fit, centre, collected, len(centres), at == 0)
+                    for at in range(0, tried.size, _BATCH)]  # fmt: skip
+            centres.append(centre)
+            left = np.setdiff1d(left, np.concatenate(done))
+        return collected.found(tuple(centres), first_fit)
+
+    def _locate(self, used: np.ndarray) -> tuple[Fit, Centre]:
+        fit = self.climb(used, self.start(used))
+        return fit, self.centre(fit)
+
+    def _around(self, images, part, fit, centre, collected, number, first) -> np.ndarray:
+        """Solve some images around a centre and collect those for which it holds: which they are."""
+        solved = centre.expansion.solve(self.taken(images[part], centre.expansion.order))
+        good, settled = self._good(solved, centre), np.ones(part.size, bool)
+        if first:
+            good[0], settled[0], solved.steps[0] = True, fit.settled, 0.0
+        collected.add(part[good], self.parameters(fit.state) + solved.steps[good], solved.squares[good])
+        collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
+        return part[good]
+
+    def _good(self, solved: Solved, centre: Centre) -> np.ndarray:
+        """Where an expansion holds: required edges hardly move, and what is left out moves no measured corner."""
+        index, ends = self.index(self.arrangement.corners), self.index(np.unique(self.arrangement.required))
+        sigma = np.sqrt(np.maximum(np.diag(centre.covariance)[index], 1e-300))
+        near = np.abs(solved.steps[:, ends]) < _AROUND * np.hypot(centre.state.blur, np.sqrt(1 / 12))
+        return near.all(1) & (solved.left[:, index] < _VALID * sigma).all(1)
+
+
+class _Collected:
+    """What is found in n images, as it comes."""
+
+    def __init__(self, tool: ArrangementEstimator, count: int) -> None:
+        self.tool = tool
+        self.parameters = np.full((count, tool.model.count), np.nan)
+        self.squares = np.full((count, 3), np.nan)
+        self.owner, self.settled = np.zeros(count, int), np.zeros(count, bool)
+
+    def add(self, which: np.ndarray, parameters: np.ndarray, squares: np.ndarray) -> None:
+        self.parameters[which], self.squares[which] = parameters, squares
+
+    def found(self, centres: tuple[Centre, ...], fit: Fit) -> Found:
+        arrangement, free = self.tool.arrangement, self.tool.model.free
+        count, first = len(self.parameters), 2 * free.size
+        vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
+        vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
+        return Found(
+            vertices, self.parameters[:, first:-1], self.parameters[:, -1], self.squares, self.owner, self.settled,
+            centres, fit,
+        )  # fmt: skip
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a positive matrix whose rows differ much in size."""
+    scale = 1 / np.sqrt(np.diag(matrix))
+    return np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale

@@ -1,0 +1,365 @@
+"""Lines and corners from the most likely arrangement: they are its vertices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from measure import status
+from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit, Found
+from measure.features.alignment import align
+from measure.features.found import MIN_SINE, Shape, gather
+from measure.features.layout import Layout
+from measure.features.linearity import is_reliable
+from measure.goodness import WORST, p_value
+from planner.features.locator import MIN_USABLE
+from planner.imaging.sensor import full_scale
+
+_FURTHEST = 6.0  # px that an end of a required edge may be from where it is expected
+_APART = 0.5  # px between vertices of two different solutions
+_TELLING = 9.0  # of a chi-square: what tells one solution from another
+_SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it
+_BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
+
+
+@_BLAS.wrap(limits=1)
+def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
+    """Lines and corners in images (n, height, width)."""
+    if not _is_shown(tool, layout):
+        return _nothing(len(images), layout)
+    parts = [(which, _shape(images[which], layout, part)) for which, part in _parts(images, layout, tool)]
+    source, rows = np.zeros(len(images), int), np.zeros(len(images), int)
+    for number, (which, _) in enumerate(parts):
+        source[which], rows[which] = number, np.arange(which.size)
+    return gather([shape for _, shape in parts], source, rows)
+
+
+@_BLAS.wrap(limits=1)
+def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
+    """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
+    probability = np.full(len(images), np.nan)
+    if not _is_shown(tool, layout):
+        return probability
+    for which, part in _parts(images, layout, tool):
+        found, reliable = _find(images[which], layout, part)
+        if reliable:
+            probability[which] = _probabilities(found)
+    return probability
+
+
+def _parts(
+    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
+) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+    """Which images are measured with which tool."""
+    used = tool.taken(images)
+    beyond = ((used < 0) | (used > full_scale(tool.noise))).any(1)
+    groups = ((np.flatnonzero(~beyond), tool), (np.flatnonzero(beyond), _unclipped(tool)))
+    return [
+        (which[part], stilled)
+        for which, here in groups
+        if which.size
+        for part, stilled in _seen(images[which], layout, here)
+    ]
+
+
+def _seen(
+    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
+) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+    """Which images show what: where the light is not known, the images tell which faces are dark.
+
+    A vertex is free where a piece that ends there is seen; an image of a rigid arrangement tells which pieces are.
+    """
+    others = frozenset(tool.model.free.tolist()) - frozenset(tool.arrangement.required.ravel().tolist())
+    if tool.is_lit or not others:
+        return [(np.arange(len(images)), tool)]
+    rigid = _stilled(tool, others)
+    contrast, sigma = _contrasts(rigid, rigid.find(images, partial(locate, rigid, layout)))
+    seen, which = np.unique((np.abs(contrast) > _SEEN * sigma).any(-1), axis=0, return_inverse=True)
+    ends = tool.arrangement.pieces[_moving(tool)]
+    return [
+        (np.flatnonzero(which.ravel() == number), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
+        for number, pattern in enumerate(seen)
+    ]
+
+
+@lru_cache(maxsize=64)
+def _unclipped(tool: ArrangementEstimator) -> ArrangementEstimator:
+    """For images that go beyond the sensor's scale: they were not recorded by it, and nothing was cut off."""
+    noise = tool.noise
+    return replace(tool, noise=noise.model_copy(update={"bits": None, "sigma": float(np.sqrt(noise.variance))}))
+
+
+@lru_cache(maxsize=64)
+def _stilled(tool: ArrangementEstimator, still: frozenset[int]) -> ArrangementEstimator:
+    return replace(tool, still=still)
+
+
+def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
+    found, reliable = _find(images, layout, tool)
+    ends = found.vertices[:, tool.arrangement.required]
+    along = ends[:, :, 1] - ends[:, :, 0]
+    lengths = np.maximum(np.linalg.norm(along, axis=-1), 1e-12)
+    normals = np.stack([-along[..., 1], along[..., 0]], -1) / lengths[..., None]
+    corners = found.vertices[:, tool.arrangement.corners]
+    probability = _probabilities(found)
+    contrast, edge_status = _edges(tool, layout, found)
+    state = _states(tool, layout, found, normals, edge_status, reliable)
+    measured = np.isin(state, status.MEASURED)
+    covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
+    tilts = np.stack([_tilts(tool, centre) for centre in found.centres])[found.centre]
+    count = np.full(edge_status.shape, tool.pixels.size)
+    return Shape(
+        corners=np.where(measured[:, None, None], corners, np.nan),
+        covariance=np.where(measured[:, None, None], covariance, np.nan),
+        normals=normals,
+        points=ends[:, :, 0],
+        tilt_covariance=tilts,
+        status=state,
+        edge_status=edge_status,
+        edge_contrast=np.abs(contrast),
+        used=count,
+        rejected=np.zeros_like(count),
+        p_value=probability,
+    )
+
+
+def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Found, bool]:
+    """What is found in the images, and whether it can be relied on.
+
+    Judged where the light says the picture is, so that all images have one answer; else where the first one is that
+    shows what the model says. Where the answer is no, the first image stands for all: of others nothing else is told.
+    """
+    here = partial(locate, tool, layout)
+    first = tool.find(images[:1], here)
+    told = tool.is_lit or bool(_shows(tool, layout, first)[0])
+    if told and not _reliable(tool, first, 0):
+        each = np.zeros(len(images), int)
+        return first._replace(
+            **{key: getattr(first, key)[each] for key in first._fields if key not in ("centres", "fit")}
+        ), False
+    found = tool.find(images, here, first)
+    good = np.flatnonzero(_shows(tool, layout, found))
+    return found, bool(told or not good.size or _reliable(tool, found, good[0]))
+
+
+def _reliable(tool: ArrangementEstimator, found: Found, number: int) -> bool:
+    return _expected_reliable(tool) if tool.is_lit else is_reliable(tool, found.centres[found.centre[number]])
+
+
+def _shows(tool: ArrangementEstimator, layout: Layout, found: Found) -> np.ndarray:
+    """Whether each image shows all edges, and is what the model says, bool (n,)."""
+    return _fits(found) & np.isin(_edges(tool, layout, found)[1], status.MEASURED).all(1)
+
+
+def _fits(found: Found) -> np.ndarray:
+    """Whether the model explains each image, bool (n,)."""
+    return found.settled & (_probabilities(found) >= WORST)
+
+
+def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
+    return bool(layout.visible.all() and (tool.arrangement.required >= 0).all() and tool.pixels.size)
+
+
+def _probabilities(found: Found) -> np.ndarray:
+    return p_value(found.squares, np.array([centre.freedom for centre in found.centres])[found.centre])
+
+
+def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: np.ndarray) -> tuple[Fit, Centre]:
+    """The likelihood's maximum in one image: from the expected place, or from where the layout is sought anew.
+
+    The second is tried only where the first does not explain the image; the more likely one is taken.
+    """
+    fit = tool.climb(used, tool.start(used))
+    centre = tool.centre(fit)
+    if fit.settled and _near(tool, fit) and _probability(centre, used) >= WORST:
+        return fit, centre
+    x, y, turn = align(image[None], layout)[0]
+    if not (x or y or turn):
+        return fit, centre
+    moved = tool.arrangement.moved((x, y), turn, layout.ends.reshape(-1, 2).mean(0)).vertices
+    other = tool.climb(used, tool.start(used, moved))
+    best, rest = (other, fit) if (other.settled, -other.cost) > (fit.settled, -fit.cost) else (fit, other)
+    best = best._replace(rivalled=_rivals(tool, best, rest))
+    return best, tool.centre(best)
+
+
+def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
+    """Whether two maxima lie apart and the noise does not tell which is the right one."""
+    away = tool.parameters(rest.state) - tool.parameters(best.state)
+    apart = np.abs(away[: 2 * tool.model.free.size]).max(initial=0.0) > _APART
+    return bool(apart and rest.settled and rest.cost - best.cost < _TELLING)
+
+
+@_BLAS.wrap(limits=1)
+def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
+    """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
+    ((_, tool),) = _parts(clean[None], layout, tool)
+    _, centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
+    rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
+    rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]
+    return rows
+
+
+def _probability(centre: Centre, used: np.ndarray) -> float:
+    solved = centre.expansion.solve(used[None, centre.expansion.order])
+    return float(p_value(solved.squares, np.array(centre.freedom)[None])[0])
+
+
+def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
+    return bool(_moved(tool, fit.state.vertices[None])[0] < _FURTHEST)
+
+
+def _moved(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
+    """Farthest way that an end of a required edge is from its expected line, px, (n,)."""
+    required = tool.arrangement.required
+    expected = tool.arrangement.vertices[required]
+    along = expected[:, 1] - expected[:, 0]
+    normals = np.stack([-along[:, 1], along[:, 0]], 1) / np.linalg.norm(along, axis=1, keepdims=True)
+    away = np.einsum("neki,ei->nek", vertices[:, required] - expected, normals)
+    return np.nan_to_num(np.abs(away), nan=np.inf).max((1, 2))
+
+
+def _moving(tool: ArrangementEstimator) -> np.ndarray:
+    """Pieces that free vertices move."""
+    return np.flatnonzero(np.isin(tool.arrangement.pieces, tool.model.free).any(1))
+
+
+def _steps(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """What the levels make of the contrast at the start, the middle and the end of each moving piece, (N, 3, L)."""
+    steps = centre.expansion.pieces.contrast[:, :, 2 * tool.model.free.size : -1]
+    return np.einsum("tk,nkl->ntl", [[1, 0, 0], [1, 0.5, 0.25], [1, 1, 1]], steps)
+
+
+def _contrasts(tool: ArrangementEstimator, found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Contrast at the start, the middle and the end of each moving piece, and its standard deviation, (n, N, 3)."""
+    first = 2 * tool.model.free.size
+    value, sigma = [], []
+    for centre in found.centres:
+        rows = _steps(tool, centre)
+        value.append(rows)
+        sigma.append(np.sqrt(np.einsum("ntl,lm,ntm->nt", rows, centre.covariance[first:-1, first:-1], rows)))
+    return np.einsum("intl,il->int", np.stack(value)[found.centre], found.levels), np.stack(sigma)[found.centre]
+
+
+@lru_cache(maxsize=64)
+def _asked(tool: ArrangementEstimator) -> np.ndarray:
+    """Required edges that must be seen, bool (E,): all but those which the light says are too faint.
+
+    The vertices at the ends of such an edge are told by the other edges there, or `is_reliable` says that they are not.
+    """
+    edges = tool.arrangement.edges[_moving(tool)]
+    if not tool.is_lit:
+        return np.ones(len(tool.arrangement.required), bool)
+    steps = _steps(tool, tool.reference)[:, 1]
+    first = 2 * tool.model.free.size
+    sigma = np.sqrt(np.einsum("nl,lm,nm->n", steps, tool.reference.covariance[first:-1, first:-1], steps))
+    seen = np.abs(steps @ tool.reference.state.levels) >= 2 * _SEEN * sigma  # noise would decide nearer to it
+    return np.array([seen[edges == e].all() for e in range(len(tool.arrangement.required))])
+
+
+def _edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Contrast in the middle of each required edge and its status, both (n, E)."""
+    edges = tool.arrangement.edges[_moving(tool)]
+    contrast, sigma = _contrasts(tool, found)
+    middle, state = (
+        np.zeros((len(contrast), len(layout.names))),
+        np.full((len(contrast), len(layout.names)), status.OK, dtype=object),
+    )
+    shown = _shown(tool)
+    for e in range(len(layout.names)):
+        if not shown[e]:
+            state[:, e] = status.NOT_VISIBLE
+            continue
+        here, spread = contrast[:, edges == e], sigma[:, edges == e]
+        faint = (np.abs(here[..., 1]) < _SEEN * spread[..., 1]).any(1)
+        turns = (here > 2 * spread).any((1, 2)) & (here < -2 * spread).any((1, 2))
+        middle[:, e] = here[..., 1].mean(1)
+        state[:, e] = np.where(faint, status.LOW_CONTRAST, np.where(turns, status.SIGN_CHANGE, status.OK))
+    return middle, state.astype(str)
+
+
+def _shown(tool: ArrangementEstimator) -> np.ndarray:
+    """Whether enough of each required edge lies within the image, bool (E,)."""
+    arrangement, t = tool.arrangement, np.linspace(0, 1, 257)[:, None, None]
+    start, stop = arrangement.vertices[arrangement.required].swapaxes(0, 1)
+    places = arrangement.recorded(start + t * (stop - start))
+    inside = ((places >= 0) & (places <= np.array(tool.shape[::-1]) - 1)).all(-1)
+    return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
+
+
+def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) -> np.ndarray:
+    """Status of each image."""
+    first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
+    sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+    joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
+    told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
+    rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
+    turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
+    near = _moved(tool, found.vertices) < _FURTHEST
+    fits = np.where(near & _fits(found), status.OK, status.MISFIT)
+    runs = np.where(near, status.OK, status.LOW_CONTRAST)
+    faint = ~_asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
+    edge_status = np.where(faint, status.OK, edge_status)
+    each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
+    return np.array([status.worst(*row) for row in each])
+
+
+@lru_cache(maxsize=64)
+def _expected_reliable(tool: ArrangementEstimator) -> bool:
+    return is_reliable(tool, tool.reference)
+
+
+def _inverted(tool: ArrangementEstimator, vertices: np.ndarray) -> np.ndarray:
+    """Whether a face beside a required edge is turned inside out, (n,)."""
+    arrangement = tool.arrangement
+    beside = np.unique(arrangement.sides[arrangement.edges >= 0])
+    found = np.zeros(len(vertices), bool)
+    for region in beside[beside > 0]:
+        found |= _area(arrangement, region, vertices) <= 0
+    return found
+
+
+def _area(arrangement, region: int, vertices: np.ndarray) -> np.ndarray:
+    """Area of a region in the image, px^2, (n,)."""
+    sign = (arrangement.sides[:, 0] == region).astype(float) - (arrangement.sides[:, 1] == region)
+    a, b = (vertices[:, arrangement.pieces[:, end]] for end in (0, 1))
+    inside = sign != 0
+    return ((a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])[:, inside] * sign[inside]).sum(1) / 2
+
+
+def _corners(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    index = tool.index(tool.arrangement.corners)
+    return centre.covariance[np.ix_(index, index)]
+
+
+def _tilts(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """Covariance of the required lines' angles, rad^2, (E, E)."""
+    rows = np.zeros((len(tool.arrangement.required), len(centre.covariance)))
+    for e, pair in enumerate(tool.arrangement.required):
+        along = np.diff(centre.state.vertices[pair], axis=0)[0]
+        normal = np.array([-along[1], along[0]]) / (along @ along)
+        for vertex, sign in zip(pair, (-1, 1), strict=True):
+            rows[e, tool.index(np.array([vertex]))] += sign * normal
+    return rows @ centre.covariance @ rows.T
+
+
+def _nothing(count: int, layout: Layout) -> Shape:
+    edges, corners = len(layout.names), len(layout.corners)
+    none = np.zeros((count, edges), int)
+    state = np.where(layout.visible, status.OK, status.NOT_VISIBLE)
+    return Shape(
+        corners=np.full((count, corners, 2), np.nan),
+        covariance=np.full((count, 2 * corners, 2 * corners), np.nan),
+        normals=np.full((count, edges, 2), np.nan),
+        points=np.full((count, edges, 2), np.nan),
+        tilt_covariance=np.full((count, edges, edges), np.nan),
+        status=np.full(count, status.NOT_VISIBLE),
+        edge_status=np.tile(state, (count, 1)),
+        edge_contrast=np.zeros((count, edges)),
+        used=none,
+        rejected=none,
+        p_value=np.full(count, np.nan),
+    )

@@ -1,0 +1,193 @@
+"""How far a classic locator's result is off without any noise, in closed form.
+
+The zero crossing of the Gaussian second derivative is the edge's place only for a lone step between constant levels.
+Another edge within a few px, shading, and the end of the sensor's scale move it, by amounts that the image model knows,
+and with it the line through the crossings and the measurand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from planner.features.locator import CLEARANCE, edge_blur
+from planner.features.measurand import corner_response, measurand, normals
+from planner.features.sampling import sampled_line
+from planner.imaging.blurred_segment import Segments, second_and_third
+from planner.imaging.boundaries import Boundaries, Places, boundaries_near
+from planner.imaging.clipped_step import clipped
+from planner.imaging.lens import lens_jacobian
+from planner.imaging.lens import recorded as recorded_at
+from planner.imaging.pictures import Pictures
+from planner.imaging.sensor import recorded
+from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from planner.models.calibrated import calibrated
+from scenes import Corner, Scene
+
+_BLOCK = 256  # pictures at a time, so that their places stay in the processor's cache
+_FAR = 6.0  # standard deviations of the smoothed edge beyond which a boundary is not felt
+_STEPS = 5  # of Newton's method
+_LONGEST = 0.5  # px a step
+_SETTLED = 1e-4  # px: the next step would be its square
+MOST = 0.3  # standard deviations of the measurand: the largest bias of what is `ok`
+_NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
+_FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
+_STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
+
+
+@dataclass(frozen=True)
+class Bias:
+    """What is added to the result without noise, for pictures of leading shape (...).
+
+    Attributes
+    ----------
+    value : ndarray, shape (...)
+        Shift of the measurand in the image, px or degrees; NaN where it is not known: next to an edge's place there is
+        no zero crossing, or the task needs a circle.
+    lines : ndarray, shape (..., E, 2)
+        Displacement of each edge's line along its normal, at the edge's two ends, ideal px.
+    corners : ndarray, shape (..., 2, 2)
+        Shift of start and end corner (x, y), ideal px; NaN for what is no corner.
+    shares : ndarray, shape (..., E)
+        What each edge adds to ``value``.
+    disturbed : ndarray of bool, shape (..., E)
+        Edges of which neither bias nor variance are to be trusted: somewhere along them the crossing is far off, or
+        flatter or steeper than a lone step's, for errors by noise are divided by its slope; or an obstacle is near.
+    """
+
+    value: np.ndarray
+    lines: np.ndarray
+    corners: np.ndarray
+    shares: np.ndarray
+    disturbed: np.ndarray
+
+
+def bias(pictures: Pictures) -> Bias:
+    """Bias of the ``gradient`` locator (and nearly that of ``canny``), found once for each set of pictures."""
+    return pictures.once("bias", lambda: _in_blocks(pictures))
+
+
+def cluttered(pictures: Pictures) -> np.ndarray:
+    """Which edges have the status ``clutter``, bool, shape (..., E): the one rule of planner and measurement.
+
+    What lies around the edge disturbs its crossings, or the measurand's bias is above a quarter of its standard
+    deviation and the edge's share in it is no less than an equal one.
+    """
+    found = bias(pictures)
+    limit = _NEGLIGIBLE * np.sqrt(calibrated(pictures).variance)
+    with np.errstate(invalid="ignore"):
+        biased = np.abs(found.value) > limit
+        large = np.abs(found.shares) >= limit[..., None] / max(found.shares.shape[-1], 1)
+    return found.disturbed | (biased[..., None] & large)
+
+
+def _in_blocks(pictures: Pictures) -> Bias:
+    lead = np.broadcast_shapes(*(poses.shape[:-1] for poses in (pictures.sensors, *pictures.lights)))
+    flat = [np.broadcast_to(poses, (*lead, 2)).reshape(-1, 2) for poses in (pictures.sensors, *pictures.lights)]
+    parts = []
+    for first in range(0, max(len(flat[0]), 1), _BLOCK):
+        sensors, *lights = (poses[first : first + _BLOCK] for poses in flat)
+        with np.errstate(all="ignore"):
+            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights))))
+    whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Bias)}
+    return Bias(**{name: values.reshape((*lead, *values.shape[1:])) for name, values in whole.items()})
+
+
+def _bias(pictures: Pictures) -> Bias:
+    """For pictures with one leading axis."""
+    known = measurand(pictures)
+    nodes = place_nodes(pictures, known.view, used_trims(pictures, known.view, trimmed=True))
+    offset, steepness = _crossings(pictures, nodes, normals(known.view))
+    mean = offset @ NODE_WEIGHTS / 2
+    turn = 6 / nodes.length[..., 0] ** 2 * ((offset * nodes.t[..., 1:-1]) @ NODE_WEIGHTS)
+    by_pixels = _sampled(pictures, nodes)
+    mean, turn = mean + by_pixels[0], turn + by_pixels[1]
+    start = mean - turn * nodes.middle[..., 0]
+    shares = known.offset * start + known.tilt * turn
+    lines = np.stack([start, start + turn * known.view.lengths], -1)
+    disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(offset) <= _FARTHEST)).all(-1)
+    corners = _corners(pictures.scene, known.view, lines)
+    value = shares.sum(-1)
+    if pictures.scene.task.kind == "distance":
+        value = np.linalg.norm(np.diff(known.points + corners, axis=-2)[..., 0, :], axis=-1) - known.value
+    return Bias(value, lines, corners, shares, disturbed)
+
+
+def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
+    """Shifts (N, 2, 2) of both corners from the displacements (N, E, 2) of the lines at the edges' ends."""
+    found = np.full((len(lines), 2, 2), np.nan)
+    for k, feature in enumerate(scene.task.corners):
+        if isinstance(feature, Corner):
+            index = [view.names.index(name) for name in feature.edges]
+            vertex = scene.solid.vertex_names.index(feature.vertex)
+            end = [scene.solid.edge(name).ends.index(vertex) for name in feature.edges]
+            found[:, k] = np.einsum("nij,nj->ni", corner_response(normals(view)[:, index]), lines[:, index, end])
+    return found
+
+
+def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
+    """Mean shift, ideal px, and turn of each line by the sampling, (N, E); a bent edge is taken as its tangent."""
+    scene, view = pictures.scene, measurand(pictures).view
+    fraction = nodes.middle / view.lengths[..., None]
+    middle = view.ends[..., 0, :] + fraction * view.along
+    along = np.einsum("...ij,...j->...i", lens_jacobian(middle, scene.camera), view.along)
+    size = np.linalg.norm(along, axis=-1)
+    length = nodes.length[..., 0] * size / view.lengths
+    mean, turn = sampled_line(
+        recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px, scene.locator.scale_px
+    )
+    across = np.broadcast_to(nodes.across, nodes.t.shape).mean(-1)
+    return mean * across, turn * across * size / view.lengths
+
+
+def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place of the zero crossing across the edge, ideal px, and the slope there over the lone step's, (N, E, n)."""
+    scene, view = pictures.scene, measurand(pictures).view
+    fractions = (nodes.middle + nodes.t[..., 1:-1]) / view.lengths[..., None]
+    shape, scale = fractions.shape, scene.locator.scale_px
+    blur = np.broadcast_to(edge_blur(nodes.blur), nodes.t.shape)[..., 1:-1].ravel()
+    width = np.hypot(blur, scale)
+    widest = float(np.nanmax(width, initial=0.0))
+    near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * widest, CLEARANCE * widest)
+    contrast = np.zeros(width.size)
+    levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
+    contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
+    moved, slope = _zero(near, width, clipped(scene.noise, near, blur, scale))
+    steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
+    wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
+    across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
+    return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
+
+
+def _zero(near: Boundaries, width: np.ndarray, cut_off: Callable | None) -> tuple[np.ndarray, np.ndarray]:
+    """By Newton's method the move (M,), px, at which each place's second derivative is 0, and its slope there."""
+    moved, slope, live = np.zeros(width.size), np.zeros(width.size), np.ones(width.size, bool)
+    for _ in range(_STEPS):
+        rows = np.flatnonzero(live[near.place])
+        place = near.place[rows]
+        parts = second_and_third(Segments(*(part[rows] for part in near.segments)), moved[place], width[place])
+        value, steep = (np.bincount(place, part, width.size) for part in parts)
+        if cut_off is not None:
+            value, steep = (a + b for a, b in zip((value, steep), cut_off(moved), strict=True))
+        slope[live] = steep[live]
+        step = np.where(live, np.clip(value / steep, -_LONGEST, _LONGEST), 0.0)
+        moved = moved - step
+        live = np.abs(step) > _SETTLED
+        if not live.any():
+            break
+    return moved, slope
+
+
+def _places(pictures: Pictures, fractions: np.ndarray, normal: np.ndarray) -> Places:
+    """The nodes as places of the recorded image; ``normal`` (N, E, 2) is that of the edges' ideal images."""
+    camera, view = pictures.scene.camera, measurand(pictures).view
+    lens = lens_jacobian(view.ends[..., :1, :] + fractions[..., None] * view.along[..., None, :], camera)
+    normal = np.broadcast_to(normal[..., None, :], lens.shape[:-1])
+    if camera.lens.bends:
+        tangent = np.einsum("...ij,...j->...i", lens, np.stack([normal[..., 1], -normal[..., 0]], -1))
+        tangent = tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
+        normal = np.stack([-tangent[..., 1], tangent[..., 0]], -1)
+    tangent = np.stack([normal[..., 1], -normal[..., 0]], -1)
+    return Places(view.names, fractions, np.stack([tangent, normal], -2), lens)

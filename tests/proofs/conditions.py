@@ -1,0 +1,154 @@
+"""Photographs that are not what the picture's model says: is the result unbiased with a true sigma, or not ``ok``?
+
+A quadrilateral on a background, exactly blurred and pixel-averaged, contrast over noise 90, and one thing wrong with it
+at a time. Optics and noise are estimated from each image, as `ice measure PHOTO` does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+
+import measure
+from tests.oracle import polygon_image
+
+SHAPE = (200, 260)
+CORNERS = np.array([[61.3, 52.2], [201.6, 63.9], [190.4, 150.7], [50.8, 139.1]])
+CONTRAST, NOISE, BLUR, BACKGROUND = 135.0, 1.5, 0.8, 50.0
+
+
+def _clean(blur: float = BLUR) -> np.ndarray:
+    return BACKGROUND + CONTRAST / 100 * polygon_image(CORNERS, SHAPE, blur)
+
+
+def _noisy(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    return np.clip(np.rint(image + NOISE * rng.standard_normal(SHAPE)), 0, 255)
+
+
+def _plain(rng):
+    return _noisy(_clean(), rng)
+
+
+def _motion(rng):
+    return _noisy(cv2.blur(_clean(), (6, 1), borderType=cv2.BORDER_REPLICATE), rng)
+
+
+def _gamma(rng):
+    return np.clip(np.rint(255 * ((_clean() + NOISE * rng.standard_normal(SHAPE)).clip(0) / 255) ** 0.45), 0, 255)
+
+
+def _jpeg(rng):
+    good, packed = cv2.imencode(".jpg", _plain(rng).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 90])
+    assert good
+    return cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE).astype(float)
+
+
+def _vignette(rng):
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    away = np.hypot(x - SHAPE[1] / 2, y - SHAPE[0] / 2) / np.hypot(*SHAPE) * 2
+    return _noisy(_clean() * (1 - 0.3 * away**2), rng)
+
+
+def _texture(rng):
+    grain = cv2.GaussianBlur(rng.standard_normal(SHAPE), (0, 0), 1.5)
+    return _noisy(_clean() + 10 * grain / grain.std(), rng)
+
+
+@lru_cache(maxsize=1)
+def _bent() -> np.ndarray:
+    middle = np.array(SHAPE[::-1]) / 2
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    away = np.stack([x, y], -1) - middle
+    bent = middle + away * (1 + 0.01 * (away**2).sum(-1, keepdims=True) / (middle**2).sum())
+    fine = BACKGROUND + CONTRAST / 100 * polygon_image(4 * CORNERS + 1.5, (4 * SHAPE[0], 4 * SHAPE[1]), 4 * BLUR)
+    return cv2.remap(fine, (4 * bent + 1.5).astype(np.float32), None, cv2.INTER_CUBIC)
+
+
+def _distorted(rng):
+    return _noisy(_bent(), rng)
+
+
+def _poisson(rng):
+    clean = _clean()
+    return np.clip(np.rint(clean + np.sqrt(NOISE**2 + 0.15 * clean) * rng.standard_normal(SHAPE)), 0, 255)
+
+
+def _sharpened(rng):
+    image = _plain(rng)
+    return np.clip(np.rint(image + (image - cv2.GaussianBlur(image, (0, 0), 1.0))), 0, 255)
+
+
+def _smoothed(rng):
+    return np.rint(cv2.GaussianBlur(_plain(rng), (0, 0), 0.6))
+
+
+CONDITIONS = {
+    "as the model says": _plain, "motion blur 6 px": _motion, "gamma 0.45": _gamma, "JPEG 90": _jpeg,
+    "vignette 30 %": _vignette, "texture of sd 10": _texture, "distortion 1 %": _distorted,
+    "Poisson noise": _poisson, "sharpened": _sharpened, "smoothed": _smoothed,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Diagonals in ``count`` images: bias, px, largest of both, of the images that are ok (of all where none is),
+    their scatter over the told sigma, and how many are ok."""
+
+    bias: float
+    told: float
+    scatter_over_told: float
+    ok: int
+    count: int
+    statuses: dict[str, int]
+
+    @property
+    def honest(self) -> bool:
+        """At most a twentieth of the images are ok, or the ok ones are unbiased and scatter as told."""
+        if self.ok <= 0.05 * self.count:
+            return True
+        error = 1 / np.sqrt(2 * max(self.ok - 1, 1))
+        return (
+            self.bias < (0.3 + 4 / np.sqrt(self.ok)) * self.told and abs(self.scatter_over_told - 1) < 0.1 + 4 * error
+        )
+
+
+def outcome(name: str, estimator: str, count: int, rng: np.random.Generator) -> Outcome:
+    """Measure ``count`` images of one condition."""
+    true = [np.linalg.norm(CORNERS[i] - CORNERS[i + 2]) for i in (0, 1)]
+    found = [measure.measure_quadrilateral(CONDITIONS[name](rng), estimator) for _ in range(count)]
+    states = [one.status for one in found]
+    ok = sum(state == "ok" for state in states)
+    used = [one for one in found if one.measurands and (one.status == "ok" or not ok)]
+    diagonals = np.array([[m.value for m in one.measurands if m.name.startswith("diagonal")] for one in used])
+    sigma = np.array([[m.sigma for m in one.measurands if m.name.startswith("diagonal")] for one in used]).mean(0)
+    scatter = diagonals.std(0, ddof=1) / sigma if len(used) > 1 else np.full(2, np.nan)
+    worst = int(np.argmax(np.abs(np.log(np.nan_to_num(scatter, nan=1.0)))))
+    counts = {state: states.count(state) for state in sorted(set(states))}
+    return Outcome(
+        float(np.abs(diagonals.mean(0) - true).max()), float(sigma.max()), float(scatter[worst]), ok, count, counts
+    )
+
+
+def conditions(
+    count: Annotated[int, typer.Option(help="Images a condition.")] = 40,
+    seed: Annotated[int, typer.Option()] = 1,
+    estimators: Annotated[str, typer.Option(help="Comma-separated.")] = "arrangement,strip,gradient",
+) -> None:
+    """Measure photographs with one thing wrong at a time; exit status 1 if one is called ok that is not."""
+    rng, honest = np.random.default_rng(seed), True
+    print(f"{'condition':18s} {'estimator':12s} bias px  told px  scatter/told  honest  statuses")
+    for name in CONDITIONS:
+        for estimator in estimators.split(","):
+            found = outcome(name, estimator, count, rng)
+            honest &= found.honest
+            print(
+                f"{name:18s} {estimator:12s} {found.bias:7.4f} {found.told:8.4f} {found.scatter_over_told:13.2f}"
+                f"  {'yes' if found.honest else 'NO':6s}  {found.statuses}",
+                flush=True,
+            )
+    raise typer.Exit(0 if honest else 1)
