@@ -30,7 +30,9 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     """Lines and corners in images (n, height, width)."""
     if not _is_shown(tool, layout):
         return _nothing(len(images), layout)
-    parts = [(which, _shape(images[which], layout, part)) for which, part in _parts(images, layout, tool)]
+    parts = [(which, _shape(some, layout, part)) for which, some, part in _parts(images, layout, tool)]
+    if len(parts) == 1:
+        return parts[0][1]
     source, rows = np.zeros(len(images), int), np.zeros(len(images), int)
     for number, (which, _) in enumerate(parts):
         source[which], rows[which] = number, np.arange(which.size)
@@ -43,45 +45,58 @@ def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> 
     probability = np.full(len(images), np.nan)
     if not _is_shown(tool, layout):
         return probability
-    for which, part in _parts(images, layout, tool):
-        found, reliable = _find(images[which], layout, part)
+    for which, some, part in _parts(images, layout, tool):
+        found, reliable = _find(some, layout, part)
         if reliable:
             probability[which] = _probabilities(found)
     return probability
 
 
-def _parts(
-    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
-) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+Part = tuple[np.ndarray, np.ndarray, ArrangementEstimator]
+"""Numbers of some images, (m,), those images, and the tool that measures them."""
+
+
+def _parts(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> list[Part]:
     """Which images are measured with which tool."""
-    used = tool.taken(images)
-    beyond = ((used < 0) | (used > full_scale(tool.noise))).any(1)
+    beyond = _is_beyond(images, tool)
     groups = ((np.flatnonzero(~beyond), tool), (np.flatnonzero(beyond), _unclipped(tool)))
     return [
-        (which[part], stilled)
+        (which[part], some, stilled)
         for which, here in groups
         if which.size
-        for part, stilled in _seen(images[which], layout, here)
+        for part, some, stilled in _seen(_some(images, which), layout, here)
     ]
 
 
-def _seen(
-    images: np.ndarray, layout: Layout, tool: ArrangementEstimator
-) -> list[tuple[np.ndarray, ArrangementEstimator]]:
+def _is_beyond(images: np.ndarray, tool: ArrangementEstimator) -> np.ndarray:
+    """Which images go beyond the sensor's scale, bool (n,)."""
+    most = full_scale(tool.noise)
+    if np.isinf(most) or (images.min() >= 0 and images.max() <= most):
+        return np.zeros(len(images), bool)
+    used = tool.taken(images)
+    return ((used < 0) | (used > most)).any(1)
+
+
+def _some(images: np.ndarray, which: np.ndarray) -> np.ndarray:
+    return images if which.size == len(images) else images[which]
+
+
+def _seen(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> list[Part]:
     """Which images show what: where the light is not known, the images tell which faces are dark.
 
     A vertex is free where a piece that ends there is seen; an image of a rigid arrangement tells which pieces are.
     """
     others = frozenset(tool.model.free.tolist()) - frozenset(tool.arrangement.required.ravel().tolist())
     if tool.is_lit or not others:
-        return [(np.arange(len(images)), tool)]
+        return [(np.arange(len(images)), images, tool)]
     rigid = _stilled(tool, others)
     contrast, sigma = _contrasts(rigid, rigid.find(images, partial(locate, rigid, layout)))
     seen, which = np.unique((np.abs(contrast) > _SEEN * sigma).any(-1), axis=0, return_inverse=True)
     ends = tool.arrangement.pieces[_moving(tool)]
+    groups = [np.flatnonzero(which.ravel() == number) for number in range(len(seen))]
     return [
-        (np.flatnonzero(which.ravel() == number), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
-        for number, pattern in enumerate(seen)
+        (group, _some(images, group), _stilled(tool, others - frozenset(ends[pattern].ravel().tolist())))
+        for group, pattern in zip(groups, seen, strict=True)
     ]
 
 
@@ -196,7 +211,7 @@ def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
 @_BLAS.wrap(limits=1)
 def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
-    ((_, tool),) = _parts(clean[None], layout, tool)
+    ((_, _, tool),) = _parts(clean[None], layout, tool)
     _, centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
     rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
     rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]

@@ -11,7 +11,7 @@ from measure.estimators.registry import SYNONYMS
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
-from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
+from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma, refined
 from measure.photo.lens import Lens, straight_corners
 from scenes.arrays import picture
 
@@ -73,7 +73,7 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
         If there is no quadrilateral, or the image is no image.
     """
     image = picture(image)
-    corners, noise = find_quadrilateral(image), max(noise_sigma(image), np.sqrt(1 / 12))
+    corners, noise = refined(image, find_quadrilateral(image)), max(noise_sigma(image), np.sqrt(1 / 12))
     blur = edge_sigma(image, corners)
     optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
     likeliest = SYNONYMS.get(estimator, estimator) == "arrangement" and lens is None

@@ -21,6 +21,8 @@ from scenes import Camera, Corner, Edge, Solid
 
 BACKGROUND = 0  # the region outside everything
 _DEGREE = 4  # of the polynomial that a known shading is told by
+_WIDE, _NARROW = 6.0, 2.0  # px: half widths of a face from which its shading has degree 4 and 2 across it, else 1
+_SQUARE = np.cos(np.pi * np.arange(9) / 8)
 _GRID = np.linspace(0.02, 0.98, 7)
 _CURVED = 30.0  # px: faces larger than this may shade quadratically where the light is not known
 _OUTSIDE = 2.0  # reaches from the middle, beyond which a level is held: it counts for nothing there
@@ -84,8 +86,14 @@ class Region:
     def shaded(cls, points: np.ndarray, levels: np.ndarray) -> Region:
         """A region with known levels (n,) at recorded places (n, 2)."""
         plain = cls.flat(points, 1)
-        x, y = ((points - plain.middle) / plain.reach).T
-        shade = np.linalg.lstsq(_terms(x, y, _DEGREE).T, levels, rcond=None)[0]
+        axes = np.linalg.svd(points - points.mean(0), full_matrices=False)[2] / plain.reach
+        across = (points - plain.middle) @ axes.T
+        most = [_degree_across(half * plain.reach) for half in np.ptp(across, axis=0) / 2]
+        powers = [(i, j) for i, j in _powers(_DEGREE) if i <= most[0] and j <= most[1]]
+        told = np.linalg.lstsq(_products(across, powers), levels, rcond=None)[0]
+        square = np.stack(np.meshgrid(_SQUARE, _SQUARE), -1).reshape(-1, 2)  # the same polynomial in x and y
+        values = _products(square @ (axes * plain.reach).T, powers) @ told
+        shade = np.linalg.lstsq(_terms(*square.T, _DEGREE).T, values, rcond=None)[0]
         return replace(plain, shade=shade, known=True)
 
 
@@ -250,6 +258,16 @@ def spread(corners: np.ndarray) -> np.ndarray:
     u, v = (part.ravel()[:, None] for part in np.meshgrid(_GRID, _GRID))
     middle, pairs = corners.mean(0), pairwise([*corners, corners[0]])
     return np.concatenate([middle + u * ((1 - v) * (a - middle) + v * (b - middle)) for a, b in pairs])
+
+
+def _degree_across(half: float) -> int:
+    """Degree of a shading along an axis on which a face is twice so many px wide: no more than its width can tell."""
+    return _DEGREE if half >= _WIDE else 2 if half >= _NARROW else 1
+
+
+def _products(points: np.ndarray, powers: list[tuple[int, int]]) -> np.ndarray:
+    """u^i v^j at points (n, 2), (n, powers)."""
+    return np.stack([points[:, 0] ** i * points[:, 1] ** j for i, j in powers], 1)
 
 
 def _degree(count: int) -> int:

@@ -156,8 +156,9 @@ def response(noise: Noise, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     level = image + noise.dark_level
     step = 1e-3 * np.sqrt(noise.variance + noise.gain * np.maximum(image, 0) + 1e-12)
     high, low = (recorded(noise, level + sign * step).level for sign in (1, -1))
+    gain = np.ones_like(level) if noise.bits is None else (high - low) / (2 * step)  # nothing is cut off without bits
     variance = np.broadcast_to(recorded(noise, level).noise_variance, level.shape)
-    return (high - low) / (2 * step), np.maximum(variance, 1e-6 * noise.variance + 1e-300)
+    return gain, np.maximum(variance, 1e-6 * noise.variance + 1e-300)
 
 
 def bound(pictures: Pictures) -> Errors:

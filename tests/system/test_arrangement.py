@@ -198,3 +198,15 @@ def test_each_image_tells_by_itself_what_is_dark(task1):
         assert alone.status == status.OK
         assert value == pytest.approx(alone.value_px, abs=0.02 * np.sqrt(alone.variance_px2))
         assert variance == pytest.approx(alone.variance_px2, rel=0.05)
+
+
+def test_derivatives_where_light_grazes_a_sliver(task1):
+    """A face seen 1 px wide: with a shading of degree 4 across it the derivatives were 90 times off."""
+    sensor, light = (66.70931190905335, 82.16066300746672), (56.36286340910322, 16.79795656482396)
+    model = information(Pictures(task1, np.array(sensor), (np.array(light),))).model
+    state, step = model.start(), 1e-3 * np.eye(model.count)
+    _, jacobian = model.evaluate(state)
+    for number in range(2 * model.free.size):
+        high, low = (model.image(model.moved(state, sign * step[number])) for sign in (1, -1))
+        away = (high - low) / 2e-3 - jacobian[:, number]
+        assert np.linalg.norm(away) < 0.1 * np.linalg.norm(jacobian[:, number])
