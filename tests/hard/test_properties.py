@@ -87,7 +87,7 @@ def conditioned(scene, sensor, light, model):
 
 def same(scene, sensor, light, model, expected, status):
     value, found = predicted(scene, sensor, light, model)
-    assert value == pytest.approx(expected, rel=1e-9 if model == "bound" else RELATIVE, abs=0)
+    assert value == pytest.approx(expected, rel=RELATIVE, abs=0)
     assert found == status
 
 
