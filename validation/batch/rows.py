@@ -163,15 +163,18 @@ class Rows(Sequence[Row]):
                 some = np.flatnonzero(self._records["kind"] == kind)
                 rows.append(some)
                 places.append(np.full(some.size, 0 if method is None else names.index(method)))
-        chosen = np.concatenate(rows)
+        chosen, place = np.concatenate(rows), np.concatenate(places)
         order = np.argsort(chosen, kind="stable")
-        records, chosen = self._records["judged"], chosen[order]
-        some = records[chosen, np.concatenate(places)[order]]
-        stray = some["failures"].sum(-1) <= statistics.STRAY * some["n"]
+        chosen, place = chosen[order], place[order]
+
+        def numbers(name: str) -> np.ndarray:
+            return self._records["judged"][name][chosen, place]
+
+        found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
+        stray = numbers("failures").sum(-1) <= statistics.STRAY * found["n"]
         return {
-            **{name: some[name] for name in ("propagated", "empirical", "bias", "n", "failed")},
-            "ratio": self._ratio(some), "predicted_bias": self._records["predicted_bias"][chosen],
-            "ok": stray & (some["clean"] == _STATUSES.index("ok")),
+            **found, "ratio": self._ratio(found), "predicted_bias": self._records["predicted_bias"][chosen],
+            "ok": stray & (numbers("clean") == _STATUSES.index("ok")),
         }  # fmt: skip
 
     @property
@@ -180,7 +183,7 @@ class Rows(Sequence[Row]):
         return list(dict.fromkeys(name for _, names in self._kinds for name in names[1:]))
 
     @staticmethod
-    def _ratio(judged: np.ndarray) -> np.ndarray:
+    def _ratio(judged: np.ndarray | dict[str, np.ndarray]) -> np.ndarray:
         """NaN where nothing was measured, or nothing was predicted."""
         predicted = judged["propagated"]
         usable = np.isfinite(judged["empirical"]) & np.isfinite(predicted) & (predicted > 0)
