@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import measure
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.photo.lens import Lens, straight_corners
@@ -48,3 +49,15 @@ def test_focal_lengths_have_a_least():
             Lens(fx=bad, fy=1.0, cx=0.0, cy=0.0)
     assert Lens(fx=0.001, fy=0.002, cx=1.0, cy=2.0).matrix.tolist() == [[0.001, 0, 1], [0, 0.002, 2], [0, 0, 1]]
     assert Lens(fx=1.0, fy=1.0, cx=0, cy=0, distortion=(0.1, 0.2)).coefficients.tolist() == [0.1, 0.2, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        Lens(fx=0.13, fy=0.1, cx=51.0, cy=50.5, distortion=(0.0277,)),
+        Lens(fx=159.0, fy=144.0, cx=58.5, cy=49.6, distortion=(20.0, 31.6, -19.2)),
+    ],
+)
+def test_a_lens_that_leaves_no_side_in_the_image_is_refused(lens):
+    with pytest.raises(InvalidInput, match=r"side s\d must have edge points in the image, got none"):
+        measure.measure_quadrilateral(picture(), lens=lens)
