@@ -54,8 +54,10 @@ def _ask(address: str) -> None:
         found = asyncio.run(asyncio.wait_for(kind(), _ANSWER_S))
     except TimeoutError:
         raise _no_scheduler(address, "no answer") from None
-    except Exception as error:  # whatever a stranger's bytes may cause
+    except OSError as error:
         raise _no_scheduler(address, error) from None
+    except Exception:  # whatever a stranger's bytes may cause
+        raise _no_scheduler(address, "something else answers") from None
     if found != "Scheduler":
         raise _no_scheduler(address, f"a {found} answers")
 
