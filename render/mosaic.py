@@ -55,17 +55,20 @@ def refine_tiles(
 
 def _mosaic(mitsuba, scene, view, start, fine, marked, samples, seed: tuple[int, int]) -> np.ndarray:
     """The image with the tiles that hold a marked fine pixel rendered again."""
-    side = _side(marked, samples, _SENSOR[view["type"]])
+    lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
+    side = _side(marked, samples, _SENSOR[view["type"]], frame.min() if lens else max(_SIDES))
     corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side
+    if lens:  # its crop must lie in the frame
+        corners = np.minimum(corners, frame - start - side)
     parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
     seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
-    result = np.pad(fine, [(0, -size % side) for size in fine.shape])
+    result = np.pad(fine, [(side, side + -size % side) for size in fine.shape])
     for part, number in zip(parts, seeds, strict=True):
         sensor = _side_by_side(mitsuba, view, [(y + start[0], x + start[1]) for y, x in part], side, samples)
         strip = np.array(mitsuba.render(scene, sensor=sensor, seed=number), float)[:, :, 0]
         for i, (y, x) in enumerate(part):
-            result[y : y + side, x : x + side] = strip[:, i * side : (i + 1) * side]
-    return result[: fine.shape[0], : fine.shape[1]]
+            result[y + side : y + 2 * side, x + side : x + 2 * side] = strip[:, i * side : (i + 1) * side]
+    return result[side : side + fine.shape[0], side : side + fine.shape[1]]
 
 
 def _held(marked: np.ndarray, side: int) -> np.ndarray:
@@ -78,9 +81,10 @@ def _held(marked: np.ndarray, side: int) -> np.ndarray:
     return padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side).any((1, 3))
 
 
-def _side(marked: np.ndarray, samples: int, sensor: int) -> int:
-    """The side of tiles that take the least time, where making a sensor takes as long as some rays."""
-    return min(_SIDES, key=lambda side: int(_held(marked, side).sum()) * (sensor + side * side * samples))
+def _side(marked: np.ndarray, samples: int, sensor: int, most: int) -> int:
+    """Side, at most ``most``, of tiles that take the least time, where making a sensor takes as long as some rays."""
+    sides = [side for side in _SIDES if side <= most]
+    return min(sides, key=lambda side: int(_held(marked, side).sum()) * (sensor + side * side * samples))
 
 
 def _side_by_side(mitsuba: Any, view: dict, corners: list[tuple[int, int]], side: int, samples: int) -> Any:

@@ -30,11 +30,20 @@ def ratio_interval(ratio: float, n: int, level: float = 0.95) -> tuple[float, fl
     >>> [round(x, 3) for x in ratio_interval(1.0, 1000)]
     [0.918, 1.094]
     """
-    if n < 2 or not np.isfinite(ratio):
-        return 0.0, float("inf")
+    low, high = ratio_intervals(np.array([ratio], float), np.array([n]), level)
+    return float(low[0]), float(high[0])
+
+
+def ratio_intervals(ratios: np.ndarray, counts: np.ndarray, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of the same intervals of many ratios, arrays of one shape."""
     tail = (1 - level) / 2
-    low, high = stats.chi2.isf([tail, 1 - tail], n - 1)
-    return float(ratio * (n - 1) / low), float(ratio * (n - 1) / high)
+    some = (counts >= 2) & np.isfinite(ratios)
+    freedoms, which = np.unique(counts[some] - 1, return_inverse=True)
+    low, high = np.zeros(ratios.shape), np.full(ratios.shape, np.inf)
+    low[some], high[some] = (
+        ratios[some] * freedoms[which] / stats.chi2.isf(p, freedoms)[which] for p in (tail, 1 - tail)
+    )
+    return low, high
 
 
 def p_value(ratio: float, n: int) -> float:
@@ -296,10 +305,13 @@ def _outcome(found: Verdict) -> str:
     return f"contradict: {', '.join(said)}"
 
 
-def correlation(first: list[float], second: list[float]) -> dict[str, float] | None:
-    """Pearson and Spearman correlation of the rows that have both numbers; None with fewer than three."""
-    pairs = np.array([(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None], float)
-    pairs = pairs[np.isfinite(pairs).all(1)] if pairs.size else pairs
+def correlation(first: ArrayLike, second: ArrayLike) -> dict[str, float] | None:
+    """Pearson and Spearman correlation of the rows that have both numbers; None with fewer than three.
+
+    A number that is not there is None or not finite.
+    """
+    pairs = np.stack([np.asarray(first, float), np.asarray(second, float)], axis=-1)
+    pairs = pairs[np.isfinite(pairs).all(1)]
     if len(pairs) < 3 or np.ptp(pairs, axis=0).min() == 0:
         return None
     return {

@@ -54,6 +54,8 @@ class Lens(Model):
     def straighten(self, points: np.ndarray) -> np.ndarray:
         """Where image points (..., 2), px, would be without distortion, px of the same camera matrix."""
         flat = np.asarray(points, float).reshape(-1, 1, 2)
+        if not flat.size:  # OpenCV answers nothing
+            return np.empty(np.shape(points))
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
         straight = cv2.undistortPoints(flat, self.matrix, self.coefficients, None, None, self.matrix, criteria)
         return straight.reshape(np.shape(points))
@@ -65,6 +67,8 @@ class Lens(Model):
         y = (points[..., 1] - self.cy) / self.fy
         rays = np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 1, 3)
         zero = np.zeros(3)
+        if not rays.size:
+            return np.empty(points.shape)
         bent, _ = cv2.projectPoints(rays, zero, zero, self.matrix, self.coefficients)
         return bent.reshape(points.shape)
 

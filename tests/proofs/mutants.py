@@ -10,19 +10,23 @@ from __future__ import annotations
 
 import argparse
 import ast
+import hashlib
+import json
 import os
 import re
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import Queue
 
-import numpy as np
+from tests.proofs.equivalent import EQUIVALENT
 
 ROOT = Path(__file__).parents[2]
 SOURCES = (
@@ -45,8 +49,8 @@ OPERATORS = tuple(
         *_OTHERS,
     )
 )
-_FILES = 3  # test files that a mutant meets
-_LIMIT_S = 90  # of them together: under 30 s on an idle machine
+_FILES = 3  # unit test files that a mutant meets, and as many others
+_LIMIT_S = 30  # processor seconds of them together
 _COMMON = 4  # letters; shorter names say nothing
 
 
@@ -82,7 +86,10 @@ def sources(root: Path = ROOT) -> list[str]:
 
 
 def nearest(file: str, root: Path = ROOT) -> list[str]:
-    """The test files that use most of a module's names, each name weighing less the more files use it."""
+    """The test files that use most of a module's names: of the quick unit tests first, then of the others.
+
+    Each name weighs less the more files use it.
+    """
     files = [path for name in TESTS for path in sorted((root / name).glob("test_*.py"))]
     texts = {path: set(re.findall(r"\w+", path.read_text(encoding="utf-8"))) for path in files}
     tree = ast.parse((root / file).read_text(encoding="utf-8"))
@@ -90,34 +97,46 @@ def nearest(file: str, root: Path = ROOT) -> list[str]:
     names = {name for name in names if not name.startswith("_") and len(name) >= _COMMON}
     uses = {name: sum(name in words for words in texts.values()) for name in names}
     score = {path: sum(1 / uses[name] for name in names if name in words) for path, words in texts.items()}
-    best = sorted((path for path in texts if score[path]), key=lambda path: (-score[path], str(path)))[:_FILES]
-    return [str(path.relative_to(root)) for path in best]
+    best = sorted((path for path in texts if score[path]), key=lambda path: (-score[path], str(path)))
+    unit = [path for path in best if path.parent.name == "unit"][:_FILES]
+    return [str(path.relative_to(root)) for path in (*unit, *[path for path in best if path not in unit][:_FILES])]
 
 
-def judged(mutant: Mutant, root: Path) -> tuple[str, str]:
-    """ "killed", "survived" or "same" (no change), and the changed line; ``root`` is a copy that nobody else uses."""
+def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
+    """The mutated file's text and, with file and number, its line; empty where nothing changes."""
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
-    path = root / mutant.file
-    before = path.read_text(encoding="utf-8")
+    before = (root / mutant.file).read_text(encoding="utf-8")
     after = mutate_code(before, get_operator(mutant.operator)(), mutant.place)
     if after is None or after == before:
-        return "same", ""
+        return "", ""
     pairs = zip(before.splitlines(), after.splitlines(), strict=False)
     number, line = next(((n, new) for n, (old, new) in enumerate(pairs, 1) if old != new), (0, ""))
-    path.write_text(after, encoding="utf-8")
+    return after, f"{mutant.file}:{number}: {line.strip()}"
+
+
+def judged(mutant: Mutant, root: Path) -> str:
+    """ "killed", "survived" or "too slow"; ``root`` is a copy that nobody else uses."""
+    path = root / mutant.file
+    before = path.read_text(encoding="utf-8")
+    path.write_text(changed(mutant, root)[0], encoding="utf-8")
     try:
-        tests = [mutant.file, *nearest(mutant.file, root)]
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", mutant.file]
         environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
-        done = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=_LIMIT_S)
-        outcome = "survived" if done.returncode in (0, 5) else "killed"
-    except subprocess.TimeoutExpired:
-        outcome = "too slow"  # a loop that no longer ends, or a machine that is too busy: neither killed nor survived
+        code = subprocess.run(
+            [*command, *nearest(mutant.file, root)], cwd=root, env=environment, capture_output=True, preexec_fn=_limited
+        ).returncode
     finally:
         path.write_text(before, encoding="utf-8")
-    return outcome, f"{mutant.file}:{number}: {line.strip()}"
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "too slow"  # a loop that no longer ends, or slow tests: neither killed nor survived
+    return "survived" if code in (0, 5) else "killed"
+
+
+def _limited() -> None:
+    """In the process of the tests: processor time, so that other work on the machine does not matter."""
+    resource.setrlimit(resource.RLIMIT_CPU, (_LIMIT_S, _LIMIT_S))
 
 
 def copies(count: int, folder: Path) -> Queue[Path]:
@@ -139,28 +158,63 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
+    parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
     asked = parser.parse_args()
     every, began = mutants(), time.perf_counter()
-    rng = np.random.default_rng(asked.seed)
-    chosen = [every[i] for i in rng.choice(len(every), min(asked.count, len(every)), replace=False)]
-    tally = dict.fromkeys(("killed", "survived", "too slow", "same"), 0)
+    chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
+    known = _known(asked.log)
+    tally = dict.fromkeys(("killed", "survived", "too slow", "equivalent", "same"), 0)
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(asked.workers) as executor:
         free = copies(asked.workers, Path(folder))
 
-        def one(mutant: Mutant) -> tuple[str, str, Mutant]:
-            root = free.get()
+        def one(mutant: Mutant) -> tuple[str, str]:
+            root, since = free.get(), time.perf_counter()
             try:
-                return *judged(mutant, root), mutant
+                line = changed(mutant, root)[1]
+                if not line or _bare(line) in EQUIVALENT:
+                    return "equivalent" if line else "same", line
+                if line in known and (known[line] == "killed" or not asked.again):
+                    return known[line], line
+                outcome = judged(mutant, root)
+                with asked.log.open("a", encoding="utf-8") as log:
+                    seconds = round(time.perf_counter() - since)
+                    log.write(
+                        json.dumps({"line": line, "outcome": outcome, "seconds": seconds, **asdict(mutant)}) + "\n"
+                    )
+                return outcome, line
             finally:
                 free.put(root)
 
-        for outcome, line, mutant in executor.map(one, chosen):
+        for outcome, line in executor.map(one, chosen):
             tally[outcome] += 1
             if outcome in ("survived", "too slow"):
-                print(f"{outcome}: {line}    [{mutant.operator.removeprefix('core/')}]", flush=True)
-    tried = sum(tally.values()) - tally["same"]
-    print(f"{tally['killed']} of {tried} mutants killed ({len(every)} in all) in {time.perf_counter() - began:.0f} s")
+                print(f"{outcome}: {line}", flush=True)
+    tried = sum(tally.values()) - tally["same"] - tally["equivalent"]
+    print(
+        f"{tally['killed']} of {tried} mutants killed, {tally['equivalent']} more are equivalent "
+        f"({len(every)} in all) in {time.perf_counter() - began:.0f} s"
+    )
     sys.exit(tally["killed"] < 0.9 * tried)
+
+
+def _drawn(mutant: Mutant, seed: int) -> str:
+    """A number by which mutants are drawn: a change of one file leaves the sample of the others as it was."""
+    return hashlib.sha256(f"{seed} {mutant}".encode()).hexdigest()
+
+
+def _bare(line: str) -> str:
+    """The file and the line's text, without its number."""
+    return re.sub(r":\d+: ", ": ", line, count=1)
+
+
+def _known(log: Path) -> dict[str, str]:
+    """The latest outcome by mutated line; a line that stands elsewhere now is judged anew."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    if not log.exists():
+        return {}
+    found = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+    return {each["line"]: each["outcome"] for each in found}
 
 
 if __name__ == "__main__":

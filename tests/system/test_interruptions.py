@@ -6,16 +6,21 @@ import operator
 import os
 import re
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
+import threading
+import time
 
+import psutil
 import pytest
 
 import scenes
 import validation
 from scenes import InvalidInput
 from tests.proofs.kill import same
+from validation.batch import cluster as clusters
 from validation.batch import pool, store
 from validation.batch.store import RunFile
 from validation.batch.work import CHUNK
@@ -138,9 +143,34 @@ def test_dask_scheduler_gone(small, unbroken, tmp_path, cluster):
 def test_no_scheduler_at_the_address():
     with (
         pytest.raises(InvalidInput, match=r"--dask must be the address of a running scheduler, got 127.0.0.1:9"),
-        pool.dask("127.0.0.1:9", patience=0.5),
+        clusters.dask("127.0.0.1:9", patience=0.5),
     ):
         pass
+
+
+@pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.6\r\n", bytes(4096)], ids=["silence", "ssh", "zeros"])
+def test_a_live_port_that_is_no_scheduler(greeting, tmp_path, monkeypatch):
+    """Refused before the work, by the check's own limit and not by the client's patience of 10 s."""
+    monkeypatch.setattr(clusters, "_ANSWER_S", 0.5)
+    stranger = socket.create_server(("127.0.0.1", 0))
+    held = []
+
+    def serve():
+        while True:
+            held.append(stranger.accept()[0])
+            held[-1].sendall(greeting)
+
+    threading.Thread(target=serve, daemon=True).start()
+    address = f"tcp://127.0.0.1:{stranger.getsockname()[1]}"
+    try:
+        with pytest.raises(InvalidInput, match=f"--dask must be the address of a running scheduler, got {address}"):
+            validation.run(scenes.load("task1"), renders=20, out=tmp_path / "run", dask=address)
+    finally:
+        stranger.close()
+        for connection in held:
+            connection.close()
+    assert len(held) <= 3  # the socket's own try and Dask's; a client would try again and again
+    assert not (tmp_path / "run").exists()
 
 
 def test_full_disk(small, unbroken, tmp_path, monkeypatch):
@@ -208,6 +238,57 @@ def test_signals_stop_with_one_line_and_leave_no_process(small_toml, tmp_path, s
     assert lines == [f"stopped: {word}; what is finished is kept; the same command continues the run"]
     assert process.returncode == status
     assert 0 < images(tmp_path) < 20000
+
+
+def test_interrupted_while_workers_start(small_toml, tmp_path):
+    """As from a terminal, to the whole group, at the first sight of a worker: they import, and would tell of it."""
+    command = [sys.executable, "-m", "validation.cli", "validate", str(small_toml), "--workers", "2", "--fresh"]
+    with subprocess.Popen(
+        [*command, "--out", str(tmp_path)],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        try:
+            while process.poll() is None and not any("spawn_main" in _words(each) for each in _children(process)):
+                time.sleep(0.01)
+            os.killpg(process.pid, signal.SIGINT)
+            _, errors = process.communicate(timeout=60)  # also waits until the workers have closed the pipe
+        finally:
+            process.kill()
+    assert errors == "stopped: interrupted; what is finished is kept; the same command continues the run\n"
+    assert process.returncode == 130
+
+
+def _children(process):
+    return psutil.Process(process.pid).children()
+
+
+def _words(process):
+    try:
+        return " ".join(process.cmdline())
+    except psutil.Error:  # ended meanwhile
+        return ""
+
+
+def test_workers_are_deaf_from_their_first_instruction():
+    """What is blocked when they are made; a signal that comes meanwhile is handled afterwards, once."""
+    heard = []
+    former = signal.signal(signal.SIGINT, lambda number, _frame: heard.append(number))
+    try:
+        with pool._undisturbed():
+            inherited = subprocess.run(
+                [sys.executable, "-c", "import signal; print(*signal.pthread_sigmask(signal.SIG_BLOCK, []))"],
+                capture_output=True,
+                text=True,
+            )
+            os.kill(os.getpid(), signal.SIGINT)
+            assert heard == []
+        assert heard == [signal.SIGINT]
+    finally:
+        signal.signal(signal.SIGINT, former)
+    assert int(inherited.stdout) == signal.SIGINT
 
 
 def test_log_json(small_toml, tmp_path):

@@ -176,3 +176,16 @@ def test_distance_gradient_against_central_differences():
 
 def test_what_cannot_be_measured_is_infinite():
     assert np.isinf(corner_covariance(np.array([[0.0, 1.0], [0.0, 1.0]]), np.ones(2)).diagonal()).all()
+
+
+def test_corner_covariance_of_many_at_once(rng):
+    """Each of a table of corners as by itself, and in units of its own: scaled variances scale it."""
+    angles = rng.uniform(0, np.pi, (3, 4, 2))
+    normals = np.stack([np.sin(angles), np.cos(angles)], -1)
+    variances = rng.uniform(0.1, 2, (3, 4, 2))
+    together = corner_covariance(normals, variances)
+    for at in np.ndindex(3, 4):
+        inverse = np.linalg.inv(normals[at])  # the corner moves by -N^-1 d
+        assert together[at] == pytest.approx(inverse @ np.diag(variances[at]) @ inverse.T, rel=1e-9)
+    parallel = corner_covariance(np.array([[0.6, 0.8], [0.6, 0.8]]), np.ones(2))
+    assert np.isinf(np.diag(parallel)).all()

@@ -123,13 +123,22 @@ class Campaign(Model):
         InvalidInput
             If its pose lies in or on the object, or the combination of swept values makes no valid scene.
         """
-        which = bisect.bisect_right(self._ends, index)
-        combination, place = divmod(index - (self._ends[which - 1] if which else 0), self._poses[which])
+        which, combination, place = self._place(index)
         scene = self._scene(which, combination)
         setting = self._setting(which, place)
         for role in ("sensor", "light"):
             scene.check_pose(role, getattr(setting, role))
         return Case(index, scene, setting, self._parameters(combination))
+
+    def at(self, index: int) -> tuple[Setting, dict[str, Any]]:
+        """Poses and swept values of a number, without the scene, and unchecked: cheap."""
+        which, combination, place = self._place(index)
+        return self._setting(which, place), self._parameters(combination)
+
+    def _place(self, index: int) -> tuple[int, int, int]:
+        """Scene, combination of swept values and pose, each by its number."""
+        which = bisect.bisect_right(self._ends, index)
+        return which, *divmod(index - (self._ends[which - 1] if which else 0), self._poses[which])
 
     def samples(self, count: int = 32) -> tuple[Scene, ...]:
         """Each scene as it is without the sweep, with up to so many of its poses as its settings."""

@@ -22,8 +22,8 @@ from render import Quality, Tolerance
 from render import variant as variants
 from render.phenomena import named
 from scenes import InvalidInput, Scene
+from validation.batch import cluster, work
 from validation.batch import pool as pools
-from validation.batch import work
 from validation.batch.campaign import Campaign, Case
 from validation.batch.pool import Crew
 from validation.batch.result import Validation, collect
@@ -100,7 +100,7 @@ def run(
     """
     _check(scene, renders, seed, workers, effects)
     if dask:
-        pools.check_address(dask)
+        cluster.check_address(dask)
     started = time.perf_counter()
     campaign, variant = Campaign.of(scene), variants.choose()
     count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)
@@ -166,7 +166,7 @@ def _code() -> str:
 def _crew(workers: int, executor: Executor | None, dask: str | None) -> AbstractContextManager[Crew]:
     if executor is not None:
         return nullcontext(Crew(executor, lambda: workers))
-    return pools.dask(dask) if dask else pools.local(workers)
+    return cluster.dask(dask) if dask else pools.local(workers)
 
 
 @dataclass

@@ -1,24 +1,17 @@
-"""Who does the work: local processes, or the workers of a Dask cluster, behind one `concurrent.futures.Executor`."""
+"""Who does the work: local processes behind one `concurrent.futures.Executor`."""
 
 from __future__ import annotations
 
-import logging
-import multiprocessing
 import os
-import re
 import signal
-import socket
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-
-from scenes import InvalidInput
-from validation.batch.stopped import Stopped
-
-_ANSWER_S = 4.0  # within which a host answers
+from multiprocessing.context import SpawnContext, SpawnProcess
 
 
 @dataclass(frozen=True)
@@ -52,7 +45,7 @@ def local(workers: int) -> Iterator[Crew]:
             finally:
                 executor.shutdown(cancel_futures=True)
         return
-    context = multiprocessing.get_context("spawn")  # the renderer's threads do not survive a fork
+    context = _Spawn()
     ours, theirs = context.Pipe()
     executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs,))
     try:
@@ -67,6 +60,42 @@ def local(workers: int) -> Iterator[Crew]:
         theirs.close()
 
 
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Signals that arrive meanwhile are dealt with afterwards, and processes started meanwhile never hear Ctrl-C."""
+    late: list[int] = []
+    here = threading.current_thread() is threading.main_thread()
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)} if here else {}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # of this thread; new processes inherit it
+    try:
+        for number in handlers:  # a signal that another thread receives is handled in this one all the same
+            signal.signal(number, lambda number, _frame: late.append(number))
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    for number in late:
+        signal.raise_signal(number)
+
+
+class _Deaf(SpawnProcess):
+    """A process that does not hear Ctrl-C, which a terminal sends to the workers, too, from its first instruction."""
+
+    def start(self) -> None:
+        if not hasattr(signal, "pthread_sigmask"):
+            return super().start()
+        resource_tracker.ensure_running()  # now: its own start unblocks the signal
+        with _undisturbed():
+            return super().start()
+
+
+class _Spawn(SpawnContext):
+    """The renderer's threads do not survive a fork."""
+
+    Process = _Deaf
+
+
 def _begin(lifeline: Connection) -> None:
     """In a worker: leave Ctrl-C to the main process, and end when that is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -78,81 +107,3 @@ def _end_with(lifeline: Connection) -> None:
         lifeline.poll(None)
     finally:
         os._exit(1)
-
-
-def check_address(address: str) -> None:
-    """See that a scheduler's address has the form of one, and that somebody answers at it if it is a host's.
-
-    Raises
-    ------
-    InvalidInput
-        If not.
-    """
-    form = re.fullmatch(r"(?:([a-z]+)://)?\[?([\w.:%-]+?)\]?:(\d{1,5})", address)
-    if not form and not re.fullmatch(r"inproc://\S+", address):
-        raise InvalidInput(f"--dask must be an address such as tcp://127.0.0.1:8786, got {address!r}")
-    if form and form[1] in (None, "tcp", "tls"):
-        try:
-            socket.create_connection((form[2], int(form[3])), timeout=_ANSWER_S).close()
-        except (OSError, OverflowError, UnicodeError) as error:
-            reason = f"{address} ({_line(error)})"
-            raise InvalidInput(f"--dask must be the address of a running scheduler, got {reason}") from None
-
-
-@contextmanager
-def dask(address: str, patience: float = 10.0) -> Iterator[Crew]:
-    """The workers of a running Dask cluster.
-
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, as "tcp://127.0.0.1:8786".
-    patience : float
-        Seconds to wait for an answer of the scheduler.
-
-    Raises
-    ------
-    InvalidInput
-        If Dask is not installed, or no scheduler answers at the address.
-    """
-    check_address(address)
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InvalidInput("--dask must be used with the extra 'dask' installed, got no package distributed") from None
-    log = logging.getLogger("distributed")
-    former = log.level
-    log.setLevel(logging.CRITICAL)  # its reports of a lost scheduler are pages long; ours is one line
-    try:
-        client = Client(address, timeout=patience, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise InvalidInput(
-            f"--dask must be the address of a running scheduler, got {address} ({_line(error)})"
-        ) from None
-    executor = client.get_executor(pure=False)
-    try:
-        yield Crew(
-            executor, lambda: max(1, sum(client.nthreads().values())), lambda error: _check(client, address, error)
-        )
-    finally:
-        executor.shutdown(wait=False)  # which cancels
-        client.close(timeout=2)
-        log.setLevel(former)
-
-
-def _check(client, address: str, error: Exception | None) -> None:
-    from distributed.scheduler import KilledWorker
-
-    try:
-        if client.status != "running":
-            raise OSError(f"the client is {client.status}")
-        client.scheduler_info()
-        client.nthreads()
-    except (OSError, TimeoutError, ValueError) as gone:
-        raise Stopped(f"the Dask scheduler at {address} is gone ({_line(gone)})") from None
-    if isinstance(error, KilledWorker):
-        raise BrokenExecutor(_line(error))
-
-
-def _line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,59 +13,14 @@ import planner
 import scenes
 from scenes import InvalidInput
 from validation import statistics
-from validation.batch.campaign import Campaign, Case
+from validation.batch.campaign import Campaign
+from validation.batch.document import document
+from validation.batch.rows import Found, Row, Rows
 from validation.batch.store import RunFile
-from validation.batch.work import Method, methods
+from validation.batch.work import methods
 from validation.statistics import Verdict
 
 _WAITING = "not yet worked on"
-
-
-@dataclass(frozen=True)
-class Judged:
-    """One method in one setting: predicted from its image against measured.
-
-    Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
-    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
-    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error
-    sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
-    lost than may be (`row_status`).
-    """
-
-    method: str
-    propagated: float
-    empirical: float | None
-    n: int
-    failed: int
-    failures: dict[str, int]
-    ratio: float | None
-    ratio_interval: tuple[float, float] | None
-    bias: float | None
-    predicted_bias: float
-    rmse: float | None
-    status: str
-
-
-@dataclass(frozen=True)
-class Row:
-    """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
-
-    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
-    """
-
-    index: int
-    scene: str
-    parameters: dict[str, Any]
-    value_px: float
-    sensor: tuple[float, float]
-    light: tuple[float, float]
-    paper_ice: float | None
-    paper_real: tuple[float, float] | None
-    paper: float
-    calibrated: float
-    bound: float
-    main: Judged
-    classic: tuple[Judged, ...]
 
 
 @dataclass(frozen=True)
@@ -81,7 +37,7 @@ class Validation:
     seed: int
     variant: str
     paper_scale: float | None
-    rows: tuple[Row, ...]
+    rows: Sequence[Row]
     refused: dict[int, str]
     search: tuple[tuple[str, tuple[float, float], tuple[float, float], float, float], ...]
     correlation: dict[str, Any]
@@ -91,25 +47,7 @@ class Validation:
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``ice validate --json``; numbers that are not finite become null."""
-        return _finite(
-            {
-                "scene": self.scene,
-                "seed": self.seed,
-                "variant": self.variant,
-                "paper_scale": self.paper_scale,
-                "settings": [_row_json(row) for row in self.rows],
-                "refused": [{"index": index, "reason": reason} for index, reason in self.refused.items()],
-                "paper_table_1": [
-                    {"scene": scene, "sensor": sensor, "light": light, "paper_ice": theirs, "paper": ours}
-                    for scene, sensor, light, theirs, ours in self.search
-                ],
-                "correlation": self.correlation,
-                "verdict": self.verdict.text,
-                "judgement": asdict(self.verdict),
-                "classic_verdicts": {name: asdict(found) for name, found in self.classic_verdicts.items()},
-                "seconds": self.seconds,
-            }
-        )
+        return document(self)
 
 
 def collect(campaign: Campaign, store: RunFile) -> Validation:
@@ -121,17 +59,19 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         If no setting could be worked on.
     """
     identity = store.identity()
-    indices, refused = [], {}
+    rows, refused = Rows(campaign), {}
     for i in range(len(campaign)):
-        if store.predicted(i):
-            indices.append(i)
+        model = store.predicted(i)
+        if model:
+            scene = campaign.case(i).scene
+            rows.add(i, scene.name, model, {m.name: _found(i, m.name, store) for m in methods(scene)})
         else:
             refused[i] = store.trouble(i) or _WAITING
-    if not indices:
+    if not rows:
         reason = next(iter(refused.values()))
         raise InvalidInput("the run must have measured a setting, got none yet" if reason == _WAITING else reason)
-    scale = _free_scale(campaign, indices, store)
-    rows = tuple(_row(campaign.case(i), scale, store) for i in indices)
+    scale = _free_scale(campaign, rows)
+    rows.finish(scale)
     return Validation(
         scene=campaign.name,
         title=campaign.title,
@@ -141,131 +81,63 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         rows=rows,
         refused=refused,
         search=_search(campaign, scale),
-        correlation=_correlations(rows),
-        verdict=_judge([row.main for row in rows], sum(reason != _WAITING for reason in refused.values())),
-        classic_verdicts=_classic_verdicts(rows),
+        correlation=_correlations(campaign, rows),
+        verdict=_judge(rows.judged(), sum(reason != _WAITING for reason in refused.values())),
+        classic_verdicts={name: _judge(rows.judged(name)) for name in rows.others},
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
 
 
-def _classic_verdicts(rows: tuple[Row, ...]) -> dict[str, Verdict]:
-    """Of each other method, over the settings that have it."""
-    groups: dict[str, list[Judged]] = {}
-    for row in rows:
-        for judged in row.classic:
-            groups.setdefault(judged.method, []).append(judged)
-    return {method: _judge(group) for method, group in groups.items()}
+def _found(setting: int, method: str, store: RunFile) -> Found:
+    propagated, _, status = store.propagated(setting, method)
+    return Found(propagated, store.distances(setting, method), store.failures(setting, method), status)
 
 
-def _free_scale(campaign: Campaign, indices: list[int], store: RunFile) -> float | None:
+def _printed(campaign: Campaign) -> bool:
+    """Whether the settings are those that scenes list, beside numbers that the paper printed."""
+    return not (campaign.grid or campaign.sweep)
+
+
+def _free_scale(campaign: Campaign, rows: Rows) -> float | None:
     """The paper prints no unit of intensity; the median is deaf to the rows that do not fit."""
-    if campaign.grid or campaign.sweep:
+    if not _printed(campaign):
         return None
-    known = [(campaign.case(i).setting.paper_ice, store.predicted(i)["paper"]) for i in indices]
-    ratios = [ice / ours for ice, ours in known if ice and 0 < ours < math.inf]
+    ratios = [row.paper_ice / row.paper for row in rows if row.paper_ice and 0 < row.paper < math.inf]
     return float(np.median(ratios)) if ratios else None
 
 
-def _row(case: Case, scale: float | None, store: RunFile) -> Row:
-    setting, model = case.setting, store.predicted(case.index)
-    main, *classic = (_judged(case.index, method, model, store) for method in methods(case.scene))
-    return Row(
-        index=case.index,
-        scene=case.scene.name,
-        parameters=case.parameters,
-        value_px=model["value_px"],
-        sensor=tuple(setting.sensor),
-        light=tuple(setting.light),
-        paper_ice=setting.paper_ice,
-        paper_real=setting.paper_real,
-        paper=model["paper"] * (scale or 1.0),
-        calibrated=model["calibrated"],
-        bound=model["bound"],
-        main=main,
-        classic=tuple(classic),
-    )
-
-
-def _judged(setting: int, method: Method, model: dict[str, float], store: RunFile) -> Judged:
-    propagated, _, status = store.propagated(setting, method.name)
-    distances = store.distances(setting, method.name)
-    good = distances[np.isfinite(distances)]
-    failures = store.failures(setting, method.name)
-    empirical = float(np.var(good, ddof=1)) if good.size > 1 else None
-    judged = empirical is not None and math.isfinite(propagated) and propagated > 0
-    ratio = empirical / propagated if judged else None
-    bias = float(good.mean() - model["value_px"]) if good.size and math.isfinite(model["value_px"]) else None
-    return Judged(
-        method=method.name,
-        propagated=propagated,
-        empirical=empirical,
-        n=distances.size,
-        failed=distances.size - good.size,
-        failures=failures,
-        ratio=ratio,
-        ratio_interval=statistics.ratio_interval(ratio, good.size) if judged else None,
-        bias=bias,
-        predicted_bias=model["predicted_bias"],
-        rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
-        status=row_status(status, failures, distances.size),
-    )
-
-
-def row_status(clean: str, others: dict[str, int], images: int) -> str:
-    """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.
-
-    Parameters
-    ----------
-    clean : str
-        Status of the noise-free image.
-    others : dict
-        Number of noisy images by status, of those that are not ``ok``.
-    images : int
-        Noisy images in all; `statistics.STRAY` of them may be lost.
-
-    Examples
-    --------
-    >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
-    ('ok', 'low_contrast')
-    """
-    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
-        return clean
-    return max(others, key=others.get)
-
-
-def _judge(judged: list[Judged], refused: int = 0) -> Verdict:
+def _judge(found: dict[str, np.ndarray], refused: int = 0) -> Verdict:
     """Of one method; a setting that could not be worked on counts as one that was not measured."""
-    listed = [*judged, *[_NOTHING] * refused]
 
-    def column(name: str) -> np.ndarray:
-        return np.array([getattr(j, name) for j in listed], float)  # None becomes NaN
+    def column(name: str, nothing: float) -> np.ndarray:
+        return np.concatenate([found[name].astype(float), np.full(refused, nothing)])
 
     return statistics.verdict(
-        column("ratio"),
-        column("n") - column("failed"),
-        lost=column("failed"),
-        bias_px=column("bias"),
-        predicted_bias_px=column("predicted_bias"),
-        sigma_px=np.sqrt(column("propagated")),
-        ok=[j.status == "ok" for j in listed],
+        column("ratio", np.nan),
+        column("n", 0) - column("failed", 0),
+        lost=column("failed", 0),
+        bias_px=column("bias", np.nan),
+        predicted_bias_px=column("predicted_bias", 0.0),
+        sigma_px=np.sqrt(column("propagated", np.inf)),
+        ok=column("ok", 0) > 0,
     )
 
 
-_NOTHING = Judged("", math.inf, None, 0, 0, {}, None, None, None, 0.0, None, "refused")
-
-
-def _correlations(rows: tuple[Row, ...]) -> dict[str, Any]:
-    empirical = [row.main.empirical for row in rows]
-    real = [row.paper_real or (None, None) for row in rows]
-    ice = [row.paper_ice for row in rows]
+def _correlations(campaign: Campaign, rows: Rows) -> dict[str, Any]:
+    main = rows.judged()
+    empirical, nothing = main["empirical"], np.full(len(rows), np.nan)
+    ice, real = nothing, np.stack([nothing, nothing])
+    if _printed(campaign):
+        ice = np.array([row.paper_ice for row in rows], float)
+        real = np.array([row.paper_real or (None, None) for row in rows], float).T
     return {
-        "paper_with_empirical": statistics.correlation([row.paper for row in rows], empirical),
-        "calibrated_with_empirical": statistics.correlation([row.calibrated for row in rows], empirical),
-        "propagated_with_empirical": statistics.correlation([row.main.propagated for row in rows], empirical),
+        "paper_with_empirical": statistics.correlation(rows.column("paper"), empirical),
+        "calibrated_with_empirical": statistics.correlation(rows.column("calibrated"), empirical),
+        "propagated_with_empirical": statistics.correlation(main["propagated"], empirical),
         "printed_ice_with_empirical": statistics.correlation(ice, empirical),
-        "printed_ice_with_printed_real_12": statistics.correlation(ice, [pair[0] for pair in real]),
-        "printed_ice_with_printed_real_10": statistics.correlation(ice, [pair[1] for pair in real]),
-        "claimed_by_paper": 0.768 if any(ice) else None,
+        "printed_ice_with_printed_real_12": statistics.correlation(ice, real[0]),
+        "printed_ice_with_printed_real_10": statistics.correlation(ice, real[1]),
+        "claimed_by_paper": 0.768 if np.nansum(ice) else None,
     }
 
 
@@ -278,30 +150,3 @@ def _search(campaign: Campaign, scale: float | None):
             ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_px2 * scale
             found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
     return tuple(found)
-
-
-def _row_json(row: Row) -> dict[str, Any]:
-    main = asdict(row.main)
-    return {
-        "index": row.index,
-        "scene": row.scene,
-        "parameters": row.parameters,
-        "sensor": row.sensor,
-        "light": row.light,
-        "value_px": row.value_px,
-        "paper_ice": row.paper_ice,
-        "paper_real": row.paper_real,
-        "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
-        **main,
-        "bound": row.bound,
-        "classic": [asdict(judged) for judged in row.classic],
-    }
-
-
-def _finite(value: Any) -> Any:
-    """The same document with null for NaN and infinity, which JSON lacks."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -270,14 +270,18 @@ class RunFile:
         """Working time of all workers by what it was spent on."""
         total: dict[str, float] = {}
         query = "SELECT seconds FROM setting WHERE seconds IS NOT NULL UNION ALL SELECT seconds FROM chunk"
-        for (text,) in self._rows(query):
+        for (text,) in self._each(query):
             for name, value in self._document("seconds", text).items():
                 total[name] = total.get(name, 0.0) + value
         return total
 
     def _rows(self, query: str, *values: Any) -> list[tuple]:
+        return list(self._each(query, *values))
+
+    def _each(self, query: str, *values: Any) -> Iterator[tuple]:
+        """One at a time: of a large run they are many."""
         try:
-            return self._db.execute(query, values).fetchall()
+            yield from self._db.execute(query, values)
         except (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError) as error:
             raise self._damaged(str(error)) from None
 

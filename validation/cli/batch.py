@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from contextlib import nullcontext
@@ -107,7 +106,10 @@ def validate_command(
 def _show(found: Validation, goal: Reached | None, directory: Path, as_json: bool) -> None:
     """The whole result, as JSON or as tables."""
     if as_json:
-        print(json.dumps(found.to_json() | ({"goal": goal.to_json()} if goal else {}), indent=1))
+        from validation.batch.document import pieces
+
+        sys.stdout.writelines(pieces(found, {"goal": goal.to_json()} if goal else None))
+        print()
         return
     from validation.report.table import report
 

@@ -174,10 +174,9 @@ def _begun(out: Path | None, fresh: bool) -> tuple[int, Quality] | None:
 
 def _widths(found: Validation, model: CostModel, choice: Choice) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Half-width of each measured setting's ratio, all sources together, and its images."""
-    rows = [row.main for row in found.rows if row.main.ratio is not None]
-    errors = [model.errors(choice.rendered, row.n - row.failed) for row in rows]
-    widths = tuple(row.ratio * combined(error) for row, error in zip(rows, errors, strict=True))
-    return widths, tuple(row.n for row in rows)
+    rows = (row.main for row in found.rows if row.main.ratio is not None)
+    each = [(row.ratio * combined(model.errors(choice.rendered, row.n - row.failed)), row.n) for row in rows]
+    return tuple(width for width, _ in each), tuple(n for _, n in each)
 
 
 @dataclass

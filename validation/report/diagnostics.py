@@ -52,15 +52,16 @@ class Distances:
 
 def residuals(found: Validation) -> np.ndarray:
     """ln(measured / predicted variance) over its standard error sqrt(2 / (n - 1)), one a judged row."""
-    judged = [row.main for row in found.rows if row.main.ratio]
-    return np.array([np.log(j.ratio) / np.sqrt(2 / (j.n - j.failed - 1)) for j in judged])
+    judged = (row.main for row in found.rows if row.main.ratio)
+    return np.fromiter((np.log(j.ratio) / np.sqrt(2 / (j.n - j.failed - 1)) for j in judged), float)
 
 
 def draw_residuals(found: Validation, path: Path) -> Path:
     """Residual of each setting, with the limits of one row and of the whole table."""
     values = residuals(found)
     figure, axis = plt.subplots(figsize=(7, 3.2), layout="constrained")
-    axis.plot([row.index + 1 for row in found.rows if row.main.ratio], values, "o", ms=5 if values.size < 100 else 2)
+    places = np.fromiter((row.index + 1 for row in found.rows if row.main.ratio), int)
+    axis.plot(places, values, "o", ms=5 if values.size < 100 else 2)
     axis.axhline(0, color="k", lw=0.8)
     limit = stats.norm.isf(found.verdict.limit / 2)
     for level, style, label in ((stats.norm.isf(0.025), ":", "95 %, one row"), (limit, "--", "verdict, whole table")):

@@ -1,22 +1,26 @@
-"""A validation as CSV, JSON and Parquet, for those who go on elsewhere."""
+"""A validation as CSV, JSON and Parquet, for those who go on elsewhere; written setting by setting."""
 
 from __future__ import annotations
 
 import csv
-import json
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
 
 from scenes import InvalidInput
-from validation.batch.result import Judged, Row, Validation
+from validation.batch.document import pieces
+from validation.batch.result import Validation
+from validation.batch.rows import Judged, Row
+
+_PART = 10_000  # settings that become columns at a time
 
 
 def write_csv(found: Validation, path: Path) -> Path:
     """One line a setting; variances in px^2, angles in degrees, empty where there is no number."""
-    lines = table(found)
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(lines[0]))
-        writer.writerow({key: _inert(key) for key in lines[0]})
-        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines)
+        writer = csv.DictWriter(file, fieldnames=columns(found))
+        writer.writerow({key: _inert(key) for key in writer.fieldnames})
+        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines(found))
     return path
 
 
@@ -27,7 +31,8 @@ def _inert(value: object) -> object:
 
 def write_json(found: Validation, path: Path) -> Path:
     """The document of ``ice validate --json``."""
-    path.write_text(json.dumps(found.to_json(), indent=1), encoding="utf-8")
+    with path.open("w", encoding="utf-8") as file:
+        file.writelines(pieces(found))
     return path
 
 
@@ -40,20 +45,29 @@ def write_parquet(found: Validation, path: Path) -> Path:
         If pyarrow, 170 MB and so an extra, is not installed.
     """
     try:
-        from pyarrow import Table, parquet
+        from pyarrow import Table, concat_tables, parquet
     except ImportError:
         raise InvalidInput(
             "--parquet must be used with the extra 'parquet' installed, got no package pyarrow"
         ) from None
-    parquet.write_table(Table.from_pylist(table(found)), path)
+    every = lines(found)
+    parts = iter(lambda: list(itertools.islice(every, _PART)), [])
+    tables = [Table.from_pylist(part) for part in parts]
+    parquet.write_table(concat_tables(tables, promote_options="permissive"), path)
     return path
 
 
-def table(found: Validation) -> list[dict[str, object]]:
+def columns(found: Validation) -> list[str]:
+    """The keys of every record."""
+    return list(dict.fromkeys(key for row in found.rows for key in _line(row)))
+
+
+def lines(found: Validation) -> Iterator[dict[str, object]]:
     """One flat record a setting, all with the same keys; None where there is no number."""
-    lines = [_line(row) for row in found.rows]
-    keys = dict.fromkeys(key for line in lines for key in line)
-    return [{key: line.get(key) for key in keys} for line in lines]
+    keys = columns(found)
+    for row in found.rows:
+        line = _line(row)
+        yield {key: line.get(key) for key in keys}
 
 
 def _line(row: Row) -> dict[str, object]:

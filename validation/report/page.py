@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import jinja2
+import numpy as np
 
 from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
+from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import diagnostics, figures
 from validation.report.table import errors, failed, far, names, number, ratio, shift, small
@@ -103,15 +105,15 @@ def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Sec
     return sections
 
 
-def _key(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
+def _key(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
     """First columns of a table of settings, and their cells by setting."""
-    headings, cells = names(found)
+    headings, cells = names(found, rows)
     return ["setting", *headings], {index: [str(index + 1), *row] for index, row in cells.items()}
 
 
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
-    key, cells = _key(found)
+    key, cells = _key(found, rows)
     columns = [
         *key,
         f"{rows[0].main.method}: measured / predicted [95 %]",
@@ -139,7 +141,7 @@ def _ratios(found: Validation) -> Table:
 
 def _variances(found: Validation) -> Table:
     rows, which = far(found)
-    key, cells = _key(found)
+    key, cells = _key(found, rows)
     others = list(dict.fromkeys(judged.method for row in found.rows for judged in row.classic))
     columns = [
         *key, "paper ICE", "our ICE", "paper real 12", "paper real 10", "calibrated", "propagated",
@@ -229,10 +231,10 @@ def _facts(found: Validation, store: RunFile) -> Table:
 
 
 def _agreement(found: Validation, path: Path) -> Picture:
-    ratios = [row.main.ratio for row in found.rows if row.main.ratio]
-    spread = f", their ratio from {min(ratios):.2f} to {max(ratios):.2f}" if ratios else ""
+    ratios = np.array([row.main.ratio for row in found.rows if row.main.ratio])
+    spread = f", their ratio from {ratios.min():.2f} to {ratios.max():.2f}" if ratios.size else ""
     alt = (
-        f"Measured against predicted variance of {len(ratios)} settings{spread}; {found.verdict.inside} agree at 95 %."
+        f"Measured against predicted variance of {ratios.size} settings{spread}; {found.verdict.inside} agree at 95 %."
     )
     return _picture(path, alt, "Measured against predicted variance, with 95 % intervals; below, their ratio.")
 

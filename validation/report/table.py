@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from validation.batch.result import Judged, Row, Validation
+from validation.batch.result import Validation
+from validation.batch.rows import Judged, Row
 
 _ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
@@ -50,31 +52,32 @@ def far(found: Validation) -> tuple[list[Row], str]:
     """Rows to show, and which they are: all of them, or of many those that are farthest from their prediction."""
     if len(found.rows) <= _ROWS:
         return list(found.rows), ""
-    rows = sorted(found.rows, key=lambda row: -abs(math.log(row.main.ratio or 1.0)))[:_ROWS]
+    rows = heapq.nsmallest(_ROWS, found.rows, key=lambda row: -abs(math.log(row.main.ratio or 1.0)))
     return rows, f"The {_ROWS} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
 
 
-def names(found: Validation) -> tuple[list[str], dict[int, list[str]]]:
-    """Headings of the columns that tell a table's settings apart, and their cells by setting."""
-    values: dict[str, set[str]] = {}
+def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
+    """Headings of the columns that tell a run's settings apart, and the cells of some rows by setting."""
+    first = found.rows[0]
+    swept, many = dict.fromkeys(first.parameters, False), False
     for row in found.rows:
+        many = many or row.scene != first.scene
         for key, value in row.parameters.items():
-            values.setdefault(key, set()).add(str(value))
-    swept = [key for key, several in values.items() if len(several) > 1]
-    many = len({row.scene for row in found.rows}) > 1
+            swept[key] = swept[key] or str(value) != str(first.parameters[key])
+    keys = [key for key, several in swept.items() if several]
     cells = {
         row.index: [
-            *([row.scene] if many else []), *(str(row.parameters[key]) for key in swept),
+            *([row.scene] if many else []), *(str(row.parameters[key]) for key in keys),
             pose(row.sensor), pose(row.light),
         ]
-        for row in found.rows
+        for row in rows
     }  # fmt: skip
-    return [*(["scene"] if many else []), *swept, "sensor", "light"], cells
+    return [*(["scene"] if many else []), *keys, "sensor", "light"], cells
 
 
 def _variances(found: Validation) -> Table:
     rows, which = far(found)
-    headings, cells = names(found)
+    headings, cells = names(found, rows)
     others = list(dict.fromkeys(judged.method for row in rows for judged in row.classic))
     printed = any(row.paper_ice or row.paper_real for row in found.rows)
     paper = ["paper\nICE", "ours\nICE", "ours/\npaper", "paper real\n12.0", "\n10.0"] if printed else []
@@ -104,7 +107,7 @@ def _paper(row: Row) -> list[str]:
 
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
-    headings, cells = names(found)
+    headings, cells = names(found, rows)
     main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
     caption = (
         f"* : 1 lies outside the interval. failed: one number a method.\nThe verdict is about {main}, as are bias "

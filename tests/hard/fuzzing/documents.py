@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+import functools
 import json
 import math
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 import measure
@@ -30,10 +32,10 @@ noise.sigma = [1.2, 2.4]
 camera.exposure = {from = 100, to = 200, count = 2}
 """
 _LENS = """\
-fx = 800.0
-fy = 801.0
-cx = 128.0
-cy = 120.0
+fx = 150.0
+fy = 151.0
+cx = 40.0
+cy = 30.0
 distortion = [-0.2, 0.01, 0.0, 0.0, 0.0]
 """
 _RANGES = (
@@ -64,14 +66,27 @@ def campaign(rng: np.random.Generator, folder: Path) -> str:
 
 
 def lens(rng: np.random.Generator, folder: Path) -> str:
-    """A lens with one to three lines corrupted; what can be loaded bends points, and straightens them."""
+    """A lens with one to three lines corrupted, or far from a lens; what can be loaded measures a photograph."""
     data = _LENS.encode()
     for _ in range(rng.integers(1, 4)):
         data = rng.choice([keys, keys, spoilt])(rng, data)
+    if rng.random() < 0.3:
+        bends = ", ".join(f"{k:.3g}" for k in rng.normal(0, 10.0 ** rng.uniform(-2, 2), rng.integers(0, 6)))
+        numbers = 10.0 ** rng.uniform(-2, 5, 2), rng.normal((40, 30), 10.0 ** rng.uniform(0, 4))
+        (fx, fy), (cx, cy) = numbers
+        data = f"fx = {fx}\nfy = {fy}\ncx = {cx}\ncy = {cy}\ndistortion = [{bends}]".encode()
     loaded = measure.load_lens(stored(folder, "lens.toml", data))
     points = np.array([[10.0, 20.0], [128.0, 120.0]])
     loaded.straighten(loaded.distort(points))
-    return "loaded"
+    return measure.measure_quadrilateral(_photograph(), lens=loaded).status
+
+
+@functools.cache
+def _photograph() -> np.ndarray:
+    """A quadrilateral of 40 x 26 px, turned a little."""
+    corners = np.array([[18, 15], [58, 20], [54, 46], [15, 42]])
+    sharp = cv2.fillConvexPoly(np.full((60, 80), 20.0), corners, 180.0)
+    return cv2.GaussianBlur(sharp, None, 0.8) + np.random.default_rng(1).standard_normal(sharp.shape)
 
 
 def comparison(rng: np.random.Generator, folder: Path, run: Path) -> str:

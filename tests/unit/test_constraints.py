@@ -1,0 +1,92 @@
+"""Limits of a plan: what they accept and refuse, by plain geometry."""
+
+import numpy as np
+import pytest
+
+import scenes
+from planner import Constraints
+from scenes import InvalidInput
+from tests.oracle import axes, pinhole
+
+
+@pytest.mark.parametrize("name", ["sensor_polar_deg", "light_polar_deg"])
+def test_polar_angles(name):
+    for good in ((0.0, 180.0), (90.0, 90.0), (0.0, 0.0), (180.0, 180.0)):
+        Constraints(**{name: good})
+    for bad in ((-1e-6, 90.0), (0.0, 180.0001), (50.0, 49.0), (float("nan"), 90.0)):
+        with pytest.raises(InvalidInput, match=f"{name} must be two rising angles between 0 and 180"):
+            Constraints(**{name: bad})
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("min_edge_px", 1e9), ("min_clearance_px", 1e9), ("min_separation_deg", 180.0)]
+)
+def test_lengths_and_separation(name, most):
+    for good in (0.0, 1e-9, most):
+        Constraints(**{name: good})
+    for bad, limit in ((-1e-9, "least 0"), (np.nextafter(most, np.inf), "most"), (float("nan"), "least 0")):
+        with pytest.raises(InvalidInput, match=f"{name} must be at {limit}"):
+            Constraints(**{name: bad})
+
+
+@pytest.mark.parametrize("name", ["forbidden_sensor", "forbidden_light"])
+def test_regions(name):
+    for good in ((0, -700, 0), (180, 10, 180)):
+        Constraints(**{name: (good,)})
+    for bad in ((-0.1, 0, 1), (180.1, 0, 1), (0, float("inf"), 1), (0, 0, -0.1), (0, 0, 180.1)):
+        with pytest.raises(InvalidInput, match=f"{name} must be polar, azimuth and radius"):
+            Constraints(**{name: ((10, 10, 10), bad)})
+
+
+def test_limits_belong_to_the_limited(task1):
+    poses = np.array([[19.9, 0.0], [20.0, 0.0], [40.0, 0.0], [40.1, 0.0]])
+    inside, everything = [False, True, True, False], [True] * 4
+    for constraints, sensors, lights in (
+        (Constraints(sensor_polar_deg=(20, 40)), inside, everything),
+        (Constraints(light_polar_deg=(20, 40)), everything, inside),
+    ):
+        assert constraints.sensors(task1, poses).tolist() == sensors
+        assert constraints.lights(poses).tolist() == lights
+
+
+def test_pairs(task1, rng):
+    """Angles by arc length between directions; the light's image by a pinhole of the oracle's own."""
+    sensors, lights = (np.column_stack([rng.uniform(0, 180, 300), rng.uniform(0, 360, 300)]) for _ in range(2))
+    lights[:50] = sensors[:50]
+    lights[50:80] = sensors[50:80] + [1.5, 0]
+    towards = [np.array([axes(pose)[0] for pose in some]) for some in (sensors, lights)]
+    angle = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(towards[0] - towards[1], axis=1) / 2, 0, 1)))
+    assert (Constraints(min_separation_deg=30).pairs(task1, sensors, lights) == (angle >= 30)).all()
+    assert Constraints().pairs(task1, sensors, lights).all()
+    assert (Constraints(same_mount=True).pairs(task1, sensors, lights) == (angle < 1e-5)).all()
+    near = task1.model_copy(update={"light": scenes.Light(distance=40.0), "settings": ()})
+    size = np.array([near.camera.width, near.camera.height])
+    seen = [pinhole(40 * at[None], pose, near.camera)[0] for at, pose in zip(towards[1], sensors, strict=True)]
+    inside = np.array([((image > -0.5) & (image < size - 0.5)).all() for image in seen])
+    assert 30 < inside.sum() < 200
+    assert (Constraints(light_out_of_view=True).pairs(near, sensors, lights) == ~inside).all()
+    assert Constraints(min_separation_deg=1).on_pairs
+    assert not Constraints(min_edge_px=1).on_pairs
+
+
+def test_lengths_in_the_image(task1):
+    """Required edges of 20 px or more, and 40 px between those that share no vertex: dense points of the oracle."""
+    poses = np.array([[polar, azimuth] for polar in (5.0, 30.0, 60.0, 80.0) for azimuth in range(0, 360, 15)])
+    solid = task1.solid
+    names = list(dict.fromkeys(name for corner in (task1.task.start, task1.task.end) for name in corner.edges))
+    pairs = [(a, b) for a in names for b in names if a < b and not set(solid.edge(a).ends) & set(solid.edge(b).ends)]
+    assert pairs
+    fractions = np.linspace(0, 1, 401)[:, None]
+    least = []
+    for pose in poses:
+        lines = {}
+        for name in names:
+            start, stop = solid.vertices[list(solid.edge(name).ends)]
+            lines[name] = pinhole(start + fractions * (stop - start), pose, task1.camera)
+        least.append(min(np.linalg.norm(lines[a][:, None] - lines[b], axis=-1).min() for a, b in pairs))
+    least = np.array(least)
+    seen = Constraints(min_edge_px=1e-9).sensors(task1, poses)
+    clear = Constraints(min_clearance_px=40.0).sensors(task1, poses)
+    told = np.abs(least - 40) > 1.0  # the product looks at 17 points of an edge
+    assert (clear == (seen & (least >= 40)))[told].all()
+    assert 0 < (seen & ~clear).sum() < seen.sum()

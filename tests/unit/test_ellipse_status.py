@@ -1,0 +1,26 @@
+"""What is said of an ellipse for which the likelihood has no maximum."""
+
+import numpy as np
+import pytest
+
+import measure
+from measure import status
+from measure.features.optics import Optics
+from measure.find import ellipse
+from tests.oracle import polygon_image
+
+TRUE = np.array([40.3, 35.7, 14.0, 14.0, 0.0])
+
+
+@pytest.mark.parametrize(("contrast", "expected"), [(60.0, status.ILL_CONDITIONED), (4.0, status.LOW_CONTRAST)])
+def test_no_maximum(contrast, expected, monkeypatch):
+    """Of noise 2: an edge of 30 times the noise was there to be measured, one of twice the noise was not."""
+    t = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
+    outline = np.column_stack([TRUE[0] + 14 * np.cos(t), TRUE[1] + 14 * np.sin(t)])
+    image = polygon_image(outline, (70, 80), 0.7, contrast)
+    optics = Optics((70, 80), 0.7, 4.0)
+    monkeypatch.setattr(ellipse, "likeliest_ellipse", lambda *_: None)
+    found = measure.find_ellipse(image, TRUE, optics)
+    assert found.status == expected
+    assert np.isnan(found.parameters).all()
+    assert np.isnan(found.covariance).all()

@@ -1,0 +1,87 @@
+"""What effects could do, against the same bounds written out with OpenCV and plain geometry."""
+
+import cv2
+import numpy as np
+import pytest
+
+import scenes
+from planner.imaging.pictures import Pictures
+from render.phenomena.base import SAFETY
+from render.phenomena.register import REGISTER
+from scenes import Floor, Jitter, Lens
+from tests.oracle import pinhole
+
+SENSORS = np.array([[30.0, 135.0], [50.0, 60.0]])
+LIGHTS = np.array([[15.0, 315.0], [30.0, 200.0]])
+
+
+def test_distortion_stretches_and_moves(task1):
+    """The Jacobian by central differences of OpenCV's projection, at 33 points of each required edge."""
+    lens = Lens(distortion=(-0.1, 0.05, 0.004, -0.003, 0.01))
+    scene = task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})})
+    camera = scene.camera
+    middle = np.array([camera.width - 1, camera.height - 1]) / 2
+    matrix = np.array([[camera.focal_px, 0, middle[0]], [0, camera.focal_px, middle[1]], [0, 0, 1.0]])
+
+    def bent(image):
+        rays = np.column_stack([(image - middle) / camera.focal_px, np.ones(len(image))])
+        return cv2.projectPoints(rays, np.zeros(3), np.zeros(3), matrix, np.array(lens.coefficients))[0][:, 0]
+
+    names = dict.fromkeys(name for corner in (scene.task.start, scene.task.end) for name in corner.edges)
+    most = 0.0
+    for pose in SENSORS:
+        for name in names:
+            start, stop = scene.solid.vertices[list(scene.solid.edge(name).ends)]
+            image = pinhole(start + np.linspace(0, 1, 33)[:, None] * (stop - start), pose, camera)
+            step = 1e-3 * np.eye(2)
+            slopes = np.stack([(bent(image + h) - bent(image - h)) / 2e-3 for h in step], -1) - np.eye(2)
+            most = max(most, np.sqrt((slopes**2).sum((1, 2))).max())
+    found = REGISTER["lens_distortion"].influence(Pictures.of(scene, SENSORS, LIGHTS))
+    assert found.variance == pytest.approx(SAFETY * 6 * most, rel=1e-5)
+    assert found.bias_px > 0
+    assert REGISTER["lens_distortion"].absent(Pictures.of(task1, SENSORS, LIGHTS)) == "all coefficients are 0"
+
+
+def test_a_floor_that_ends_before_the_edges_show_it(task1):
+    """Nothing where no required edge has floor behind it, the same as a wide one where all of them have."""
+    floor = REGISTER["floor"]
+
+    def influence(half_side):
+        scene = task1.model_copy(update={"floor": Floor(reflectance=0.5, height=-1.0, half_side=half_side)})
+        return floor.influence(Pictures.of(scene, SENSORS[:1], LIGHTS[:1]))
+
+    assert influence(1e-6) == (0, 0)
+    assert influence(1000.0).variance > 0
+    assert influence(100.0) == pytest.approx(influence(1000.0), rel=1e-12)
+
+
+def test_jitter_of_the_light_alone_moves_no_edge(task1):
+    """Only contrasts change: with the square of the angle, and without bias."""
+    jitter = REGISTER["pose_jitter"]
+
+    def influence(sensor, light):
+        scene = task1.model_copy(update={"jitter": Jitter(sensor_deg=sensor, light_deg=light)})
+        return jitter.influence(Pictures.of(scene, SENSORS[:1], LIGHTS[:1]))
+
+    one, two = influence(0.0, 0.5), influence(0.0, 1.0)
+    assert one.bias_px == two.bias_px == 0
+    assert two.variance == pytest.approx(4 * one.variance)
+    # twice the largest relative change of 1 / cos^2 for tilts of one standard deviation both ways, to second order
+    assert one.variance >= SAFETY * 2 * np.radians(0.5) ** 2
+    assert influence(0.5, 0.5).variance == pytest.approx(influence(0.5, 0.0).variance + one.variance)
+    assert jitter.absent(Pictures.of(task1, SENSORS, LIGHTS)) == "poses are exact"
+
+
+@pytest.mark.parametrize("height", [0.0, -2.0])
+def test_interreflection_needs_another_surface(task1, height):
+    """A floor of reflectance r under faces of albedo a: proportional to r to first order, and none without."""
+    effect = REGISTER["interreflection"]
+
+    def influence(reflectance):
+        scene = task1.model_copy(update={"floor": Floor(reflectance=reflectance, height=height)})
+        return effect.influence(Pictures.of(scene, SENSORS[:1], LIGHTS[:1]))
+
+    assert influence(1e-4).variance == pytest.approx(10 * influence(1e-5).variance, rel=1e-2)
+    assert effect.absent(Pictures.of(task1, SENSORS, LIGHTS)) is not None
+    hollow = scenes.load("bracket")
+    assert effect.absent(Pictures.of(hollow, SENSORS, LIGHTS)) is None

@@ -1,0 +1,63 @@
+"""Corners of straightened sides: their covariance by many noisy pictures of one bent quadrilateral."""
+
+import numpy as np
+import pytest
+
+import measure
+from measure.features.layout import polygon_layout
+from measure.features.optics import Optics
+from measure.photo.lens import Lens, straight_corners
+from scenes import InvalidInput
+from tests.oracle import polygon_image
+
+SHAPE, NOISE = (100, 120), 2.0
+LENS = Lens(fx=150.0, fy=150.0, cx=60.0, cy=50.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
+CORNERS = np.array([[30.0, 22.0], [93.0, 30.0], [86.0, 80.0], [24.0, 74.0]])
+OPTICS = Optics(SHAPE, 0.7, NOISE**2)
+
+
+def picture():
+    steps = np.linspace(0, 1, 100, endpoint=False)[:, None]
+    sides = [a + steps * (b - a) for a, b in zip(CORNERS, np.roll(CORNERS, -1, 0), strict=True)]
+    return polygon_image(LENS.distort(np.concatenate(sides)), SHAPE, 0.7, 100.0, 20.0)
+
+
+def test_covariance_of_all_corners(rng):
+    """150 pictures: variances within 3.5 standard errors (41 %), 2.2 times them refused; correlations to 0.33."""
+    clean, layout = picture(), polygon_layout(CORNERS, OPTICS)
+    true = straight_corners(clean, layout, LENS)
+    assert true.corners == pytest.approx(CORNERS, abs=0.01)
+    found = [straight_corners(clean + NOISE * rng.standard_normal(SHAPE), layout, LENS) for _ in range(150)]
+    values = np.array([each.corners.ravel() for each in found])
+    told = np.mean([each.covariance for each in found], axis=0)
+    ratio, within = values.var(0, ddof=1) / np.diag(told), 3.5 * np.sqrt(2 / 149)
+    assert np.abs(ratio - 1).max() < within
+    assert np.abs(ratio / 2.2 - 1).min() > within
+    sigma = np.sqrt(np.diag(told))
+    assert np.abs(np.corrcoef(values.T) - told / np.outer(sigma, sigma)).max() < 4 / np.sqrt(150)
+    assert (np.array([each.used for each in found]) > 20).all()
+
+
+def test_sides_without_edge_points():
+    with pytest.raises(InvalidInput, match="side s1 must have edge points in the image, got none"):
+        straight_corners(picture(), polygon_layout(CORNERS - [0, 60], OPTICS), LENS)
+
+
+def test_focal_lengths_have_a_least():
+    for bad in (0.0009, 1e-300):
+        with pytest.raises(ValueError, match=r"a focal length must be at least 0\.001 px"):
+            Lens(fx=bad, fy=1.0, cx=0.0, cy=0.0)
+    assert Lens(fx=0.001, fy=0.002, cx=1.0, cy=2.0).matrix.tolist() == [[0.001, 0, 1], [0, 0.002, 2], [0, 0, 1]]
+    assert Lens(fx=1.0, fy=1.0, cx=0, cy=0, distortion=(0.1, 0.2)).coefficients.tolist() == [0.1, 0.2, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        Lens(fx=0.13, fy=0.1, cx=51.0, cy=50.5, distortion=(0.0277,)),
+        Lens(fx=159.0, fy=144.0, cx=58.5, cy=49.6, distortion=(20.0, 31.6, -19.2)),
+    ],
+)
+def test_a_lens_that_leaves_no_side_in_the_image_is_refused(lens):
+    with pytest.raises(InvalidInput, match=r"side s\d must have edge points in the image, got none"):
+        measure.measure_quadrilateral(picture(), lens=lens)

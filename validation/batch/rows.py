@@ -1,0 +1,250 @@
+"""The settings of a run, kept as columns: a million of them take some 300 MB, as objects they would take gigabytes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from measure import status as statuses
+from validation import statistics
+from validation.batch.campaign import Campaign
+
+_STATUSES = tuple(sorted(statuses.ALL))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One method in one setting: predicted from its image against measured.
+
+    Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
+    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
+    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error
+    sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
+    lost than may be (`row_status`).
+    """
+
+    method: str
+    propagated: float
+    empirical: float | None
+    n: int
+    failed: int
+    failures: dict[str, int]
+    ratio: float | None
+    ratio_interval: tuple[float, float] | None
+    bias: float | None
+    predicted_bias: float
+    rmse: float | None
+    status: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
+
+    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
+    """
+
+    index: int
+    scene: str
+    parameters: dict[str, Any]
+    value_px: float
+    sensor: tuple[float, float]
+    light: tuple[float, float]
+    paper_ice: float | None
+    paper_real: tuple[float, float] | None
+    paper: float
+    calibrated: float
+    bound: float
+    main: Judged
+    classic: tuple[Judged, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one method measured in one setting: the numbers that a `Judged` follows from."""
+
+    propagated: float
+    distances: np.ndarray
+    failures: dict[str, int]
+    clean: str
+
+
+MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias")
+
+
+def _record(methods: int) -> np.dtype:
+    judged = [
+        ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
+        ("failed", "i4"), ("failures", "i4", (len(_STATUSES),)), ("clean", "u1"),
+    ]  # fmt: skip
+    return np.dtype([
+        ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", judged, (methods,)),
+    ])  # fmt: skip
+
+
+class Rows(Sequence[Row]):
+    """Rows made when they are asked for, from numbers in an array.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Knows poses and swept values by a setting's number.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign, self._size = campaign, 0
+        self._records = np.zeros(len(campaign), _record(1))  # memory is taken where it is written to
+        self._kinds: list[tuple[str, tuple[str, ...]]] = []  # scene and methods, which few settings differ in
+        self._places: dict[tuple[str, tuple[str, ...]], int] = {}
+
+    def add(self, index: int, scene: str, model: dict[str, float], found: dict[str, Found]) -> None:
+        """Append a setting: its predictions without an image, and what each method found, the verdict's first."""
+        kind = self._kind(scene, tuple(found))
+        record = self._records[self._size]
+        record["index"], record["kind"] = index, kind
+        for name in MODEL:
+            record[name] = model[name]
+        for place, each in zip(record["judged"], found.values(), strict=False):
+            good = each.distances[np.isfinite(each.distances)]
+            place["propagated"], place["clean"] = each.propagated, _STATUSES.index(each.clean)
+            place["empirical"] = np.var(good, ddof=1) if good.size > 1 else np.nan
+            place["bias"] = good.mean() - model["value_px"] if good.size else np.nan
+            place["n"], place["failed"] = each.distances.size, each.distances.size - good.size
+            place["failures"] = [each.failures.get(status, 0) for status in _STATUSES]
+        self._size += 1
+
+    def _kind(self, scene: str, methods: tuple[str, ...]) -> int:
+        """Number of a kind of setting; the records get room for its methods."""
+        key, there = (scene, methods), self._records["judged"].shape[1]
+        if len(methods) > there:
+            wider = np.zeros(len(self._records), _record(len(methods)))
+            some = slice(self._size)
+            for name in ("index", "kind", *MODEL):
+                wider[name][some] = self._records[name][some]
+            wider["judged"][some, :there] = self._records["judged"][some]
+            self._records = wider
+        if key not in self._places:
+            self._places[key] = len(self._kinds)
+            self._kinds.append(key)
+        return self._places[key]
+
+    def finish(self, scale: float | None) -> None:
+        """Once all are there: the paper model's free scale, and all intervals at a time."""
+        self._records = self._records[: self._size]
+        self._records["paper"] *= scale or 1.0
+        judged = self._records["judged"]
+        ratio = self._ratio(judged)
+        judged["low"], judged["high"] = statistics.ratio_intervals(ratio, judged["n"] - judged["failed"])
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __getitem__(self, which):
+        if isinstance(which, slice):
+            return [self[i] for i in range(*which.indices(self._size))]
+        return self._row(self._records[: self._size][which])
+
+    def __iter__(self):
+        return (self._row(record) for record in self._records[: self._size])
+
+    def column(self, name: str) -> np.ndarray:
+        """A number of `Row`, all settings."""
+        return self._records[name]
+
+    def judged(self, method: str | None = None) -> dict[str, np.ndarray]:
+        """Numbers of one method, or of the verdict's, by name of `Judged`; of the settings that have it; NaN: none."""
+        rows, places = [], []
+        for kind, (_, names) in enumerate(self._kinds):
+            if method is None or method in names[1:]:
+                some = np.flatnonzero(self._records["kind"] == kind)
+                rows.append(some)
+                places.append(np.full(some.size, 0 if method is None else names.index(method)))
+        chosen, place = np.concatenate(rows), np.concatenate(places)
+        order = np.argsort(chosen, kind="stable")
+        chosen, place = chosen[order], place[order]
+
+        def numbers(name: str) -> np.ndarray:
+            return self._records["judged"][name][chosen, place]
+
+        found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
+        stray = numbers("failures").sum(-1) <= statistics.STRAY * found["n"]
+        return {
+            **found, "ratio": self._ratio(found), "predicted_bias": self._records["predicted_bias"][chosen],
+            "ok": stray & (numbers("clean") == _STATUSES.index("ok")),
+        }  # fmt: skip
+
+    @property
+    def others(self) -> list[str]:
+        """Names of all methods but the verdict's."""
+        return list(dict.fromkeys(name for _, names in self._kinds for name in names[1:]))
+
+    @staticmethod
+    def _ratio(judged: np.ndarray | dict[str, np.ndarray]) -> np.ndarray:
+        """NaN where nothing was measured, or nothing was predicted."""
+        predicted = judged["propagated"]
+        usable = np.isfinite(judged["empirical"]) & np.isfinite(predicted) & (predicted > 0)
+        return np.divide(judged["empirical"], predicted, out=np.full(usable.shape, np.nan), where=usable)
+
+    def _row(self, record: np.void) -> Row:
+        index = int(record["index"])
+        setting, parameters = self._campaign.at(index)
+        scene, names = self._kinds[int(record["kind"])]
+        numbers = {name: float(record[name]) for name in MODEL}
+        bias = numbers.pop("predicted_bias")
+        judged = [_judged(name, place, bias) for name, place in zip(names, record["judged"], strict=False)]
+        return Row(
+            index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=tuple(setting.light),
+            paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=judged[0], classic=tuple(judged[1:]),
+            **numbers,
+        )  # fmt: skip
+
+
+def _judged(method: str, place: np.void, predicted_bias: float) -> Judged:
+    n, propagated = int(place["n"]), float(place["propagated"])
+    empirical, bias = _known(place["empirical"]), _known(place["bias"])
+    failures = {name: int(count) for name, count in zip(_STATUSES, place["failures"], strict=True) if count}
+    judged = empirical is not None and math.isfinite(propagated) and propagated > 0
+    return Judged(
+        method=method,
+        propagated=propagated,
+        empirical=empirical,
+        n=n,
+        failed=int(place["failed"]),
+        failures=failures,
+        ratio=empirical / propagated if judged else None,
+        ratio_interval=(float(place["low"]), float(place["high"])) if judged else None,
+        bias=bias,
+        predicted_bias=predicted_bias,
+        rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
+        status=row_status(_STATUSES[place["clean"]], failures, n),
+    )
+
+
+def _known(number: np.float64) -> float | None:
+    return None if math.isnan(number) else float(number)
+
+
+def row_status(clean: str, others: dict[str, int], images: int) -> str:
+    """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.
+
+    Parameters
+    ----------
+    clean : str
+        Status of the noise-free image.
+    others : dict
+        Number of noisy images by status, of those that are not ``ok``.
+    images : int
+        Noisy images in all; `statistics.STRAY` of them may be lost.
+
+    Examples
+    --------
+    >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
+    ('ok', 'low_contrast')
+    """
+    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
+        return clean
+    return max(others, key=others.get)
