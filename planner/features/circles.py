@@ -1,7 +1,7 @@
-"""A circular edge as the sensor sees it, and how well the centre of its image is found.
+"""A circular edge as the sensor sees it, and how well the circle is found from its rim.
 
-The image of a circle is an ellipse. Moving it by (x, y) and straining it by a symmetric matrix reaches every ellipse
-near by, so these five are the parameters of the fit; a point's residual is its distance along the normal.
+The pose tells in which plane the circle lies, so its parameters are three: two shifts of its centre in that plane and the
+change of its radius. A point's residual is its distance from the rim's image along the normal.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.features.seen import plane_axes
 from planner.imaging.appearance import behind, of_sides, signal
-from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame, project_ideal
+from planner.imaging.projection import jacobian_ideal
 from planner.imaging.rays import first_face
-from scenes import Circle, Scene, Solid
+from scenes import Circle, Solid
 
 RIM_POINTS = 64
 
@@ -26,8 +26,9 @@ class Rim:
 
     Attributes
     ----------
-    design : ndarray, shape (..., n, 5)
-        Derivative of each point's distance along its normal by the ellipse's five parameters, the centre first.
+    design : ndarray, shape (..., n, 3)
+        Derivative of each point's place along its normal by the circle's three parameters (`planner.features.seen`), px
+        for the scene's unit.
     arc : ndarray, shape (..., n)
         Length of image that each point stands for, px.
     squared : ndarray, shape (..., n)
@@ -51,17 +52,16 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     """Sample a circular edge at equal angles."""
     scene, sensors = pictures.scene, pictures.sensors
     angle = 2 * np.pi * (np.arange(RIM_POINTS) + 0.5) / RIM_POINTS
-    one, two = _axes(circle.axis)
+    one, two = plane_axes(circle.axis)
     radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
     points = circle.centre + circle.radius * radial
+    slope = jacobian_ideal(points, sensors, scene.camera)
     step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
-    image = project_ideal(points, sensors, scene.camera)
-    tangent = (project_ideal(points + 1e-4 * step, sensors, scene.camera) - image) / 1e-4
+    tangent = np.einsum("...nij,nj->...ni", slope, step)
     speed = np.linalg.norm(tangent, axis=-1)
     normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1) / speed[..., None]
-    x, y = np.moveaxis(image - ellipse_centre(scene, circle, sensors)[..., None, :], -1, 0)
-    nx, ny = normal[..., 0], normal[..., 1]
-    design = np.stack([nx, ny, nx * x, ny * y, nx * y + ny * x], -1)
+    across = np.einsum("...ni,...nij->...nj", normal, slope)
+    design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
     sides = _sides(pictures, circle, points, radial, fall_off)
     if not fall_off:
         squared, noise = (sides[..., 0, :] - sides[..., 1, :]) ** 2, scene.noise.variance
@@ -70,26 +70,15 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     return Rim(design, speed * 2 * np.pi / RIM_POINTS, squared, noise)
 
 
-def ellipse_centre(scene: Scene, circle: Circle, sensors: np.ndarray) -> np.ndarray:
-    """Centre of the ellipse that is the image of a circle, px; not the image of the circle's centre."""
-    axes, camera = frame(sensors), scene.camera
-    centre = circle.centre - np.array(camera.look_at)
-    columns = np.stack([circle.radius * axis for axis in _axes(circle.axis)] + [centre], -1)
-    rows = np.stack([camera.focal_px * axes.right, camera.focal_px * axes.down, axes.forward], -2) @ columns
-    rows[..., 2, 2] += camera.distance
-    dual = rows @ np.diag([1.0, 1.0, -1.0]) @ np.swapaxes(rows, -1, -2)
-    return dual[..., :2, 2] / dual[..., 2:, 2] + image_centre(camera)
-
-
-def fisher_centre(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
-    """Covariance of the centre from independent points of the given inverse variances (..., n), px^2."""
+def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
+    """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
     information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
-    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 5
-    return _centre(information, None, enough)
+    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 3
+    return _covariance(information, None, enough)
 
 
-def calibrated_centre(circle: Rim, kappa2: float, correlation_length: float, weakest: float) -> np.ndarray:
-    """Covariance of the centre found by least squares from dense points with correlated errors, px^2.
+def calibrated_circle(circle: Rim, kappa2: float, correlation_length: float, weakest: float) -> np.ndarray:
+    """Covariance of the three parameters found by least squares from dense points with correlated errors, unit^2.
 
     ``kappa2`` is a point's variance over that of the noise at unit contrast. Points of a squared contrast below
     ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
@@ -100,28 +89,21 @@ def calibrated_centre(circle: Rim, kappa2: float, correlation_length: float, wea
     )
     information = np.einsum("...n,...ni,...nj->...ij", used, circle.design, circle.design)
     spread = np.einsum("...n,...ni,...nj->...ij", used * variance, circle.design, circle.design)
-    return _centre(information, spread, (used > 0).mean(-1) >= 0.1)
+    return _covariance(information, spread, (used > 0).mean(-1) >= 0.1)
 
 
-def _centre(information: np.ndarray, spread: np.ndarray | None, enough: np.ndarray) -> np.ndarray:
-    """Upper left block of information^-1 [spread information^-1]; infinite diagonal where singular."""
+def _covariance(information: np.ndarray, spread: np.ndarray | None, enough: np.ndarray) -> np.ndarray:
+    """information^-1 [spread information^-1]; infinite diagonal where singular."""
     enough = enough & np.isfinite(information).all((-1, -2))
     size = np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1)))
     enough &= (size > 0).all(-1)
     size = np.where(enough[..., None], size, 1.0)
-    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), np.eye(5))
+    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), np.eye(3))
     enough &= np.linalg.eigvalsh(scaled)[..., 0] > 1e-10
-    scaled = np.where(enough[..., None, None], scaled, np.eye(5))
+    scaled = np.where(enough[..., None, None], scaled, np.eye(3))
     inverse = np.linalg.inv(scaled) / (size[..., None] * size[..., None, :])
     covariance = inverse if spread is None else inverse @ np.where(enough[..., None, None], spread, 0.0) @ inverse
-    return np.where(enough[..., None, None], covariance[..., :2, :2], np.diag([np.inf, np.inf]))
-
-
-def _axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    one = np.cross(axis, helper)
-    one /= np.linalg.norm(one)
-    return one, np.cross(axis, one)
+    return np.where(enough[..., None, None], covariance, np.diag(np.full(3, np.inf)))
 
 
 def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
