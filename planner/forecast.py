@@ -67,6 +67,8 @@ def forecasts(
 ) -> tuple[Forecast, ...]:
     """One for each quantity of one picture, from the errors, the edges' statuses, and biases in image and object."""
     known = evaluated.measurands
+    crowds = zip(known.circles, evaluated.crowded, strict=False)
+    edge_status = edge_status | {name: "clutter" for name, crowded in crowds if crowded}
     found = []
     for m, quantity in enumerate(known.quantities):
         nominal = known.value_object[m] if quantity.nominal is None else quantity.nominal

@@ -10,14 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.features.locator import reach
 from planner.features.seen import plane_axes
 from planner.imaging.appearance import behind, of_sides, signal
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import jacobian_ideal
+from planner.imaging.projection import from_axis, jacobian_ideal
 from planner.imaging.rays import first_face
 from scenes import Circle, Solid
 
 RIM_POINTS = 64
+LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of it is taken and its circle is `clutter`
+LEAST_SEEN = 0.1  # part of the rim that must have contrast
+_STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
 
 
 @dataclass(frozen=True)
@@ -35,12 +39,22 @@ class Rim:
         Squared contrast, 0 at hidden points.
     noise_variance : ndarray, shape (..., n), or float
         Mean of both sides, grey levels^2.
+    clear : ndarray of bool, shape (..., n)
+        Whether the locator is undisturbed there: the far rim of the wall beside, where the wall is seen, and the straight
+        edges around the circle's face are `locator.reach` away.
     """
 
     design: np.ndarray
     arc: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray | float
+    clear: np.ndarray
+
+    @property
+    def crowded(self) -> np.ndarray:
+        """Whether so little of what is seen is undisturbed that all of it has to be taken, bool, shape (...)."""
+        seen = self.squared > 0
+        return (seen & self.clear).mean(-1) < LEAST_CLEAR * np.maximum(seen.mean(-1), LEAST_CLEAR)
 
     @property
     def counted(self) -> np.ndarray:
@@ -48,12 +62,23 @@ class Rim:
         return self.squared > 0
 
 
+def equal_angles(count: int = RIM_POINTS) -> np.ndarray:
+    """Angles all around a rim."""
+    return 2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Unit vectors from a circle's centre, shape (n, 3)."""
+    one, two = plane_axes(circle.axis)
+    return np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+
+
 def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     """Sample a circular edge at equal angles."""
     scene, sensors = pictures.scene, pictures.sensors
-    angle = 2 * np.pi * (np.arange(RIM_POINTS) + 0.5) / RIM_POINTS
+    angle = equal_angles()
     one, two = plane_axes(circle.axis)
-    radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+    radial = radials(circle, angle)
     points = circle.centre + circle.radius * radial
     slope = jacobian_ideal(points, sensors, scene.camera)
     step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
@@ -67,7 +92,87 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
         squared, noise = (sides[..., 0, :] - sides[..., 1, :]) ** 2, scene.noise.variance
     else:
         squared, noise = of_sides(scene, sides)
-    return Rim(design, speed * 2 * np.pi / RIM_POINTS, squared, noise)
+    clear = clearance(pictures, circle, angle) >= reach(scene.locator.scale_px, scene.camera.blur_px)
+    return Rim(design, speed * 2 * np.pi / RIM_POINTS, squared, noise, clear)
+
+
+def contrast_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
+    """Squared contrast at angles of a rim, 0 where it is hidden, and the noise's variance there."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    return of_sides(pictures.scene, _sides(pictures, circle, points, radial, True))
+
+
+def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees a rim at angles, whatever the light, bool, shape (..., n)."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    sensor_at = pictures.sensor_at[..., None, :]
+    turned = [
+        np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        for normal in (np.broadcast_to(circle.axis, points.shape), -radial if circle.hole else radial)
+    ]
+    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(circle, points), sensor_at)
+
+
+def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
+
+    Boundaries are the wall's other rim, where the wall beside the place is seen, and straight edges of the face.
+    """
+    solid, radial = pictures.scene.solid, radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    there = _image(pictures, points)
+    nearest = np.full(there.shape[:-1], np.inf)
+    for other in solid.circles:
+        if _coaxial(circle, other):
+            wall = -radial if circle.hole else radial
+            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - points) > 0
+            away = _to_curve(there, _image(pictures, other.centre + other.radius * radials(other, equal_angles())))
+            nearest = np.where(turned, np.minimum(nearest, away), nearest)
+    own = {name for rim in solid.circles for name in rim.edges}
+    for edge in solid.edges:
+        if circle.face in edge.faces and edge.name not in own:
+            start, stop = solid.vertices[list(edge.ends)]
+            places = start + np.linspace(0, 1, _STRAIGHT)[:, None] * (stop - start)
+            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, places), closed=False))
+    return nearest
+
+
+def _image(pictures: Pictures, points: np.ndarray) -> np.ndarray:
+    return from_axis(points, pictures.sensors, pictures.scene.camera)
+
+
+def _coaxial(circle: Circle, other: Circle) -> bool:
+    """Whether another circle is the far rim of the same wall, or may be: on the same axis, about as wide."""
+    across = other.centre - circle.centre
+    along = across @ circle.axis
+    near = 1e-3 * circle.radius
+    return (
+        other is not circle
+        and other.hole == circle.hole
+        and abs(along) > near
+        and np.linalg.norm(across - along * circle.axis) < near
+        and abs(other.radius - circle.radius) < circle.radius / 2
+    )
+
+
+def _to_curve(points: np.ndarray, curve: np.ndarray, *, closed: bool = True) -> np.ndarray:
+    """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n)."""
+    start, stop = (curve, np.roll(curve, -1, -2)) if closed else (curve[..., :-1, :], curve[..., 1:, :])
+    nearest = np.full(points.shape[:-1], np.inf)
+    for k in range(start.shape[-2]):
+        a, along = start[..., k : k + 1, :], stop[..., k : k + 1, :] - start[..., k : k + 1, :]
+        size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
+        share = np.clip(((points - a) * along).sum(-1) / size, 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(points - a - share[..., None] * along, axis=-1))
+    return nearest
+
+
+def _probe(circle: Circle, points: np.ndarray) -> np.ndarray:
+    """Places that stand for those of a rim where it is asked what they see: the mesh's facets reach into a hole."""
+    chord = np.cos(np.pi / len(circle.edges)) if circle.hole else 1.0
+    return circle.centre + chord * (points - circle.centre)
 
 
 def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
@@ -80,16 +185,17 @@ def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) 
 def calibrated_circle(circle: Rim, kappa2: float, correlation_length: float, weakest: float) -> np.ndarray:
     """Covariance of the three parameters found by least squares from dense points with correlated errors, unit^2.
 
-    ``kappa2`` is a point's variance over that of the noise at unit contrast. Points of a squared contrast below
-    ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
+    ``kappa2`` is a point's variance over that of the noise at unit contrast. Disturbed points and those of a squared
+    contrast below ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
     """
-    used = np.where(circle.squared >= weakest * circle.noise_variance, circle.arc, 0.0)
+    taken = circle.clear | circle.crowded[..., None]
+    used = np.where(taken & (circle.squared >= weakest * circle.noise_variance), circle.arc, 0.0)
     variance = (
         kappa2 * circle.noise_variance * correlation_length / np.where(circle.squared > 0, circle.squared, np.inf)
     )
     information = np.einsum("...n,...ni,...nj->...ij", used, circle.design, circle.design)
     spread = np.einsum("...n,...ni,...nj->...ij", used * variance, circle.design, circle.design)
-    return _covariance(information, spread, (used > 0).mean(-1) >= 0.1)
+    return _covariance(information, spread, (used > 0).mean(-1) >= LEAST_SEEN)
 
 
 def _covariance(information: np.ndarray, spread: np.ndarray | None, enough: np.ndarray) -> np.ndarray:
@@ -110,8 +216,7 @@ def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.n
     """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
     bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
     wall = -radial if circle.hole else radial
-    chord = np.cos(np.pi / len(circle.edges)) if circle.hole else 1.0  # the mesh's facets reach into the hole
-    probe = circle.centre + chord * (points - circle.centre)
+    probe = _probe(circle, points)
     lit = tuple(_free(bodies, probe, at[..., None, :]) for at in pictures.lights_at)
     sides = []
     for normal in (np.broadcast_to(circle.axis, points.shape), wall):

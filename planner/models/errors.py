@@ -38,6 +38,8 @@ class Errors:
     circles : tuple of ndarray, shape (..., 3, 3)
         Covariance of each circle's three parameters, the scene's unit squared; infinite diagonal where it cannot be
         found.
+    crowded : tuple of ndarray of bool, shape (...)
+        Whether something disturbs most of each circle.
     """
 
     measurands: Measurands
@@ -47,6 +49,7 @@ class Errors:
     contrast: np.ndarray
     noise_variance: np.ndarray
     circles: tuple[np.ndarray, ...]
+    crowded: tuple[np.ndarray, ...]
 
     @property
     def variance(self) -> np.ndarray:
@@ -89,10 +92,11 @@ def combined(
     """From the lines' and the circles' errors to those of all quantities."""
     known, solid = measurands(pictures), pictures.scene.solid
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        rims = (rim(pictures, solid.circle(name), fall_off=fall_off) for name in known.circles)
+        rims = [rim(pictures, solid.circle(name), fall_off=fall_off) for name in known.circles]
         circles = tuple(circle_covariance(each) for each in rims)
     noise = np.broadcast_to(noise_variance, contrast2.shape)
-    bare = Errors(known, np.empty(0), np.empty(0), line_variance, np.sqrt(contrast2), noise, circles)
+    crowded = tuple(each.crowded for each in rims)
+    bare = Errors(known, np.empty(0), np.empty(0), line_variance, np.sqrt(contrast2), noise, circles, crowded)
     return replace(
         bare, variances=_variances(bare, known.gradient), variances_object=_variances(bare, known.gradient_object)
     )
