@@ -109,7 +109,9 @@ def _gathered(found: Found, scene: Scene, lead: tuple[int, ...]) -> Measurements
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)
-    told = [q.nominal if q.nominal is not None else v for q, v in zip(quantities, found.known.value_object, strict=True)]
+    told = [
+        q.nominal if q.nominal is not None else v for q, v in zip(quantities, found.known.value_object, strict=True)
+    ]
     return Measurements(
         quantities=quantities,
         units=tuple(unit_of(scene, quantity) for quantity in quantities),

@@ -15,23 +15,26 @@ from measure import status
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
-from planner.features.circles import (
-    LEAST_CLEAR,
-    LEAST_SEEN,
+from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
+from planner.features.locator import MIN_CONTRAST, edge_blur, reach
+from planner.features.rim_sides import (
+    RIM_POINTS,
     clearance,
     contrast_along,
     equal_angles,
+    outward_normals,
     radials,
     seen_along,
+    shading_shift,
+    steady,
 )
-from planner.features.locator import MIN_CONTRAST, edge_blur, reach
 from planner.features.seen import plane_axes
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import jacobian_ideal, project_ideal
+from planner.imaging.projection import project_ideal
 from scenes import Circle, Picture, Solid
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
-_FEWEST = 24  # places on a rim, however small
+_MOST = 64  # times the planner's places
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
 _GRID = 0.25  # px to which a new expectation is rounded, so that images can share it
@@ -50,9 +53,10 @@ class RimTool:
     design : ndarray, shape (m, 3)
         Derivative of each place's offset by the circle's parameters, ideal px for the scene's unit.
     weights : ndarray, shape (m,)
-        Length of the rim's image that each place stands for, px; 0 where it is not taken.
+        Of the places in the least squares: the length that each stands for, and where the light is known the squared
+        contrast over the noise's variance; 0 where it is not taken.
     inward : ndarray, shape (m,)
-        How far inside the rim the zero crossing lies, for the rim is curved, ideal px.
+        How far inside the rim the zero crossing lies, for the rim is curved and its sides are shaded, ideal px.
     state : str
         ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
     optics : Optics
@@ -194,30 +198,26 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
     spokes = radial * (circle.radius * facets(solid, nominal, angle))[:, None]
-    ideal = project_ideal(circle.centre + spokes, pictures.sensors, camera)
-    ahead, behind = (
-        project_ideal(circle.centre + circle.radius * radials(circle, angle + s * _BEND), pictures.sensors, camera)
-        for s in (1, -1)
+    ideal, smooth, ahead, behind = (
+        project_ideal(circle.centre + away, pictures.sensors, camera)
+        for away in (spokes, *(circle.radius * radials(circle, angle + s * _BEND) for s in (0, 1, -1)))
     )
-    smooth = project_ideal(circle.centre + circle.radius * radial, pictures.sensors, camera)
-    tangent, bend = (ahead - behind) / (2 * _BEND), (ahead - 2 * smooth + behind) / _BEND**2
-    speed = np.linalg.norm(tangent, axis=-1)
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]], -1) / speed[:, None]
-    slope = jacobian_ideal(circle.centre + spokes, pictures.sensors, camera)
+    normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("ni,nij->nj", normal, slope)
-    outward = np.sign((across * radial).sum(-1))
-    normal, across = normal * outward[:, None], across * outward[:, None]
     design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
-    curvature = -(bend * normal).sum(-1) / speed**2
+    curvature = -((ahead - 2 * smooth + behind) / _BEND**2 * normal).sum(-1) / speed**2
     inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature
+    if pictures.lights:
+        inward = inward - shading_shift(pictures, nominal, angle)
     places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
     size = np.linalg.norm(gradient, axis=-1)
-    taken, state = _taken(pictures, nominal, angle, places, optics)
+    arc = speed * 2 * np.pi / angle.size
+    weight, state = _weights(pictures, nominal, angle, places, arc, optics)
+    taken = weight > 0
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
     recorded_normals = gradient / size[:, None]
     locator = gradient_along(optics, angle[keep], _held(places[keep], optics), recorded_normals[keep], size[keep])
-    weights = np.where(taken, speed * 2 * np.pi / angle.size, 0.0)
-    return RimTool(locator, design[keep], weights[keep], inward[keep], state, optics)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
 
 
 def _held(places: np.ndarray, optics: Optics) -> np.ndarray:
@@ -227,9 +227,11 @@ def _held(places: np.ndarray, optics: Optics) -> np.ndarray:
 
 
 def _count(pictures: Pictures, circle: Circle, scale: float) -> int:
-    rim = project_ideal(circle.centre + circle.radius * radials(circle, equal_angles()), pictures.sensors, pictures.scene.camera)
+    """Number of places: the planner's, or as many times that as the image's length needs."""
+    places = circle.centre + circle.radius * radials(circle, equal_angles())
+    rim = project_ideal(places, pictures.sensors, pictures.scene.camera)
     length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()
-    return int(np.clip(np.ceil(length / (SPACING * scale)), _FEWEST, 4000))
+    return RIM_POINTS * int(np.clip(np.ceil(length / (SPACING * scale * RIM_POINTS)), 1, _MOST))
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
@@ -237,25 +239,30 @@ def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
     return replace(circle, centre=circle.centre + errors[0] * one + errors[1] * two, radius=circle.radius + errors[2])
 
 
-def _taken(
-    pictures: Pictures, circle: Circle, angle: np.ndarray, places: np.ndarray, optics: Optics
+def _weights(
+    pictures: Pictures, circle: Circle, angle: np.ndarray, places: np.ndarray, arc: np.ndarray, optics: Optics
 ) -> tuple[np.ndarray, str]:
-    """Which places are taken, bool (m,), and the status that this makes: the rules of `planner.features.circles`."""
+    """Weights of places (m,), 0 where they are not taken, and the status that this makes.
+
+    The rules are those of `planner.features.circles`.
+    """
     margin = optics.window_px + 4 * optics.scale_px + 1
     inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(-1)
     seen = inside & seen_along(pictures, circle, angle)
     if seen.mean() < LEAST_SEEN:
-        return seen & False, status.NOT_VISIBLE
-    strong = seen
+        return np.zeros(seen.size), status.NOT_VISIBLE
+    strong, weight, far = seen, arc, reach(optics.scale_px, optics.blur_px)
+    clear = clearance(pictures, circle, angle) >= far
     if pictures.lights:
         squared, noise = contrast_along(pictures, circle, angle)
         strong = seen & (squared >= MIN_CONTRAST**2 * noise)
+        weight, clear = arc * squared / noise, clear & steady(squared, arc, far)
         if strong.mean() < LEAST_SEEN:
-            return seen & False, status.LOW_CONTRAST
-    clear = strong & (clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.blur_px))
-    if clear.mean() < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or clear.mean() < LEAST_SEEN:
-        return strong, status.CLUTTER
-    return clear, status.OK
+            return np.zeros(seen.size), status.LOW_CONTRAST
+    part = (strong & clear).mean()
+    if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or part < LEAST_SEEN:
+        return np.where(strong, weight, 0.0), status.CLUTTER
+    return np.where(strong & clear, weight, 0.0), status.OK
 
 
 def facets(solid: Solid, circle: Circle, angle: np.ndarray) -> np.ndarray:

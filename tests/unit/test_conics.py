@@ -38,6 +38,7 @@ def test_design_against_central_differences():
 
     along = np.roll(image(0, 0, 0), -1, 0) - np.roll(image(0, 0, 0), 1, 0)
     normal = np.stack([along[:, 1], -along[:, 0]], -1) / np.linalg.norm(along, axis=1)[:, None]
+    normal *= np.sign((normal * (image(0, 0, 0) - image(0, 0, -2))).sum(1))[:, None]  # outwards
     for k, step in enumerate(1e-4 * np.eye(3)):
         moved = ((image(*step) - image(*-step)) / 2e-4 * normal).sum(1)
         assert rim(pictures, circle).design[:, k] == pytest.approx(moved, rel=2e-3, abs=2e-3)
