@@ -3,7 +3,8 @@
 from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
 from planner.imaging.pictures import Pictures
-from planner.jitter import PoseSpread, pose_spread
+from planner.forecast import Forecast
+from planner.jitter import PoseSpread, pose_scatter, pose_spread
 from planner.maps import variance_map
 from planner.planning import Candidate, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
@@ -14,7 +15,7 @@ from planner.search.robustness import Robust, Tolerances, robust
 from planner.search.viewing import ViewingSpace, local_minima
 
 __all__ = [
-    "Candidate", "Constraints", "EdgePrediction", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust",
-    "Tolerances", "ViewingSpace", "alternate", "exhaustive", "local_minima", "plan", "pose_spread", "predict",
+    "Candidate", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust",
+    "Tolerances", "ViewingSpace", "alternate", "exhaustive", "local_minima", "plan", "pose_scatter", "pose_spread", "predict",
     "projected_edges", "required_edges", "robust", "variance_map", "variances",
 ]  # fmt: skip

@@ -13,6 +13,7 @@ import scenes
 from scenes import InvalidInput
 from validation import statistics
 from validation.batch.campaign import Campaign, Case
+from validation.batch.measurands import JudgedMeasurand, judged
 from validation.batch.store import RunFile
 from validation.batch.work import Method, methods
 from validation.statistics import Verdict
@@ -49,6 +50,9 @@ class Judged:
 class Row:
     """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
 
+    They are about the first measurand, in the image; ``measurands`` are all of them by the verdict's method, in the
+    scene's unit.
+
     ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
     """
 
@@ -65,6 +69,7 @@ class Row:
     bound: float
     main: Judged
     classic: tuple[Judged, ...]
+    measurands: tuple[JudgedMeasurand, ...]
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         refused=refused,
         search=_search(campaign, scale),
         correlation=_correlations(rows),
-        verdict=_judge([row.main for row in rows], sum(reason != _WAITING for reason in refused.values())),
+        verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values())),
         classic_verdicts=_classic_verdicts(rows),
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
@@ -152,8 +157,8 @@ def _classic_verdicts(rows: tuple[Row, ...]) -> dict[str, Verdict]:
     """Of each other method, over the settings that have it."""
     groups: dict[str, list[Judged]] = {}
     for row in rows:
-        for judged in row.classic:
-            groups.setdefault(judged.method, []).append(judged)
+        for each in row.classic:
+            groups.setdefault(each.method, []).append(each)
     return {method: _judge(group) for method, group in groups.items()}
 
 
@@ -183,6 +188,7 @@ def _row(case: Case, scale: float | None, store: RunFile) -> Row:
         bound=model["bound"],
         main=main,
         classic=tuple(classic),
+        measurands=judged(model["measurands"], main.method, case.index, store, row_status),
     )
 
 
@@ -233,9 +239,31 @@ def row_status(clean: str, others: dict[str, int], images: int) -> str:
     return max(others, key=others.get)
 
 
-def _judge(judged: list[Judged], refused: int = 0) -> Verdict:
+def _verdict(rows: tuple[Row, ...], refused: int) -> Verdict:
+    """About every measurand of every setting; where there is one a setting, about its value in the image."""
+    if all(len(row.measurands) == 1 for row in rows):
+        return _judge([row.main for row in rows], refused)
+    every = [each for row in rows for each in row.measurands]
+    lost = [None] * refused
+
+    def column(name: str, none: float = np.nan) -> np.ndarray:
+        return np.array([none if each is None else getattr(each, name) for each in [*every, *lost]], float)
+
+    return statistics.verdict(
+        column("ratio"),
+        column("n", 0) - column("failed", 0),
+        lost=column("failed", 0),
+        bias_px=column("bias"),
+        predicted_bias_px=column("predicted_bias"),
+        sigma_px=np.sqrt(column("predicted")),
+        ok=[*(each.status == "ok" for each in every), *(False for _ in lost)],
+        independent=column("independent", 1.0),
+    )
+
+
+def _judge(rows: list[Judged], refused: int = 0) -> Verdict:
     """Of one method; a setting that could not be worked on counts as one that was not measured."""
-    listed = [*judged, *[_NOTHING] * refused]
+    listed = [*rows, *[_NOTHING] * refused]
 
     def column(name: str) -> np.ndarray:
         return np.array([getattr(j, name) for j in listed], float)  # None becomes NaN
@@ -275,7 +303,7 @@ def _search(campaign: Campaign, scale: float | None):
     found = []
     for other in map(scenes.load, campaign.scenes[0].same_scale):
         for setting in other.settings:
-            ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_px2 * scale
+            ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_image * scale
             found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
     return tuple(found)
 
@@ -294,7 +322,8 @@ def _row_json(row: Row) -> dict[str, Any]:
         "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
         **main,
         "bound": row.bound,
-        "classic": [asdict(judged) for judged in row.classic],
+        "classic": [asdict(each) for each in row.classic],
+        "measurands": [asdict(each) for each in row.measurands],
     }
 
 
