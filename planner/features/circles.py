@@ -88,17 +88,28 @@ def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) 
     return _covariance(information, enough)
 
 
-def calibrated_circle(circle: Rim, kappa2: float, correlation_length: float, weakest: float) -> np.ndarray:
-    """Covariance of the three parameters found by weighted least squares from dense points, errors correlated, unit^2.
+def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
+    """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
-    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the noise at unit contrast. Disturbed points and those of a squared
-    contrast below ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
+    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the noise
+    at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an edge, the
+    variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece that is used.
+    Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of
+    the rim must be left.
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
-    used = np.where(taken & (ratio >= weakest), circle.arc * ratio, 0.0)
-    information = np.einsum("...n,...ni,...nj->...ij", used, circle.design, circle.design)
-    return _covariance(information, (used > 0).mean(-1) >= LEAST_SEEN) * kappa2 * correlation_length
+    used = taken & (ratio >= weakest)
+    ends = (used & ~np.roll(used, 1, -1)).astype(int) + (used & ~np.roll(used, -1, -1))
+    information, at_ends = (
+        np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
+        for weight in (circle.arc, ends)
+    )
+    inverse = _covariance(information, used.mean(-1) >= LEAST_SEEN)
+    good = np.isfinite(inverse).all((-1, -2))[..., None, None]
+    known = np.where(good, inverse, 0.0)
+    found = kappa2 * (2 * np.sqrt(np.pi) * scale * known - 2 * scale**2 * known @ at_ends @ known)
+    return np.where(good, found, inverse)
 
 
 def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:
