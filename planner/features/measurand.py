@@ -6,7 +6,9 @@ To first order a measured quantity moves by gradient . errors, the errors being 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -33,26 +35,54 @@ class Measurands:
     quantities : tuple of Quantity
     view : ProjectedEdges
         The E different straight edges that they depend on.
-    circles : tuple of str
-        The C circles.
-    value : ndarray, shape (..., M)
-        In the image (ideal coordinates: the lens' distortion undone).
-    value_object : ndarray, shape (M,)
-        In the object.
-    gradient, gradient_object : ndarray, shape (..., M, 2 E + 3 C)
-        Derivatives of the values in the image and in the object by the parameters of `Seen`.
     seen : Seen
         What they are found from.
     """
 
     quantities: tuple[Quantity, ...]
     view: ProjectedEdges
-    circles: tuple[str, ...]
-    value: np.ndarray
-    value_object: np.ndarray
-    gradient: np.ndarray
-    gradient_object: np.ndarray
     seen: Seen
+
+    @property
+    def circles(self) -> tuple[str, ...]:
+        """The C circles that they depend on."""
+        return self.seen.circles
+
+    @property
+    def value(self) -> np.ndarray:
+        """In the image (ideal coordinates: the lens' distortion undone), shape (..., M)."""
+        return self._image[0]
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """Derivatives of the values in the image by the parameters of `Seen`, shape (..., M, 2 E + 3 C)."""
+        return self._image[1]
+
+    @cached_property
+    def value_object(self) -> np.ndarray:
+        """In the object, shape (M,)."""
+        found = self._plane[0].reshape(-1, len(self.quantities))
+        return found[0] if len(found) else np.full(len(self.quantities), np.nan)
+
+    @property
+    def gradient_object(self) -> np.ndarray:
+        """The same of the values on the planes of the features, shape (..., M, 2 E + 3 C)."""
+        return self._plane[1]
+
+    @cached_property
+    def _image(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._found(in_image)
+
+    @cached_property
+    def _plane(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._found(on_plane)
+
+    def _found(self, kind: Callable[[Seen, Quantity], Evaluated]) -> tuple[np.ndarray, np.ndarray]:
+        lead = self.seen.sensors.shape[:-1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            found = [kind(self.seen, quantity) for quantity in self.quantities]
+            values = np.stack([np.broadcast_to(each.value, lead) for each in found], -1)
+            return values, dense(found, lead, self.seen.count)
 
     def of_lines(self, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A gradient's parts by displacement and rotation of each line, each (..., M, E)."""
@@ -109,23 +139,8 @@ def measurand(pictures: Pictures, number: int = 0) -> Measurand:
 
 
 def _measurands(pictures: Pictures) -> Measurands:
-    scene = pictures.scene
     view = projected_edges(pictures)
-    seen = expected(pictures, view)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        image, plane = ([find(seen, q) for q in scene.quantities] for find in (in_image, on_plane))
-        lead = pictures.sensors.shape[:-1]
-        nominal = [float(np.ravel(each.value)[0]) if np.size(each.value) else np.nan for each in plane]
-        return Measurands(
-            quantities=scene.quantities,
-            view=view,
-            circles=seen.circles,
-            value=np.stack([np.broadcast_to(each.value, lead) for each in image], -1),
-            value_object=np.array(nominal),
-            gradient=dense(image, lead, seen.count),
-            gradient_object=dense(plane, lead, seen.count),
-            seen=seen,
-        )
+    return Measurands(pictures.scene.quantities, view, expected(pictures, view))
 
 
 def dense(found: list[Evaluated], lead: tuple[int, ...], count: int) -> np.ndarray:

@@ -16,6 +16,7 @@ RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
 _MOST_AWAY = 16  # places beyond which no jump is looked for
 _STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
+_AT_ONCE = 1 << 17  # numbers
 _STEP = 0.25  # px that a slope is taken over
 
 
@@ -173,11 +174,14 @@ def _to_curve(points: np.ndarray, curve: np.ndarray, *, closed: bool = True) -> 
     """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n)."""
     start, stop = (curve, np.roll(curve, -1, -2)) if closed else (curve[..., :-1, :], curve[..., 1:, :])
     nearest = np.full(points.shape[:-1], np.inf)
-    for k in range(start.shape[-2]):
-        a, along = start[..., k : k + 1, :], stop[..., k : k + 1, :] - start[..., k : k + 1, :]
+    pieces = start.shape[-2]
+    many = max(1, _AT_ONCE // max(points.size, 1))
+    for k in range(0, pieces, many):
+        a, b = (ends[..., None, k : k + many, :] for ends in (start, stop))
+        along, away = b - a, points[..., None, :] - a
         size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
-        share = np.clip(((points - a) * along).sum(-1) / size, 0, 1)
-        nearest = np.minimum(nearest, np.linalg.norm(points - a - share[..., None] * along, axis=-1))
+        share = np.clip((away * along).sum(-1) / size, 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(away - share[..., None] * along, axis=-1).min(-1))
     return nearest
 
 

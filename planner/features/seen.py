@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -84,12 +85,12 @@ class Seen:
         """Unit normal (-t_y, t_x) of each line, shape (..., E, 2)."""
         return unit_normals(self.along)
 
-    @property
+    @cached_property
     def eye(self) -> np.ndarray:
         """Where the sensors stand, shape (..., 3)."""
         return sensor_position(self.camera, self.sensors)
 
-    @property
+    @cached_property
     def axes(self) -> Frame:
         return frame(self.sensors)
 

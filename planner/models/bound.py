@@ -182,7 +182,8 @@ def bound(pictures: Pictures) -> Errors:
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
-    return Errors(known, variances, variances_object, line_variance, alone.contrast, alone.noise_variance, (), ())
+    joint = variances, variances_object
+    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint)
 
 
 def _unit(known: Measurands) -> np.ndarray:

@@ -7,7 +7,8 @@ line's displacement at the edge's first end (px) and theta its rotation (rad). `
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,9 +27,6 @@ class Errors:
     ----------
     measurands : Measurands
         What is measured; its arrays have the sensors' leading shape.
-    variances, variances_object : ndarray, shape (..., M)
-        Of all quantities in the image (px^2, or degrees^2 of an angle) and in the object (the scene's unit squared, or
-        degrees^2); infinite where it cannot be measured.
     line_variance : callable
         (A, B) of shape (..., E) to the variance of A d + B theta of each line, px^2.
     contrast : ndarray, shape (..., E)
@@ -40,16 +38,27 @@ class Errors:
         found.
     crowded : tuple of ndarray of bool, shape (...)
         Whether something disturbs most of each circle.
+    joint : tuple of ndarray, optional
+        Variances in the image and in the object where a model finds them jointly, not edge by edge.
     """
 
     measurands: Measurands
-    variances: np.ndarray
-    variances_object: np.ndarray
     line_variance: LineVariance
     contrast: np.ndarray
     noise_variance: np.ndarray
     circles: tuple[np.ndarray, ...]
     crowded: tuple[np.ndarray, ...]
+    joint: tuple[np.ndarray, np.ndarray] | None = None
+
+    @cached_property
+    def variances(self) -> np.ndarray:
+        """Of all quantities in the image, px^2 (degrees^2 of an angle), shape (..., M); infinite where not measurable."""
+        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
+
+    @cached_property
+    def variances_object(self) -> np.ndarray:
+        """The same in the object, the scene's unit squared (degrees^2)."""
+        return self.joint[1] if self.joint else _variances(self, self.measurands.gradient_object)
 
     @property
     def variance(self) -> np.ndarray:
@@ -96,10 +105,7 @@ def combined(
         circles = tuple(circle_covariance(each) for each in rims)
     noise = np.broadcast_to(noise_variance, contrast2.shape)
     crowded = tuple(each.crowded for each in rims)
-    bare = Errors(known, np.empty(0), np.empty(0), line_variance, np.sqrt(contrast2), noise, circles, crowded)
-    return replace(
-        bare, variances=_variances(bare, known.gradient), variances_object=_variances(bare, known.gradient_object)
-    )
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded)
 
 
 def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:
