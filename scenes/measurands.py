@@ -148,10 +148,10 @@ class Measurand(Model):
             raise ValueError(f"name must be a printable text, got {self.name!r}")
         if len(self.features) != len(wanted) or not all(map(_is, wanted, self.features)):
             got = ", ".join(" ".join(feature.edges) for feature in self.features)
-            raise ValueError(f"features must be {_list(wanted)} for a {self.kind}, got {got}")
+            raise ValueError(f"features must be {_list(wanted)} for kind {self.kind}, got {got}")
         if self.nominal is not None and isinstance(self.nominal, tuple) != (self.kind == "position"):
             number = "two numbers" if self.kind == "position" else "one number"
-            raise ValueError(f"nominal must be {number} for a {self.kind}, got {self.nominal}")
+            raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
         return self
 
     @property

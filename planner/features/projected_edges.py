@@ -125,7 +125,7 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
         recorded=bent,
         framed=cut(trims, within_image(scene, bent), lengths, 0.0),
         shown=shown,
-        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], lead, ())
+        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], lead, ()).astype(bool)
         & (shown[..., 1] > 0)
         & np.isfinite(bent).all((-1, -2)),
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from planner.features.locator import CLEARANCE, edge_blur
-from planner.features.measurand import corner_response, measurands, normals
+from planner.features.measurand import Measurands, corner_response, measurands, normals
 from planner.features.sampling import sampled_line
 from planner.imaging.blurred_segment import Segments, second_and_third
 from planner.imaging.boundaries import Boundaries, Places, boundaries_near
@@ -105,6 +105,8 @@ def _in_blocks(pictures: Pictures) -> Bias:
 def _bias(pictures: Pictures) -> Bias:
     """For pictures with one leading axis."""
     known = measurands(pictures)
+    if not known.view.names:
+        return _nothing(np.broadcast_shapes(pictures.sensors.shape, *(p.shape for p in pictures.lights))[0], known)
     nodes = place_nodes(pictures, known.view, used_trims(pictures, known.view, trimmed=True))
     moved, steepness = _crossings(pictures, nodes, normals(known.view))
     mean = moved @ NODE_WEIGHTS / 2
@@ -122,6 +124,13 @@ def _bias(pictures: Pictures) -> Bias:
     disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
     corners = _corners(pictures.scene, known.view, lines)
     return Bias(values, values_object, lines, corners, shares, disturbed)
+
+
+def _nothing(count: int, known: Measurands) -> Bias:
+    """Of ``count`` pictures in which no straight edge is needed."""
+    quantities = len(known.quantities)
+    none, lines, corners = np.zeros((count, quantities)), np.zeros((count, 0, 2)), np.full((count, 2, 2), np.nan)
+    return Bias(none, none, lines, corners, np.zeros((count, quantities, 0)), np.zeros((count, 0), bool))
 
 
 def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:

@@ -206,7 +206,9 @@ def _facts(
 
 def _measurand(each: planner.Forecast) -> dict:
     zone = each.tolerance
-    sigma, sigma_image = (math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image))
+    sigma, sigma_image = (
+        math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image)
+    )
     return {
         "name": each.name,
         "kind": each.kind,

@@ -7,12 +7,21 @@ import json
 from pathlib import Path
 
 from scenes import InvalidInput
+from validation.batch.measurands import JudgedMeasurand
 from validation.batch.result import Judged, Row, Validation
 
 
 def write_csv(found: Validation, path: Path) -> Path:
     """One line a setting; variances in px^2, angles in degrees, empty where there is no number."""
-    lines = table(found)
+    return _write(table(found), path)
+
+
+def write_measurands(found: Validation, path: Path) -> Path:
+    """One line a setting and measurand; variances in the scene's unit squared or degrees^2."""
+    return _write(measurands(found), path)
+
+
+def _write(lines: list[dict[str, object]], path: Path) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(lines[0]))
         writer.writerow({key: _inert(key) for key in lines[0]})
@@ -78,3 +87,20 @@ def _judged(judged: Judged) -> dict[str, object]:
         "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
         "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
     }  # fmt: skip
+
+
+def measurands(found: Validation) -> list[dict[str, object]]:
+    """One flat record a setting and measurand, variances in the scene's unit squared or degrees^2."""
+    return [
+        {"index": row.index, "scene": row.scene, "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
+         "light_polar": row.light[0], "light_azimuth": row.light[1], **_flat(each)}
+        for row in found.rows for each in row.measurands
+    ]  # fmt: skip
+
+
+def _flat(each: JudgedMeasurand) -> dict[str, object]:
+    low, high = each.ratio_interval or (None, None)
+    return {key: value for key, value in vars(each).items() if key != "ratio_interval"} | {
+        "ratio_low": low,
+        "ratio_high": high,
+    }

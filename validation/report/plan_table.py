@@ -95,7 +95,9 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     for c in found.candidates:
         ratio = c.variance / best.variance
         if several:
-            table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", f"{ratio:.3f}")
+            table.add_row(
+                _pose(c.sensor), _pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", f"{ratio:.3f}"
+            )
             continue
         values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
         table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
