@@ -29,12 +29,12 @@ class Measurements:
     nominal : ndarray, shape (M,)
         The scene's nominal values, or the object's own.
     value_image, value : ndarray, shape (..., M)
-        In the image (px, degrees; the lens' distortion undone) and on the plane of the features (`units`); NaN where the
-        status is neither ``ok`` nor ``clutter`` nor ``misfit``.
+        In the image (px, degrees; the lens' distortion undone) and on the plane of the features (`units`); NaN where
+        the status is neither ``ok`` nor ``clutter`` nor ``misfit``.
     covariance_image, covariance : ndarray, shape (..., M, M)
         Their joint covariances (not sigmas), from the estimators' own linear responses at the contrast measured in the
-        image; infinite on the diagonal where there is no value, NaN beside it. Circles count as independent of each other
-        and of the straight edges, for they are found from different pixels.
+        image; infinite on the diagonal where there is no value, NaN beside it. Circles count as independent of each
+        other and of the straight edges, for they are found from different pixels.
     status : ndarray of str, shape (..., M)
         As of `measure.distance`, from what each quantity needs.
     p_value : ndarray, shape (...)
@@ -76,8 +76,8 @@ def measure(
     image, scene, sensor, light, threshold
         As for `measure.distance`.
     estimator : str, optional
-        Of the straight edges, as for `measure.distance`; `measure.best_estimator` when not given. Circles are found from
-        edge points (zero crossing of the Gaussian second derivative) around their rims, in the plane that the pose
+        Of the straight edges, as for `measure.distance`; `measure.best_estimator` when not given. Circles are found
+        from edge points (zero crossing of the Gaussian second derivative) around their rims, in the plane that the pose
         tells, so that centre and diameter are the circle's own and not those of its image, an ellipse.
 
     Examples

@@ -154,8 +154,8 @@ def distances(
 def _check_distance(scene: Scene) -> None:
     if scene.quantities[0].kind != "distance":
         raise InvalidInput(
-            f"{scene.name}: the first measurand must be a distance for measure.distance, got {scene.quantities[0].kind}; "
-            "measure.measure measures all"
+            f"the first measurand must be a distance for measure.distance, got {scene.quantities[0].kind} "
+            "(measure.measure takes all kinds)"
         )
 
 

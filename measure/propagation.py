@@ -32,8 +32,8 @@ class PropagatedValues:
     bias, bias_image : ndarray, shape (M,)
         That less the object's own value, and less the model's value in the image.
     covariance, covariance_image : ndarray, shape (M, M)
-        Joint covariances: edges and circles that share pixels are correlated. Infinite on the diagonal where there is no
-        value, NaN beside it.
+        Joint covariances: edges and circles that share pixels are correlated. Infinite on the diagonal where there is
+        no value, NaN beside it.
     status : tuple of str
     """
 

@@ -22,7 +22,7 @@ from scenes import Corner, Picture, Quantity
 
 @dataclass(frozen=True)
 class Values:
-    """Values (n, M), their derivatives (n, M, q) by lines and circles (`Seen`), and their joint covariance (n, M, M)."""
+    """Values (n, M), derivatives (n, M, q) by lines and circles (`Seen`), and joint covariance (n, M, M)."""
 
     value: np.ndarray
     gradient: np.ndarray
@@ -42,8 +42,8 @@ class Found:
     circles : tuple of Circles
     seen : Seen
     errors : ndarray, shape (n, q, q)
-        Joint covariance of lines and circles; those of different circles, and of circles and lines, count as independent,
-        for they are found from different pixels.
+        Joint covariance of lines and circles; those of different circles, and of circles and lines, count as
+        independent, for they are found from different pixels.
     image, plane : Values
         In the image (px, degrees) and on the planes of the features (the scene's unit, degrees).
     status : ndarray of str, shape (n, M)

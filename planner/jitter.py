@@ -73,7 +73,7 @@ def pose_scatter(scene: Scene, sensors: np.ndarray) -> PoseScatter:
 
 
 def _both(here: Measurands, there: Measurands) -> tuple[np.ndarray, np.ndarray]:
-    """Values in the image of another pose, and what they look like in the object to who believes in this one, (S, M)."""
+    """Values in the image of another pose, and what they are in the object to who believes in this one, (S, M)."""
     found = replace(there.seen, sensors=here.seen.sensors, expected=False)
     with np.errstate(divide="ignore", invalid="ignore"):
         plane = [on_plane(_with_circles(here, there, found), q).value for q in here.quantities]

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from planner import Pictures, projected_edges
-from planner.features.rim_sides import equal_angles, radials
 from planner.features.projected_edges import circles
+from planner.features.rim_sides import equal_angles, radials
 from planner.imaging.projection import project
 from render.rays import Rays
 from scenes import Picture

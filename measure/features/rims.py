@@ -1,7 +1,7 @@
 """Circles in images: edge points along the rim of a circle in its known plane, and the circle through them.
 
-The pose tells the circle's plane, so that three numbers are sought: two shifts of the centre in that plane and the change
-of the radius. The centre so found is the circle's own, not that of the ellipse which is its image.
+The pose tells the circle's plane, so that three numbers are sought: two shifts of the centre in that plane and the
+change of the radius. The centre so found is the circle's own, not that of the ellipse which is its image.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A circular edge as the sensor sees it, and how well the circle is found from its rim.
 
-The pose tells in which plane the circle lies, so its parameters are three: two shifts of its centre in that plane and the
-change of its radius. A point's residual is its distance from the rim's image along the normal.
+The pose tells in which plane the circle lies, so its parameters are three: two shifts of its centre in that plane and
+the change of its radius. A point's residual is its distance from the rim's image along the normal.
 """
 
 from __future__ import annotations
@@ -91,11 +91,11 @@ def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) 
 def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
     """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
-    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the noise
-    at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an edge, the
-    variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece that is used.
-    Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of
-    the rim must be left.
+    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the
+    noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
+    edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
+    that is used. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are
+    left out; a tenth of the rim must be left.
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance

@@ -1,7 +1,7 @@
 """What a scene's pictures are expected to show of its measurands: values, derivatives, required edges.
 
-To first order a measured quantity moves by gradient . errors, the errors being those of lines and circles as numbered in
-`planner.features.seen`. The same edge in several features is one line, not several.
+To first order a measured quantity moves by gradient . errors, the errors being those of lines and circles as numbered
+in `planner.features.seen`. The same edge in several features is one line, not several.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What lies beside a circular edge: levels on both sides, what disturbs a locator there, and what shading does to it."""
+"""What lies beside a circular edge: levels on both sides, what disturbs a locator, and what shading does to it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
 
 
 def outward_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the rim's image: unit normals away from its middle (..., n, 2), the projection's derivative there (..., n, 2, 3),
+    """Of the rim's image: unit normals away from its middle (..., n, 2), the projection's derivative (..., n, 2, 3),
     and image lengths for a radian (..., n), ideal px."""
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)

@@ -1,9 +1,9 @@
 """What is seen of the features - lines, corners, circles - in the image and, back-projected, on their planes.
 
-The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px) at
-the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the change of
-its radius (the scene's unit). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E; then 2 E + 3 c, ... for
-the circle c. Image coordinates are ideal px from the image's middle, in which lines are straight.
+The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px)
+at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
+change of its radius (the scene's unit). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E; then 2 E +
+3 c, ... for the circle c. Image coordinates are ideal px from the image's middle, in which lines are straight.
 """
 
 from __future__ import annotations

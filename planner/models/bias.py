@@ -44,8 +44,8 @@ class Bias:
     Attributes
     ----------
     values, values_object : ndarray, shape (..., M)
-        Shift of each quantity in the image, px or degrees, and in the object, to first order; NaN where it is not known,
-        for next to an edge's place there is no zero crossing. Circles count as unbiased.
+        Shift of each quantity in the image, px or degrees, and in the object, to first order; NaN where it is not
+        known, for next to an edge's place there is no zero crossing. Circles count as unbiased.
     lines : ndarray, shape (..., E, 2)
         Displacement of each edge's line along its normal, at the edge's two ends, ideal px.
     corners : ndarray, shape (..., 2, 2)

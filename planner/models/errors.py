@@ -52,7 +52,7 @@ class Errors:
 
     @cached_property
     def variances(self) -> np.ndarray:
-        """Of all quantities in the image, px^2 (degrees^2 of an angle), shape (..., M); infinite where not measurable."""
+        """Of all quantities in the image, px^2 (degrees^2), shape (..., M); infinite where not measurable."""
         return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
 
     @cached_property

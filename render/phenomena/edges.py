@@ -119,9 +119,9 @@ def px_per_cm(pictures: Pictures) -> np.ndarray:
 def lever(pictures: Pictures) -> np.ndarray:
     """|d value / d offset| of each required edge when all its points may move by up to 1 px, shape (S, E).
 
-    Twice the response to shifts of both ends: extrapolating a fitted line from the points to its end at most doubles what
-    moves them. The most over the lengths that are measured; angles are told in other units and do not count. For the edges
-    that stand for a circle the plain bound 2.
+    Twice the response to shifts of both ends: extrapolating a fitted line from the points to its end at most doubles
+    what moves them. The most over the lengths that are measured; angles are told in other units and do not count. For
+    the edges that stand for a circle the plain bound 2.
     """
     known, names = measurands(pictures), required(pictures.scene)
     lengths = np.array([not quantity.is_angle for quantity in known.quantities])

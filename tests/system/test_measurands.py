@@ -91,8 +91,8 @@ def measured(two_holes):
 
 
 def test_every_kind_is_as_predicted(two_holes, measured):
-    """Variance of each value in the scene's unit and in the image; for each, 1.7 x the prediction and 0 are rejected."""
-    scene, truth = two_holes
+    """Variance of each value in the scene's unit and in the image; for each, 1.7 x the prediction and 0 are refused."""
+    _, truth = two_holes
     told, found = measured
     assert np.isin(found.status, ["ok", "clutter"]).all()
     assert found.names[-2:] == ("place.x", "place.y")
@@ -131,7 +131,7 @@ def test_the_joint_covariance(measured):
 
 def test_hole_to_hole_alone(two_holes):
     """No straight edge at all: planned, rendered, measured."""
-    whole, truth = two_holes
+    whole, _ = two_holes
     scene = whole.model_copy(update={"measurands": whole.measurands[:1]})
     told = planner.predict(scene, SENSOR, LIGHT)
     clean = render.image(scene, SENSOR, LIGHT)
@@ -148,7 +148,7 @@ def test_hole_to_hole_alone(two_holes):
 
 def test_a_displaced_part_is_followed(two_holes):
     """The camera looks 2 px beside: lines and circles are found again, and perspective changes lengths by 1e-3."""
-    scene, truth = two_holes
+    scene, _ = two_holes
     clean = render.image(scene, SENSOR, LIGHT)
     found = measure.measure(np.roll(clean, (1, 2), (0, 1)), scene, SENSOR, LIGHT, "gradient")
     here = measure.measure(clean, scene, SENSOR, LIGHT, "gradient")
@@ -190,7 +190,9 @@ def test_a_hidden_feature_leaves_the_others(two_holes):
 def test_distance_refuses_what_is_none(two_holes):
     scene, _ = two_holes
     other = scene.model_copy(update={"measurands": scene.measurands[2:]})
-    with pytest.raises(InvalidInput, match="the first measurand must be a distance for measure.distance, got diameter"):
+    with pytest.raises(
+        InvalidInput, match=r"the first measurand must be a distance for measure\.distance, got diameter"
+    ):
         measure.distance(np.zeros((240, 256)), other, SENSOR, LIGHT)
 
 

@@ -47,8 +47,8 @@ class JudgedMeasurand:
     """One measurand of one setting, by the verdict's method, in the scene's unit or degrees.
 
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
-    ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of `Judged`.
-    ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of
+    `Judged`. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
     """
 
     name: str

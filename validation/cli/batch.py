@@ -74,8 +74,8 @@ def validate_command(
 ) -> None:
     """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
 
-    Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements contradict the
-    predictions.
+    Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements
+    contradict the predictions.
     """
     started = time.perf_counter()
     check_number("renders", renders, 2, _MOST_RENDERS)

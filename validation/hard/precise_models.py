@@ -26,7 +26,7 @@ _NODES = [tuple(map(mpf, pair)) for pair in zip(*map(list, leggauss(8)), strict=
 
 
 def paper(scene, inputs: Inputs, points: int = 100, objective: str = "image"):
-    """Variance of the distance in the image, px^2, or on the object, cm^2, by eq. 3-10 with all moments formed plainly."""
+    """Variance of the distance in the image, px^2, or on the object, cm^2, by eq. 3-10, all moments formed plainly."""
     view, focal = View.of(scene, inputs), mpf(scene.camera.focal_px)
 
     def offset_variance(name, normal, corner):
@@ -95,7 +95,7 @@ def _distance_variance(scene, inputs: Inputs, offset_variance, objective: str):
 
 
 def _pulls(scene, inputs: Inputs):
-    """Derivative of the object's distance by each end's image, both ends moving in the face that they have in common."""
+    """Derivative of the object's distance by each end's image, both ends moving in the face that they share."""
     step, focal = mpf(10) ** -20, mpf(scene.camera.focal_px)
     index = [scene.solid.vertex_names.index(feature.vertex) for feature in scene.task.corners]
     ends = [inputs.vertices[i] for i in index]

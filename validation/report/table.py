@@ -139,7 +139,7 @@ def _measurands(found: Validation) -> Table:
     table = _table(
         "\nAll measurands, in the scene's unit (1 sigma)",
         *headings, "measurand", "value", "unit", "calibrated", "propagated", "measured", "ratio", "bias", "status",
-        caption="\n".join(filter(None, ["ratio: of variances, measured / propagated. The verdict is about all.", which])),
+        caption="\n".join(filter(None, ["ratio: of variances, measured / propagated; all are judged.", which])),
     )  # fmt: skip
     for row in rows:
         for each in row.measurands:
