@@ -5,10 +5,11 @@ from measure.estimators.registry import ESTIMATORS, best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
 from measure.find.ellipse import find_ellipse
+from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
-from measure.propagation import Propagated, propagate
+from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
 __all__ = [
@@ -17,7 +18,9 @@ __all__ = [
     "Lens",
     "MeasuredValue",
     "Measurement",
+    "Measurements",
     "Propagated",
+    "PropagatedValues",
     "Quadrilateral",
     "best_estimator",
     "bound",
@@ -27,6 +30,8 @@ __all__ = [
     "image_bound",
     "line_angle",
     "load_lens",
+    "measure",
+    "measure_by",
     "measure_quadrilateral",
     "point_distance",
     "propagate",

@@ -59,8 +59,8 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
         return float("inf")
     state = locate(tool, layout, tool.taken(clean[None])[0], clean).state
     covariance = _corners(layout, state, scene.noise)
-    _, gradient = separation(state.vertices[tool.arrangement.corners][None])
-    return float(gradient[0] @ covariance @ gradient[0])
+    _, gradient = separation(state.vertices[tool.arrangement.corners[:2]][None])
+    return float(gradient[0] @ covariance[:4, :4] @ gradient[0])
 
 
 def corner_bound(layout: Layout, contrast: float, noise_variance: float) -> np.ndarray:

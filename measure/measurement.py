@@ -1,4 +1,4 @@
-"""The measured distance between the task's two corners, in one image or in a stack."""
+"""The measured distance between two corners or centres, in one image or in a stack."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from measure import status
-from measure.features.layout import Layout, layout_of
-from measure.features.shape import find_shape
+from measure.quantities import Found, find
 from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
@@ -37,7 +36,7 @@ class Measurement:
     bias_px : ndarray, shape (...)
         Predicted bias that has been subtracted from the distance, px; 0 where none was asked for.
     corners : ndarray, shape (..., 2, 2)
-        Start and end corner (x, y), px; (0, 0) is the centre of the first pixel.
+        Start and end corner or centre (x, y), px; (0, 0) is the centre of the first pixel.
     covariance : ndarray, shape (..., 4, 4)
         Joint covariance of start (x, y) and end (x, y), px^2.
     edge_names : tuple of str
@@ -75,7 +74,7 @@ def distance(
     *,
     correct_bias: bool = False,
 ) -> Measurement:
-    """Measure the task's distance.
+    """Measure the task's distance, or the first measurand if that is one.
 
     Parameters
     ----------
@@ -122,7 +121,7 @@ def _check_known(picture: Picture, estimator: str) -> None:
 def _corrected(found: Measurement, picture: Picture) -> Measurement:
     """With the predicted bias subtracted, unless it is not to be trusted."""
     predicted = bias(Pictures.of(picture))
-    if predicted.disturbed.any():
+    if predicted.disturbed.any() or not np.isfinite(predicted.corners).all():
         return found
     corners = found.corners - predicted.corners
     value = separation(corners.reshape(-1, 2, 2))[0].reshape(found.value_px.shape)
@@ -146,12 +145,18 @@ def distances(
     """
     for name, threshold in methods:
         _check_method(name, threshold)
-    camera, layout = picture.scene.camera, layout_of(picture)
+    _check_distance(picture.scene)
+    camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
-    first = picture.scene.locator.thresholds[0]
-    return tuple(
-        _by_method(images, layout, name, first if threshold is None else threshold) for name, threshold in methods
-    )
+    return tuple(_by_method(images, picture, name, threshold) for name, threshold in methods)
+
+
+def _check_distance(scene: Scene) -> None:
+    if scene.quantities[0].kind != "distance":
+        raise InvalidInput(
+            f"the first measurand must be a distance for measure.distance, got {scene.quantities[0].kind} "
+            "(measure.measure takes all kinds)"
+        )
 
 
 def _check_method(estimator: Any, threshold: Any) -> None:
@@ -163,11 +168,12 @@ def _check_method(estimator: Any, threshold: Any) -> None:
         raise InvalidInput(f"threshold must be {wanted}, got {threshold!r}")
 
 
-def _by_method(images: np.ndarray, layout: Layout, estimator: str, threshold: float) -> Measurement:
+def _by_method(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    whole = _measure(stack, layout, estimator, threshold)
+    found = find(stack, picture, estimator, threshold)
+    whole = _first(found)
     return Measurement(
-        edge_names=layout.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
+        edge_names=found.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
     )
 
 
@@ -189,21 +195,18 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     return grey_levels(images)
 
 
-def _measure(images: np.ndarray, layout, estimator: str, threshold: float) -> dict[str, np.ndarray]:
-    """All columns of a Measurement for a stack (n, height, width)."""
-    shape = find_shape(images, layout, estimator, threshold)
-    measured = np.isin(shape.status, status.MEASURED)
-    value, gradient = separation(shape.corners)
-    variance = np.where(
-        measured, np.einsum("ni,nij,nj->n", gradient, np.nan_to_num(shape.covariance), gradient), np.inf
-    )
+def _first(found: Found) -> dict[str, np.ndarray]:
+    """All columns of a Measurement, about the first quantity, for a stack (n, height, width)."""
+    state, shape = found.status[:, 0], found.shape
+    measured = np.isin(state, status.MEASURED)
+    corners, covariance = found.ends()
     return {
-        "value_px": np.where(measured, value, np.nan),
-        "variance_px2": variance,
-        "status": shape.status,
-        "bias_px": np.zeros(len(value)),
-        "corners": shape.corners,
-        "covariance": shape.covariance,
+        "value_px": np.where(measured, found.image.value[:, 0], np.nan),
+        "variance_px2": np.where(measured, found.image.covariance[:, 0, 0], np.inf),
+        "status": state,
+        "bias_px": np.zeros(len(state)),
+        "corners": np.where(measured[:, None, None], corners, np.nan),
+        "covariance": np.where(measured[:, None, None], covariance, np.nan),
         "edge_status": shape.edge_status,
         "edge_contrast": shape.edge_contrast,
         "used": shape.used,

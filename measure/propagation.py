@@ -10,37 +10,63 @@ import numpy as np
 from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
-from measure.features.corners import corner_response
-from measure.features.layout import layout_of
+from measure.features.layout import Layout, layout_of
+from measure.features.rims import circle_response
 from measure.features.shape import prepared
-from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, checked_image, distance, separation
-from planner.features.measurand import measurand
-from planner.imaging.pictures import Pictures
+from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, checked_image
+from measure.quantities import Found, find
 from planner.imaging.sensor import recorded
 from planner.models.bias import MOST
-from scenes import Picture, Scene
+from scenes import Picture, Scene, Side
 from scenes.arrays import picture as one_picture
 
 
 @dataclass(frozen=True)
+class PropagatedValues:
+    """Predicted errors of all M quantities of one setting.
+
+    Attributes
+    ----------
+    value, value_image : ndarray, shape (M,)
+        Measured in the noise-free image: the scene's unit, px; degrees. NaN where there is none.
+    bias, bias_image : ndarray, shape (M,)
+        That less the object's own value, and less the model's value in the image.
+    covariance, covariance_image : ndarray, shape (M, M)
+        Joint covariances: edges and circles that share pixels are correlated. Infinite on the diagonal where there is
+        no value, NaN beside it.
+    status : tuple of str
+    """
+
+    value: np.ndarray
+    value_image: np.ndarray
+    bias: np.ndarray
+    bias_image: np.ndarray
+    covariance: np.ndarray
+    covariance_image: np.ndarray
+    status: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Propagated:
-    """Predicted errors of one setting.
+    """Predicted errors of one setting: of its first measurand, and of all.
 
     Attributes
     ----------
     value_px : float
-        Distance measured in the noise-free image, px.
+        The first measurand in the noise-free image, px (degrees, if it is an angle).
     bias_px : float
-        That less the model's distance, px.
+        That less the model's value.
     variance_px2 : float
-        Variance of the distance, px^2; infinite where `status` says it cannot be measured.
+        Its variance, px^2; infinite where `status` says it cannot be measured.
     covariance : ndarray, shape (4, 4)
-        Joint covariance of start (x, y) and end (x, y), px^2.
+        Joint covariance of start (x, y) and end (x, y) of a distance, px^2; NaN of other kinds.
     response : ndarray, shape (height, width)
-        Derivative of the distance by each pixel, px per grey level.
+        Derivative of its value by each pixel, px per grey level.
     status : str
         As `measure.distance` says; ``clutter`` too where a classic locator's noise-free value is off by more than 0.3
         standard deviations for a reason that no formula knows (interreflection).
+    measurands : PropagatedValues
+        All of them, in the scene's unit, jointly.
     """
 
     value_px: float
@@ -49,6 +75,7 @@ class Propagated:
     covariance: np.ndarray
     response: np.ndarray
     status: str
+    measurands: PropagatedValues
 
 
 def propagate(
@@ -59,10 +86,10 @@ def propagate(
     estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
 ) -> Propagated:
-    """Propagate pixel noise through lines and corners to the distance.
+    """Propagate pixel noise through lines, circles and corners to all measurands.
 
-    On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of the
-    distance by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
+    On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of a
+    value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
     share pixels, and so their correlation is in g.
 
     Parameters
@@ -76,33 +103,78 @@ def propagate(
     camera = picture.scene.camera
     clean, noise = recorded(picture.scene.noise, checked_image(one_picture(clean), (camera.height, camera.width)))
     noise = np.broadcast_to(noise, clean.shape).ravel()
-    found = distance(clean, picture, estimator=estimator, threshold=threshold)
-    if str(found.status) not in status.MEASURED:
-        return _nothing(clean, str(found.status))
-    layout = layout_of(picture)
+    found = find(clean[None], picture, estimator, threshold)
+    rows, lost = _responses(clean, picture, found, estimator, threshold)
+    state = [str(each) for each in found.status[0]]
+    for m, gone in enumerate(((found.image.gradient[0] != 0) & lost).any(-1)):
+        if gone and state[m] in status.MEASURED:  # an edge was only found far from its place, where another one is
+            state[m] = status.ILL_CONDITIONED
+    errors = (noise * rows) @ rows.T
+    image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
+    values = _values(found, image, plane, state, estimator)
+    return _of_first(found, rows, errors, values, clean.shape)
+
+
+def _responses(
+    clean: np.ndarray, picture: Picture, found: Found, estimator: str, threshold: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivative of lines and circles (`Seen`) by the pixels, (q, pixels), and which of them have none, bool (q,)."""
+    layout, parts = layout_of(picture), [np.zeros((0, clean.size))]
+    if layout.names:
+        parts.append(_of_lines(clean, picture, layout, found, estimator, threshold))
+    for name, circle in zip(found.known.circles, found.circles, strict=True):
+        good = str(circle.state[0]) in status.MEASURED
+        parts.append(circle_response(clean, picture, name) if good else np.full((3, clean.size), np.nan))
+    rows = np.concatenate(parts)
+    lost = ~np.isfinite(rows).all(1)
+    return np.where(lost[:, None], 0.0, rows), lost
+
+
+def _of_lines(
+    clean: np.ndarray, picture: Picture, layout: Layout, found: Found, estimator: str, threshold: float | None
+) -> np.ndarray:
+    """Of the lines, (2 E, pixels); NaN where there is none."""
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     if isinstance(tool, ArrangementEstimator):
-        ends = arranged.corner_response(tool, layout, clean)
-    else:
-        response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
-        ends = response @ tool.respond(clean)
-    _, gradient = separation(found.corners[None])
-    g = gradient[0] @ ends
-    if not np.isfinite(g).all():  # an edge was only found far from its place, where another one is
-        return _nothing(clean, status.ILL_CONDITIONED)
-    shift, variance = float(found.value_px - measurand(Pictures.of(picture)).value), float(noise @ (g * g))
-    state = str(found.status)
-    if state == status.OK and estimator in PREDICTED and abs(shift) > MOST * np.sqrt(variance):
-        state = status.CLUTTER
+        if str(found.shape.status[0]) not in status.MEASURED:
+            return np.full((2 * len(layout.names), clean.size), np.nan)
+        return arranged.line_response(tool, layout, clean)
+    rows = tool.respond(clean)
+    measured = np.isin(found.shape.edge_status[0], status.MEASURED)
+    return np.where(np.repeat(measured, 2)[:, None], rows, np.nan)
+
+
+def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> np.ndarray:
+    measured = np.isin(state, status.MEASURED)
+    lost = np.where(np.eye(len(state), dtype=bool), np.inf, np.nan)
+    gradient = np.where(measured[:, None], np.nan_to_num(gradient), 0.0)
+    return np.where(measured[:, None] & measured, gradient @ errors @ gradient.T, lost)
+
+
+def _values(found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], estimator: str) -> PropagatedValues:
+    measured = np.isin(state, status.MEASURED)
+    value, value_image = (np.where(measured, part.value[0], np.nan) for part in (found.plane, found.image))
+    bias, bias_image = value - found.known.value_object, value_image - found.known.value
+    for m in range(len(state)):
+        if state[m] == status.OK and estimator in PREDICTED and abs(bias_image[m]) > MOST * np.sqrt(image[m, m]):
+            state[m] = status.CLUTTER
+    return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state))
+
+
+def _of_first(
+    found: Found, rows: np.ndarray, errors: np.ndarray, values: PropagatedValues, shape: tuple[int, int]
+) -> Propagated:
+    measured, quantity = values.status[0] in status.MEASURED, found.known.quantities[0]
+    covariance = np.full((4, 4), np.inf)
+    if measured:
+        is_pair = len(quantity.features) == 2 and not any(isinstance(f, Side) for f in quantity.features)
+        covariance = found.with_errors(errors).ends()[1][0] if is_pair else np.full((4, 4), np.nan)
     return Propagated(
-        float(found.value_px),
-        shift,
-        variance,
-        (noise * ends) @ ends.T,
-        g.reshape(clean.shape),
-        state,
+        float(values.value_image[0]),
+        float(values.bias_image[0]),
+        float(values.covariance_image[0, 0]),
+        covariance,
+        (found.image.gradient[0, 0] @ rows if measured else np.zeros(shape)).reshape(shape),
+        values.status[0],
+        values,
     )
-
-
-def _nothing(clean: np.ndarray, state: str) -> Propagated:
-    return Propagated(float("nan"), float("nan"), float("inf"), np.full((4, 4), np.inf), np.zeros(clean.shape), state)

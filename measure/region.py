@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from measure.features.layout import layout_of
+from measure.features.rims import rim_tool
 from measure.features.shape import prepared
+from planner.features.projected_edges import circles
 from scenes import Picture, Scene
 
 
 def region_of_interest(
     scene: Scene | Picture, sensor: Any = None, light: Any = None, estimators: tuple[str, ...] = ("gradient", "canny")
 ) -> np.ndarray:
-    """Pixels that can change the measured distance, as long as the edges are where the pose projects them.
+    """Pixels that can change a measured value, as long as edges and circles are where the pose projects them.
 
     Parameters
     ----------
@@ -29,6 +31,8 @@ def region_of_interest(
     picture = Picture.of(scene, sensor, light)
     layout = layout_of(picture)
     used = np.zeros(layout.optics.shape, bool)
-    for name in estimators:
+    for name in circles(picture.scene):
+        used.flat[rim_tool(picture, name, (0.0, 0.0, 0.0)).locator.pixels] = True
+    for name in estimators if layout.names else ():
         used.flat[prepared(layout, name, picture.scene.locator.thresholds[0]).pixels] = True
     return used

@@ -2,19 +2,23 @@
 
 from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
+from planner.forecast import Forecast
 from planner.imaging.pictures import Pictures
-from planner.jitter import PoseSpread, pose_spread
+from planner.jitter import PoseSpread, pose_scatter, pose_spread
 from planner.maps import variance_map
 from planner.planning import Candidate, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
+from planner.search.aim import Aim
 from planner.search.alternating import alternate
+from planner.search.candidates import edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
 from planner.search.viewing import ViewingSpace, local_minima
 
 __all__ = [
-    "Candidate", "Constraints", "EdgePrediction", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust",
-    "Tolerances", "ViewingSpace", "alternate", "exhaustive", "local_minima", "plan", "pose_spread", "predict",
-    "projected_edges", "required_edges", "robust", "variance_map", "variances",
+    "Aim", "Candidate", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction",
+    "Robust", "Tolerances", "ViewingSpace", "alternate", "edges_of", "exhaustive", "local_minima", "plan",
+    "pose_scatter", "pose_spread", "predict", "projected_edges", "required_edges", "robust", "variance_map",
+    "variances",
 ]  # fmt: skip

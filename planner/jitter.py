@@ -1,33 +1,45 @@
-"""What it costs to set the sensor's pose with a ruler: the distance in the image changes with it."""
+"""What it costs to set the sensor's pose with a ruler: the values in the image change with it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.imaging.projection import project_ideal
-from scenes import Scene
+from planner.features.kinds import on_plane
+from planner.features.measurand import Measurands, measurands
+from planner.features.seen import Seen
+from planner.imaging.pictures import Pictures
+from scenes import Centre, Scene
 
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
 
 
 class PoseSpread(NamedTuple):
-    """Variance (px^2, first order) and bias (px, at most; second order) of the distance, shape (S,) each."""
+    """Variance (px^2, first order) and bias (px, at most; second order) of the first quantity, shape (S,) each."""
 
     variance: np.ndarray
     bias: np.ndarray
 
 
+class PoseScatter(NamedTuple):
+    """Joint covariance (S, M, M) of all quantities as poses scatter, in the image and as they are then measured in the
+    object by who trusts the pose, and bias (S, M) in the image (at most)."""
+
+    covariance: np.ndarray
+    covariance_object: np.ndarray
+    bias: np.ndarray
+
+
 def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
-    """Spread of the projected distance over poses that are off as `scenes.Jitter` says.
+    """Spread of the projected first quantity over poses that are off as `scenes.Jitter` says.
 
     The light's pose changes contrasts alone, which is left out.
 
     Parameters
     ----------
     scene : Scene
-        With a task between two corners.
     sensors : ndarray, shape (S, 2)
         Polar angles and azimuths, degrees.
 
@@ -38,21 +50,47 @@ def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
     >>> pose_spread(scene, np.array([[30.0, 135.0]])).variance.round(4)
     array([0.0137])
     """
-    sigma = scene.jitter.sensor_deg
+    found = pose_scatter(scene, sensors)
+    return PoseSpread(found.covariance[:, 0, 0], found.bias[:, 0])
+
+
+def pose_scatter(scene: Scene, sensors: np.ndarray) -> PoseScatter:
+    """The same for all quantities, jointly."""
+    count, sigma = len(scene.quantities), scene.jitter.sensor_deg
+    covariance = np.zeros((2, len(sensors), count, count))
+    bias = np.zeros((len(sensors), count))
     if sigma == 0:
-        return PoseSpread(np.zeros(len(sensors)), np.zeros(len(sensors)))
+        return PoseScatter(*covariance, bias)
     step = max(sigma, 1e-3)
-    here = _distance(scene, sensors)
-    variance, bias = np.zeros(len(here)), np.zeros(len(here))
+    here = measurands(Pictures.of(scene, sensors))
     sine = np.maximum(np.sin(np.radians(sensors[:, 0])), LEAST_SINE)
     for axis in (np.stack([np.ones_like(sine), 0 * sine], -1), np.stack([0 * sine, 1 / sine], -1)):
-        ahead, behind = (_distance(scene, sensors + sign * step * axis) for sign in (1, -1))
-        variance += ((ahead - behind) / 2 * (sigma / step)) ** 2
-        bias += np.abs(ahead - 2 * here + behind) / 2 * (sigma / step) ** 2
-    return PoseSpread(variance, bias)
+        ahead, behind = (measurands(Pictures.of(scene, sensors + sign * step * axis)) for sign in (1, -1))
+        moved = [(a - b) / 2 * (sigma / step) for a, b in zip(_both(here, ahead), _both(here, behind), strict=True)]
+        covariance += np.einsum("ksm,ksn->ksmn", moved, moved)
+        bias += np.abs(ahead.value - 2 * here.value + behind.value) / 2 * (sigma / step) ** 2
+    return PoseScatter(*covariance, bias)
 
 
-def _distance(scene: Scene, sensors: np.ndarray) -> np.ndarray:
-    ends = np.array([scene.solid.vertex(corner.vertex) for corner in scene.task.corners])
-    image = project_ideal(ends, sensors, scene.camera)
-    return np.linalg.norm(image[:, 1] - image[:, 0], axis=-1)
+def _both(here: Measurands, there: Measurands) -> tuple[np.ndarray, np.ndarray]:
+    """Values in the image of another pose, and what they are in the object to who believes in this one, (S, M)."""
+    found = replace(there.seen, sensors=here.seen.sensors, expected=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        plane = [on_plane(_with_circles(here, there, found), q).value for q in here.quantities]
+    return there.value, np.stack(plane, -1)
+
+
+def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
+    """What is found, circles too: their centres sought along the rays, their radii by the depth."""
+    if not found.circles:
+        return found
+    centres, radii = [], []
+    for c, name in enumerate(found.circles):
+        centre, feature = here.seen.centres[..., c, :], Centre(circle=name)
+        image = there.seen.point(feature, None)
+        plane = np.broadcast_to(found.solid.circle(name).axis, centre.shape)
+        seen = found.onto(image, plane, found.solid.circle(name).centre).at
+        depths = there.seen.depth(there.seen.centres[..., c, :]), found.depth(seen)
+        centres.append(seen)
+        radii.append(found.radii[..., c] * depths[1] / depths[0])
+    return replace(found, centres=np.stack(centres, -2), radii=np.stack(radii, -1))

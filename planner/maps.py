@@ -8,7 +8,8 @@ import numpy as np
 
 from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.prediction import DEFAULT_OBJECTIVE, Objective, minimised
+from planner.prediction import minimised
+from planner.search.aim import DEFAULT_OBJECTIVE, Objective
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from planner.features.measurand import required_edges
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.prediction import DEFAULT_OBJECTIVE, Objective, Prediction, check_objective, predict
+from planner.prediction import Prediction, predict
+from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.alternating import Partial, Step, alternate
-from planner.search.candidates import Candidate, candidates
+from planner.search.candidates import Candidate, candidates, edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.refinement import refine
@@ -32,9 +33,12 @@ class Plan:
         The scene, its task with the required edges that the plan uses: ready to predict, render and measure.
     sensor, light : Pose
         Continuous if refined, else on the grid.
-    objective, model : str
+    objective, over, model : str
     variance : float
-        What was minimised: cm^2 or px^2 (degrees^2 for an angle).
+        What was minimised: cm^2 or px^2 (degrees^2 for an angle); of several measurands the squared ratio of standard
+        deviations to tolerances, the largest or their weighted sum.
+    limiting : str
+        Name of the measurand that limits the plan: with the largest such ratio.
     grid_sensor, grid_light, grid_variance
         The best pair of the grid.
     prediction : Prediction
@@ -58,8 +62,10 @@ class Plan:
     sensor: Pose
     light: Pose
     objective: str
+    over: str
     model: str
     variance: float
+    limiting: str
     grid_sensor: Pose
     grid_light: Pose
     grid_variance: float
@@ -82,6 +88,7 @@ def plan(
     scene: Scene,
     objective: Objective = DEFAULT_OBJECTIVE,
     *,
+    over: Over = DEFAULT_OVER,
     model: ModelName = DEFAULT_MODEL,
     search: Search = "exhaustive",
     edges: Literal["given", "best"] = "given",
@@ -100,6 +107,9 @@ def plan(
     scene : Scene
     objective : {"object", "image"}
         Variance of the physical quantity, or of that in the image (the paper's, which rewards foreshortening).
+    over : {"minimax", "sum"}
+        Of several measurands the largest squared ratio of a standard deviation to its tolerance is minimised, or their
+        weighted sum.
     model : {"calibrated", "paper"}
     search : {"exhaustive", "alternating"}
         All pairs, or the paper's search alone, which stops at a partial optimum.
@@ -129,18 +139,19 @@ def plan(
     >>> found.prediction.status, found.gap >= 0, len(found.candidates)
     ('ok', True, 10)
     """
-    check_objective(objective)
+    aim = Aim.of(scene.quantities, objective, over)
     variance_model(model)
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
     constraints = constraints or Constraints()
-    tasks = required_edges(scene) if edges == "best" else (scene.task,)
-    options = [_Option.of(with_task(scene, task), model, step_deg, constraints, sensor, light) for task in tasks]
-    found = [option.search(objective, search, start, report) for option in options]
+    tasks = required_edges(scene) if edges == "best" else ()
+    worlds = [with_task(scene, task) for task in tasks] or [scene]
+    options = [_Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
+    found = [option.search(aim, search, start, report) for option in options]
     best = min(range(len(found)), key=lambda k: found[k].variance)
     if not np.isfinite(found[best].variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    return _finish(options, found, best, objective, refined)
+    return _finish(options, found, best, aim, refined)
 
 
 def with_task(scene: Scene, task: Task) -> Scene:
@@ -199,14 +210,14 @@ class _Option:
             raise InvalidInput("constraints must leave a pose for sensor and light, got none")
         return cls(scene, model, step, constraints, sensors, lights, sensor is None and light is None)
 
-    def search(self, objective: str, search: str, start: Any, report: Report | None) -> _Result:
+    def search(self, aim: Aim, search: str, start: Any, report: Report | None) -> _Result:
         partial = found = None
         plain = self.free and not self.constraints.on_pairs
         if plain:
             spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
-            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.model, objective)
+            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.model, aim)
         if search == "exhaustive" or not plain:
-            found = exhaustive(self.scene, self.sensors, self.lights, self.model, objective, self.constraints, report)
+            found = exhaustive(self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report)
         best = found or partial
         return _Result(self.sensors[best.sensor], self.lights[best.light], best.variance, partial, found)
 
@@ -219,29 +230,32 @@ class _Allowed(ViewingSpace):
         self.__dict__["poses"] = poses
 
 
-def _finish(options: list[_Option], results: list[_Result], best: int, objective: str, refined: bool) -> Plan:
+def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim, refined: bool) -> Plan:
     option, result = options[best], results[best]
     scene, found, partial = option.scene, result.found, result.partial
     sensor, light, variance = result.sensor, result.light, result.variance
-    choice = candidates(options, results, objective)
+    choice = candidates(options, results, aim)
     if refined and option.free:
         starts = [(sensor, light)]
         if found is None or not has_bound(scene, option.model):
-            others = [c for c in choice[1:3] if c.edges == scene.task.edges]
+            others = [c for c in choice[1:3] if c.edges == edges_of(scene)]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
-        descents = [refine(scene, *at, option.model, objective, option.step_deg, option.constraints) for at in starts]
+        descents = [refine(scene, *at, option.model, aim, option.step_deg, option.constraints) for at in starts]
         sensor, light, variance = min(descents, key=lambda descent: descent[2])
+    prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
     return Plan(
         scene=scene,
         sensor=Pose(*map(float, sensor)),
         light=Pose(*map(float, light)),
-        objective=objective,
+        objective=aim.unit,
+        over=aim.over,
         model=option.model,
         variance=float(variance),
+        limiting=prediction.limiting or prediction.measurands[0].name,
         grid_sensor=Pose(*map(float, result.sensor)),
         grid_light=Pose(*map(float, result.light)),
         grid_variance=float(result.variance),
-        prediction=predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model),
+        prediction=prediction,
         trace=partial.trace if partial else (),
         partial_variance=float(partial.variance) if partial else float("nan"),
         gap=partial.variance / result.variance - 1 if partial and found else None,

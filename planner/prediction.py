@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from planner.features.locator import MIN_CONTRAST, MIN_USABLE
-from planner.features.measurand import measurand, normals
+from planner.features.measurand import measurand, measurands, normals
 from planner.features.propagation import corner_covariance
+from planner.features.seen import plane_axes
+from planner.forecast import Forecast, forecasts, worst
 from planner.imaging.pictures import Pictures
+from planner.imaging.projection import jacobian_ideal
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
-from scenes import Corner, InvalidInput, Picture, Scene
+from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
+from scenes import Centre, Corner, InvalidInput, Picture, Scene
 
-Objective = Literal["object", "image"]
-DEFAULT_OBJECTIVE: Objective = "object"
-_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
+__all__ = ["DEFAULT_OBJECTIVE", "EdgePrediction", "Objective", "Prediction", "minimised", "predict", "variances"]
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,16 @@ class EdgePrediction:
 
 @dataclass(frozen=True)
 class Prediction:
-    """How precisely one setting will let the distance or the angle be measured.
+    """How precisely one setting will let the scene's quantities be measured.
+
+    ``measurands`` tells of all of them; the other attributes of the first, where nothing else is said.
 
     Attributes
     ----------
     model : str
         ``paper``, ``calibrated`` or ``bound``.
     kind : str
-        ``distance`` or ``angle``.
+        ``distance``, ``width``, ``offset``, ``angle``, ``diameter`` or ``position``.
     value_image, value_object : float
         The measurand itself, as the model projects it and in the object: px and cm, or degrees.
     variance_image, variance_object : float
@@ -60,16 +64,23 @@ class Prediction:
         only where an edge is hidden or without any contrast.
     bias_image : float
         Value that the classic locators (``gradient``; ``canny`` nearly) find without noise, less `value_image`; px, or
-        degrees. NaN where it is not known (circles). 0 for the ``bound``, which is about unbiased estimators.
+        degrees. NaN where it is not known. 0 for the ``bound``, which is about unbiased estimators.
     corners : ndarray, shape (2, 2)
-        Start and end feature (x, y), px; (0, 0) is the centre of the first pixel. For an angle, a point on each line.
+        Its two features (x, y), px; (0, 0) is the centre of the first pixel. For an edge, a point on its line; one
+        feature twice.
     covariances : ndarray, shape (2, 2, 2)
-        Covariance of each feature, px^2; NaN for an angle, which needs no corners.
+        Covariance of each feature, px^2; NaN for an edge.
     edges : tuple of EdgePrediction
-        The straight edges.
+        The straight edges of all quantities.
     status : str
+        The worst of all quantities:
         ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
         is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
+    measurands : tuple of Forecast
+        One for each quantity.
+    covariance, covariance_object : ndarray, shape (M, M)
+        Joint covariance of all quantities in the image and in the object; infinite on the diagonal, NaN beside it,
+        where a quantity cannot be measured.
     """
 
     model: str
@@ -83,6 +94,9 @@ class Prediction:
     covariances: np.ndarray
     edges: tuple[EdgePrediction, ...]
     status: str
+    measurands: tuple[Forecast, ...]
+    covariance: np.ndarray
+    covariance_object: np.ndarray
 
     @property
     def value_px(self) -> float:
@@ -109,6 +123,17 @@ class Prediction:
             raise InvalidInput(f"task.kind must be distance for {name}, got {self.kind!r}")
         return value
 
+    @property
+    def limiting(self) -> str | None:
+        """Name of the quantity whose standard deviation is largest against its tolerance; None without tolerances."""
+        known = [(each.ratio, each.name) for each in self.measurands if each.ratio is not None]
+        return max(known)[1] if known else None
+
+    @property
+    def worst_ratio(self) -> float | None:
+        """That ratio."""
+        return max((each.ratio for each in self.measurands if each.ratio is not None), default=None)
+
 
 def variances(
     scene: Scene,
@@ -117,7 +142,7 @@ def variances(
     model: ModelName = DEFAULT_MODEL,
     objective: Objective = DEFAULT_OBJECTIVE,
 ) -> np.ndarray:
-    """Variance of the measurand for arrays of settings.
+    """Variance of the measurand, or what is minimised of several, for arrays of settings.
 
     Parameters
     ----------
@@ -126,8 +151,8 @@ def variances(
         Poses (polar, azimuth) in degrees, broadcast against each other.
     model : {"calibrated", "paper", "bound"}
     objective : {"object", "image"}
-        In the object (cm^2: px^2 over the squared derivative of the image's distance by the object's, both ends moving
-        apart alike) or in the image (px^2); degrees^2 for an angle.
+        On the plane of the features in the object (cm^2) or in the image (px^2); degrees^2 for an angle. Of several
+        measurands the largest squared ratio of a standard deviation to its tolerance.
 
     Returns
     -------
@@ -198,59 +223,69 @@ def predict(
             strict=True,
         )
     )
+    told = forecasts(scene, evaluated, {edge.name: edge.status for edge in edges}, biased)
+    gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
+    covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
     return Prediction(
         model=model,
-        kind=scene.task.kind,
-        value_image=float(known.value),
-        value_object=float(known.value_object),
-        variance_image=float(evaluated.variance),
-        variance_object=float(evaluated.variance_object),
-        bias_image=biased,
+        kind=told[0].kind,
+        value_image=told[0].value_image,
+        value_object=told[0].value_object,
+        variance_image=told[0].variance_image,
+        variance_object=told[0].variance_object,
+        bias_image=told[0].bias_image,
         corners=known.points,
-        covariances=_covariances(scene, evaluated),
+        covariances=_covariances(pictures, evaluated),
         edges=edges,
-        status=_status(scene, evaluated, edges),
+        status=worst(told),
+        measurands=told,
+        covariance=covariance,
+        covariance_object=covariance_object,
     )
 
 
-def _of_locator(pictures: Pictures, model: str) -> tuple[float, np.ndarray, np.ndarray]:
-    """Bias of the measurand and of the lines (E, 2), and which edges are cluttered (E,)."""
+def _of_locator(pictures: Pictures, model: str) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+    """Biases of the quantities in image and object (M,), of the lines (E, 2), and which edges are cluttered (E,)."""
     if model == "bound":
-        edges = len(measurand(pictures).view.names)
-        return 0.0, np.zeros((edges, 2)), np.zeros(edges, bool)
+        known = measurands(pictures)
+        edges, none = len(known.view.names), np.zeros(len(known.quantities))
+        return (none, none), np.zeros((edges, 2)), np.zeros(edges, bool)
     found = bias(pictures)
-    return float(found.value), found.lines, cluttered(pictures)
+    return (found.values, found.values_object), found.lines, cluttered(pictures)
 
 
-def minimised(errors: Errors, objective: str) -> np.ndarray:
-    """The variance that an objective is about (degrees^2 for an angle)."""
-    return errors.variance if check_objective(objective) == "image" else errors.variance_object
+def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
+    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several."""
+    aim = Aim.of(errors.measurands.quantities, objective)
+    return aim(errors.variances if aim.unit == "image" else errors.variances_object)
 
 
-def check_objective(objective: str) -> str:
-    """The objective, once it is known to be one."""
-    if objective not in get_args(Objective):
-        raise InvalidInput(f"objective must be one of {', '.join(get_args(Objective))}, got {objective!r}")
-    return objective
-
-
-def _covariances(scene: Scene, evaluated: Errors) -> np.ndarray:
-    """Covariances of the two features, px^2."""
-    if not scene.task.corners:
-        return np.full((2, 2, 2), np.nan)
-    view, centres, found = evaluated.measurand.view, iter(evaluated.centres), []
-    for feature in scene.task.corners:
-        if not isinstance(feature, Corner):
-            found.append(next(centres))
-            continue
-        index = [view.names.index(name) for name in feature.edges]
-        vertex = scene.solid.vertex_names.index(feature.vertex)
-        last = np.array([scene.solid.edge(name).ends[1] == vertex for name in view.names])
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            offsets = evaluated.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
-        offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
-        found.append(corner_covariance(normals(view)[index], offsets[index]))
+def _covariances(pictures: Pictures, evaluated: Errors) -> np.ndarray:
+    """Covariances of the first quantity's two features, px^2; NaN of an edge."""
+    known, solid = evaluated.measurands, pictures.scene.solid
+    view, found = known.view, []
+    for feature in (known.quantities[0].features * 2)[:2]:
+        if isinstance(feature, Centre):
+            circle = solid.circle(feature.circle)
+            slope = jacobian_ideal(circle.centre[None], pictures.sensors, pictures.scene.camera)[0]
+            slope = slope @ np.stack(plane_axes(circle.axis), -1)
+            whole = evaluated.circles[known.circles.index(feature.circle)][:2, :2]
+            found.append(slope @ whole @ slope.T if np.isfinite(whole).all() else np.diag([np.inf, np.inf]))
+        elif isinstance(feature, Corner):
+            found.append(_corner_covariance(feature, view, solid, evaluated))
+        else:
+            found.append(np.full((2, 2), np.nan))
     return np.stack(found)
+
+
+def _corner_covariance(feature: Corner, view, solid, evaluated: Errors) -> np.ndarray:
+    index = [view.names.index(name) for name in feature.edges]
+    vertex = solid.vertex_names.index(feature.vertex)
+    last = np.array([solid.edge(name).ends[1] == vertex for name in view.names])
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        offsets = evaluated.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
+    offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
+    return corner_covariance(normals(view)[index], offsets[index])
 
 
 def _edge_status(noise: float, visible: bool, whole: float, usable: float, step: float, crowded: bool) -> str:
@@ -261,17 +296,3 @@ def _edge_status(noise: float, visible: bool, whole: float, usable: float, step:
     if not step > MIN_CONTRAST * np.sqrt(noise):
         return "low_contrast"
     return "clutter" if crowded else "ok"
-
-
-def _status(scene: Scene, evaluated: Errors, edges: tuple[EdgePrediction, ...]) -> str:
-    for worst in ("not_visible", "short", "low_contrast"):
-        if any(edge.status == worst for edge in edges):
-            return worst
-    directions = dict(zip(evaluated.measurand.view.names, normals(evaluated.measurand.view), strict=True))
-    corners = [feature for feature in scene.task.corners if isinstance(feature, Corner)]
-    sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
-    if min(sines, default=1.0) < _MIN_SINE:
-        return "ill_conditioned"
-    if not np.isfinite(evaluated.variance):
-        return "not_visible"
-    return "clutter" if any(edge.status == "clutter" for edge in edges) else "ok"

@@ -8,6 +8,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from planner import Pictures, projected_edges
+from planner.features.projected_edges import circles
+from planner.features.rim_sides import equal_angles, radials
+from planner.imaging.projection import project
 from render.rays import Rays
 from scenes import Picture
 
@@ -28,17 +31,28 @@ def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP) -> np.ndarray:
 
 
 def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
-    """Fine pixels of the crop that the task's straight edges are located from, and their surroundings, as a mask."""
+    """Fine pixels of the crop that edges and circles are located from, and their surroundings, as a mask."""
     locator, shape = picture.scene.locator, [(part.stop - part.start) // supersample for part in crop]
     rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
     pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
     found = np.zeros(shape, bool)
-    for start, stop in projected_edges(Pictures.of(picture)).recorded:
+    for start, stop in [*projected_edges(Pictures.of(picture)).recorded, *_around(picture)]:
         along = stop - start
         part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
         away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)
         found |= away <= locator.window_px + 4 * locator.scale_px + 1
     return found.repeat(supersample, 0).repeat(supersample, 1)
+
+
+def _around(picture: Picture) -> list[np.ndarray]:
+    """Pieces of the required circles' images, (2, 2) each, px."""
+    pieces = []
+    for name in circles(picture.scene):
+        circle = picture.scene.solid.circle(name)
+        places = circle.centre + circle.radius * radials(circle, equal_angles())
+        rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
+        pieces += list(np.stack([rim, np.roll(rim, -1, 0)], 1))
+    return pieces
 
 
 def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:

@@ -6,7 +6,7 @@ from scenes.lens import Lens
 from scenes.lights import Light
 from scenes.load import load, names
 from scenes.materials import Material
-from scenes.measurands import Centre, Corner, Locator, Task
+from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
 from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
@@ -18,6 +18,6 @@ from scenes.surroundings import Floor, Jitter, Obstacle
 
 __all__ = [
     "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
-    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Scene", "Setting", "Solid", "Task", "block",
-    "load", "names",
+    "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene", "Setting",
+    "Side", "Solid", "Task", "Tolerance", "block", "load", "names",
 ]  # fmt: skip

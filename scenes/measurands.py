@@ -1,13 +1,26 @@
-"""What is to be measured, and how its edges are located."""
+"""What is to be measured - the measurands (VIM), each with its tolerance - and how its edges are located."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from scenes.model import Model
-from scenes.ranges import Positive
+from scenes.model import Model, Title
+from scenes.ranges import Length, Positive
+
+Kind = Literal["distance", "width", "offset", "angle", "diameter", "position"]
+_WANTED = {
+    "distance": "pp",
+    "width": "ee",
+    "offset": "pe",
+    "angle": "ee",
+    "diameter": "c",
+    "position": "pee",
+}  # of each kind the features in their order: p a corner or centre, c a centre, e an edge
+_WORDS = {"p": "a corner or a circle", "c": "a circle", "e": "an edge"}
 
 
 class Corner(Model):
@@ -18,7 +31,7 @@ class Corner(Model):
 
 
 class Centre(Model):
-    """The centre of a circular edge, found by fitting the ellipse that is its image."""
+    """A circular edge: its centre, or itself where its diameter is asked for."""
 
     circle: str
 
@@ -28,15 +41,142 @@ class Centre(Model):
         return (self.circle,)
 
 
+class Side(Model):
+    """A straight edge."""
+
+    edge: str
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Its own name."""
+        return (self.edge,)
+
+
 def _tag_of_feature(value: Any) -> str:
-    return "centre" if isinstance(value, Centre) or (isinstance(value, dict) and "circle" in value) else "corner"
+    for tag, kind, key in (("centre", Centre, "circle"), ("side", Side, "edge")):
+        if isinstance(value, kind) or (isinstance(value, dict) and key in value):
+            return tag
+    return "corner"
 
 
 Feature = Annotated[Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")], Discriminator(_tag_of_feature)]
+AnyFeature = Annotated[
+    Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")] | Annotated[Side, Tag("side")],
+    Discriminator(_tag_of_feature),
+]
+
+
+class Tolerance(Model):
+    """How far a value may lie above and below its nominal one, in the scene's unit or degrees."""
+
+    plus: Annotated[float, Field(ge=0)]
+    minus: Annotated[float, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Tolerance:
+        if not self.plus + self.minus > 0:
+            raise ValueError("tolerance must be greater than 0 above or below, got 0 for both")
+        return self
+
+    @property
+    def half(self) -> float:
+        """Half of the whole zone: what a standard deviation is compared with."""
+        return (self.plus + self.minus) / 2
+
+
+def _both_ways(value: Any) -> Any:
+    """A single number is meant for both sides."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"plus": value, "minus": value} if number else value
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number to be measured: a measurand, or one coordinate of a position.
+
+    Attributes
+    ----------
+    name, kind : str
+        Of the measurand; a position's two coordinates are NAME.x, from its first datum edge, and NAME.y, from its
+        second.
+    features : tuple
+        A coordinate's are the feature and that datum edge.
+    nominal : float or None
+        The value that is wanted, in the scene's unit or degrees; the object's own where None.
+    tolerance : Tolerance or None
+    weight : float
+        In the planner's weighted sum.
+    """
+
+    name: str
+    kind: str
+    features: tuple[Corner | Centre | Side, ...]
+    nominal: float | None = None
+    tolerance: Tolerance | None = None
+    weight: float = 1.0
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Names of the edges and circles that it needs."""
+        return sum((feature.edges for feature in self.features), ())
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether its unit is degrees."""
+        return self.kind == "angle"
+
+
+class Measurand(Model):
+    """What to measure, on the plane of its features.
+
+    ``distance`` between two corners or centres of circles; ``width`` from the middle of the first edge to the line of
+    the second; ``offset`` of a corner or centre from the line of an edge; ``angle`` between two edges; ``diameter`` of
+    a circle; ``position`` of a corner or centre from two datum edges, as two offsets with two nominal values.
+    """
+
+    name: Title
+    kind: Kind
+    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=3)]
+    nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Length, Length] | None = None
+    tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
+    weight: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> Measurand:
+        wanted = _WANTED[self.kind]
+        if not self.name or not self.name.isprintable():
+            raise ValueError(f"name must be a printable text, got {self.name!r}")
+        if len(self.features) != len(wanted) or not all(map(_is, wanted, self.features)):
+            got = ", ".join(" ".join(feature.edges) for feature in self.features)
+            raise ValueError(f"features must be {_list(wanted)} for kind {self.kind}, got {got}")
+        if self.nominal is not None and isinstance(self.nominal, tuple) != (self.kind == "position"):
+            number = "two numbers" if self.kind == "position" else "one number"
+            raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
+        return self
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The numbers that it consists of: one, or the two coordinates of a position."""
+        if self.kind != "position":
+            return (Quantity(self.name, self.kind, self.features, self.nominal, self.tolerance, self.weight),)
+        feature, *datums = self.features
+        return tuple(
+            Quantity(f"{self.name}.{axis}", self.kind, (feature, datum), nominal, self.tolerance, self.weight)
+            for axis, datum, nominal in zip("xy", datums, self.nominal or (None, None), strict=True)
+        )
+
+
+def _is(wanted: str, feature: Corner | Centre | Side) -> bool:
+    kinds = {"p": (Corner, Centre), "c": Centre, "e": Side}
+    return isinstance(feature, kinds[wanted])
+
+
+def _list(wanted: str) -> str:
+    return ", then ".join(_WORDS[letter] for letter in wanted)
 
 
 class Task(Model):
-    """What to measure: the distance in the image between two features, or the angle between two edges.
+    """Short form of one measurand: the distance between two features, or the angle between two edges.
 
     A distance needs ``start`` and ``end``, an angle ``lines``, the names of its two edges.
     """
@@ -65,6 +205,17 @@ class Task(Model):
     def edges(self) -> tuple[str, ...]:
         """The required edges: those of the start feature, then those of the end feature; or the two lines."""
         return self.lines or sum((feature.edges for feature in self.corners), ())
+
+    @property
+    def quantity(self) -> Quantity:
+        """The same as a quantity, named by its kind."""
+        return Quantity(self.kind, self.kind, self.corners or tuple(Side(edge=name) for name in self.lines))
+
+
+@lru_cache(maxsize=256)
+def quantities_of(task: Task | None, measurands: tuple[Measurand, ...]) -> tuple[Quantity, ...]:
+    """All numbers that a scene asks for."""
+    return sum((measurand.quantities for measurand in measurands), () if task is None else (task.quantity,))
 
 
 class Locator(Model):

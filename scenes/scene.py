@@ -13,9 +13,10 @@ from pydantic import Discriminator, Tag, model_validator
 
 from scenes.camera import Camera
 from scenes.errors import InvalidInput
+from scenes.features import check_feature, check_quantity
 from scenes.lights import Light
 from scenes.materials import Material
-from scenes.measurands import Centre, Corner, Locator, Task
+from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
 from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
 from scenes.parts.block import Block
@@ -65,13 +66,19 @@ class Scene(Model):
     camera: Camera
     light: Light
     noise: Noise
-    task: Task
+    task: Task | None = None
+    measurands: tuple[Measurand, ...] = ()
     locator: Locator = Locator()
     settings: tuple[Setting, ...] = ()
     same_scale: tuple[str, ...] = ()
     floor: Floor | None = None
     obstacles: tuple[Obstacle, ...] = ()
     jitter: Jitter = Jitter()
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All numbers to be measured: that of ``task``, or those of ``measurands``."""
+        return quantities_of(self.task, self.measurands)
 
     @property
     def solid(self) -> Solid:
@@ -129,36 +136,46 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        self._check_task()
+        self._check_measurands()
         self._check_surroundings()
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
         return self
 
-    def _check_task(self) -> None:
-        for end, feature in zip(("start", "end"), self.task.corners, strict=False):
-            check = self._check_corner if isinstance(feature, Corner) else self._check_centre
-            check(f"task.{end}", feature)
-        if self.task.kind == "angle":
+    def _check_measurands(self) -> None:
+        """Either ``task`` or ``measurands``, of features that the object has."""
+        if (self.task is None) == (not self.measurands):
+            got = "none of them" if self.task is None else "both"
+            raise ValueError(f"task or measurands must be given, not both, got {got}")
+        names = [quantity.name for quantity in self.quantities]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"measurands must have different names, got {name!r} twice")
+        if self.task is not None:
+            self._check_task(self.task)
+        for i, measurand in enumerate(self.measurands):
+            for k, feature in enumerate(measurand.features):
+                check_feature(self.solid, f"measurands[{i}].features[{k}]", feature)
+            for quantity in measurand.quantities:
+                check_quantity(self.solid, f"measurands[{i}].features", quantity)
+
+    def _check_task(self, task: Task) -> None:
+        for end, feature in zip(("start", "end"), task.corners, strict=False):
+            check_feature(self.solid, f"task.{end}", feature)
+        if task.kind == "angle":
             known = [edge.name for edge in self.solid.edges]
-            for name in self.task.lines:
+            for name in task.lines:
                 if name not in known:
                     raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")
-            if self.task.lines[0] == self.task.lines[1]:
-                raise ValueError(f"task.lines must be two different edges, got {list(self.task.lines)}")
-        elif self.task.start == self.task.end or (
-            getattr(self.task.start, "vertex", 0) == getattr(self.task.end, "vertex", 1)
-        ):
-            key = "vertex" if isinstance(self.task.end, Corner) else "circle"
+            if task.lines[0] == task.lines[1]:
+                raise ValueError(f"task.lines must be two different edges, got {list(task.lines)}")
+            check_quantity(self.solid, "task.lines", task.quantity)
+        elif task.start == task.end or (getattr(task.start, "vertex", 0) == getattr(task.end, "vertex", 1)):
+            key = "vertex" if isinstance(task.end, Corner) else "circle"
             raise ValueError(
-                f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(self.task.end, key)!r}"
+                f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(task.end, key)!r}"
             )
-
-    def _check_centre(self, key: str, centre: Centre) -> None:
-        known = [circle.name for circle in self.solid.circles]
-        if centre.circle not in known:
-            raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
 
     def _check_surroundings(self) -> None:
         """Floor below the object, a light that does not reach the object."""
@@ -169,13 +186,3 @@ class Scene(Model):
             )
         if self.light.radius >= self.light.distance / 2:
             raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")
-
-    def _check_corner(self, key: str, corner: Corner) -> None:
-        if corner.vertex not in self.solid.vertex_names:
-            raise ValueError(f"{key}.vertex must be one of {', '.join(self.solid.vertex_names)}, got {corner.vertex!r}")
-        there = [edge.name for edge in self.solid.edges_at(corner.vertex)]
-        for name in corner.edges:
-            if name not in there:
-                raise ValueError(f"{key}.edges must be edges at {corner.vertex} ({', '.join(there)}), got {name!r}")
-        if corner.edges[0] == corner.edges[1]:
-            raise ValueError(f"{key}.edges must be two different edges, got {list(corner.edges)}")

@@ -29,10 +29,10 @@ class CheckedSetting:
     edges : tuple of str
         Required edges.
     calibrated, propagated : float
-        Predicted variance (not sigma) without and with the picture, in the plan's unit (cm^2 or px^2); infinite where
-        it cannot be measured.
+        What the plan minimises, without and with the picture: the variance (not sigma) in cm^2 or px^2, or what several
+        make together; infinite where it cannot be measured.
     status : str
-        Of the measurement of the noise-free picture.
+        The worst of the measurands in the noise-free picture.
     without_formula : tuple of str
         Effects that were simulated there and that no formula of the planner knows.
     rank_before : int
@@ -130,7 +130,7 @@ def check_plan(
 
 def _best(found: planner.Plan) -> list[tuple[Pose, Pose, tuple[str, ...]]]:
     """The plan, and its candidates from other places, the best first."""
-    here = found.sensor, found.light, found.scene.task.edges
+    here = found.sensor, found.light, planner.edges_of(found.scene)
     others = [(c.sensor, c.light, c.edges) for c in found.candidates]
     return [here, *(other for other in others if not _same(here, other))]
 
@@ -151,16 +151,18 @@ def _checked(
 ) -> CheckedSetting:
     scene = _with_edges(found.scene, edges)
     picture = render.image(scene, sensor, light, quality)
-    measured = measure.propagate(picture, scene, sensor, light, ESTIMATOR)
-    planned, calibrated = (planner.predict(scene, sensor, light, model) for model in (found.model, "calibrated"))
-    to_unit = planned.variance_object / planned.variance_image if found.objective == "object" else 1.0
+    measured = measure.propagate(picture, scene, sensor, light, ESTIMATOR).measurands
+    calibrated = planner.predict(scene, sensor, light, "calibrated").measurands
+    aim = planner.Aim.of(scene.quantities, found.objective, found.over)
+    in_object = found.objective == "object"
+    joint = measured.covariance if in_object else measured.covariance_image
     return CheckedSetting(
         sensor=sensor,
         light=light,
         edges=edges,
-        calibrated=calibrated.variance_object if found.objective == "object" else calibrated.variance_image,
-        propagated=measured.variance_px2 * to_unit,
-        status=measured.status,
+        calibrated=float(aim(np.array([e.variance_object if in_object else e.variance_image for e in calibrated]))),
+        propagated=float(aim(np.diag(joint))),
+        status=status.worst(*measured.status),
         without_formula=without_formula(scene, sensor, light),
         rank_before=rank,
     )
@@ -181,7 +183,7 @@ def without_formula(scene: Scene, sensor: Pose, light: Pose) -> tuple[str, ...]:
 
 def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:
     """The scene with the task that measures the same by other edges."""
-    if edges == scene.task.edges:
+    if edges == planner.edges_of(scene):
         return scene
     task = next(task for task in planner.required_edges(scene) if task.edges == edges)
     return scene.model_copy(update={"task": task})

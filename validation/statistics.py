@@ -154,6 +154,7 @@ def verdict(
     predicted_bias_px: ArrayLike = 0.0,
     sigma_px: ArrayLike | None = None,
     ok: ArrayLike = True,
+    independent: ArrayLike = 1.0,
 ) -> Verdict:
     """Judge all rows together: a table of true predictions is contradicted with probability ``level`` at most.
 
@@ -178,6 +179,9 @@ def verdict(
         first nothing is said of biases.
     ok : array_like of bool
         Whether the row's status is ``ok``; only such rows have promised to be without bias.
+    independent : array_like
+        For how many independent rows each counts when they are pooled: less than 1 for quantities measured in the same
+        images (their number over the sum of their squared correlations).
 
     Examples
     --------
@@ -190,7 +194,7 @@ def verdict(
     >>> verdict([1.0, float("nan"), float("nan")], [1000, 0, 0]).reasons
     ('not measured',)
     """
-    ratios, counts, lost, ok = np.broadcast_arrays(np.asarray(ratios, float), counts, lost, ok)
+    ratios, counts, lost, ok, shares = np.broadcast_arrays(np.asarray(ratios, float), counts, lost, ok, independent)
     judged = np.isfinite(ratios) & (counts >= 2) & (lost <= STRAY * (counts + lost))
     rows, missing = int(judged.sum()), int((~judged).sum())
     if not rows:
@@ -204,7 +208,7 @@ def verdict(
     levels = _levels(level, promised.any())
     p_values, limit = _p_values(ratios[judged], counts[judged]), sidak(levels["rows"], rows)
     smallest = float(p_values.min())
-    pooled = _pooled(ratios[judged], counts[judged] - 1, levels["pooled"])
+    pooled = _pooled(ratios[judged], shares[judged] * (counts[judged] - 1), levels["pooled"])
     bias = bias_test(away[promised], counts[promised], levels["bias"]) if "bias" in levels else None
     broken = {
         "rows": smallest < limit,
@@ -256,8 +260,8 @@ def bias_p_value(difference: ArrayLike, n: ArrayLike, allowance: float = ALLOWAN
 
 
 def _pooled(ratios: np.ndarray, freedoms: np.ndarray, level: float) -> Pooled:
-    freedom = int(freedoms.sum())
-    ratio = float((freedoms * ratios).sum() / freedom)
+    freedom = max(int(freedoms.sum()), 1)
+    ratio = float((freedoms * ratios).sum() / freedoms.sum())
     return Pooled(ratio, ratio_interval(ratio, freedom + 1), p_value(ratio, freedom + 1), level)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from measure.features.lines import trapezoid, trend_along
-from measure.features.points import EdgePoints, UnitNoise
+from measure.features.points import EachPoint, EdgePoints, UnitNoise
 from planner.features.locator import MIN_CONTRAST
 
 STEP = 0.5  # px between the places across the edge
@@ -62,39 +62,63 @@ class CrossingLocator:
         profiles *= _polarity(profiles)
         return self._points(*_bracket(profiles), profiles, turned)
 
-    def _points(self, crossing, start, found, profiles: np.ndarray, turned: np.ndarray) -> EdgePoints:
+    def locate_each(self, images: np.ndarray) -> EachPoint:
+        """Edge points of images (n, height, width), each position by itself: its contrast may be of either sign."""
+        profiles = self._profiles(images)
+        profiles *= np.where(_rise(profiles) >= 0, 1.0, -1.0)[:, None]
+        offset, valid, slope = self._offsets(*_bracket(profiles), profiles)
+        return EachPoint(offset.T * self.gain, valid.T, (self.slope_to_contrast[:, None] * slope).T)
+
+    def respond_each(self, clean: np.ndarray) -> tuple[EachPoint, sparse.csr_array]:
+        """Such points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
+        profiles = self._profiles(clean[None])
+        sign = np.where(_rise(profiles) >= 0, 1.0, -1.0)
+        profiles *= sign[:, None]
+        return self.locate_each(clean[None]), self._response(profiles, sign[:, 0], clean.size)
+
+    def _offsets(self, crossing, start, found, profiles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Offsets, px, whether they are valid, and the slopes there, all (m, n)."""
         offset, slope = _refine(profiles, crossing, start)
         valid = found & (np.abs(offset - start) < 1)
-        offset = np.where(valid, self.offsets[0] + STEP * offset, 0.0)
-        slope = np.where(valid, -slope / STEP, 0.0)
+        return np.where(valid, self.offsets[0] + STEP * offset, 0.0), valid, np.where(valid, -slope / STEP, 0.0)
+
+    def _points(self, crossing, start, found, profiles: np.ndarray, turned: np.ndarray) -> EdgePoints:
+        offset, valid, slope = self._offsets(crossing, start, found, profiles)
         along = np.broadcast_to(self.positions, (profiles.shape[2], self.positions.size))
         contrast, trend, _ = trend_along(along, self.slope_to_contrast * slope.T, 1.0 * valid.T)
         return EdgePoints(along, offset.T * self.gain, valid.T, contrast, turned, trend, trapezoid(self.positions))
 
     def unit_noise(self) -> UnitNoise:
         """Response to noise on a straight edge of unit contrast: the function's over its slope."""
+        return UnitNoise(self.positions, trapezoid(self.positions), self.unit_response())
+
+    def unit_response(self) -> sparse.csr_array:
+        """Derivative of the offsets by `pixels` at unit contrast, px per grey level, (m, P)."""
         middle = self.kernel[self.offsets.size // 2 :: self.offsets.size] + self._common
-        response = sparse.diags_array(self.slope_to_contrast * self.gain) @ middle
-        return UnitNoise(self.positions, trapezoid(self.positions), response)
+        return sparse.csr_array(sparse.diags_array(self.slope_to_contrast * self.gain) @ middle)
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
         profiles = self._profiles(clean[None])
         turned, polarity = _reversed(profiles), _polarity(profiles)
         profiles *= polarity
-        crossing, start, found = _bracket(profiles)
+        found = self._points(*_bracket(profiles), profiles, turned)
+        return found, self._response(profiles, np.full(len(profiles), polarity[0]), clean.size)
+
+    def _response(self, profiles: np.ndarray, polarity: np.ndarray, size: int) -> sparse.csr_array:
+        """d(offset) / d(pixel) of one image whose profiles (m, T, 1) were made positive by signs (m,)."""
+        crossing, start, _ = _bracket(profiles)
         root, slope = _refine(profiles, crossing, start)
         weights = _cubic_weights(root - crossing)
         rows = np.arange(crossing.shape[0])[:, None]
         columns = rows * self.offsets.size + crossing[:, :1] + np.arange(-1, 3)
-        scale = -STEP / slope[:, :1] * polarity[0] * self.gain[:, None]
+        scale = -STEP / slope[:, :1] * (polarity * self.gain)[:, None]
         values = scale * weights[:, 0]
         pick = sparse.csr_array(
             (values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0])
         )
         near = sparse.coo_array(pick @ self.kernel + sparse.diags_array(scale[:, 0]) @ self._common)
-        full = sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (rows.size, clean.size))
-        return self._points(crossing, start, found, profiles, turned), full
+        return sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (rows.size, size))
 
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """The function at all places, shape (m, T, n)."""

@@ -117,19 +117,23 @@ def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Sh
     corners = found.vertices[:, tool.arrangement.corners]
     probability = _probabilities(found)
     contrast, edge_status = seen_edges(tool, layout, found)
-    state = _states(tool, layout, found, normals, edge_status, reliable)
+    whole = _whole(tool, found, reliable)
+    counted = _counted(tool, edge_status)
+    state = _states(layout, normals, counted, whole)
     measured = np.isin(state, status.MEASURED)
     covariance = np.stack([_corners(tool, centre) for centre in found.centres])[found.centre]
-    tilts = np.stack([_tilts(tool, centre) for centre in found.centres])[found.centre]
+    lines = np.stack([_lines(tool, centre) for centre in found.centres])[found.centre]
     count = np.full(edge_status.shape, tool.pixels.size)
     return Shape(
         corners=np.where(measured[:, None, None], corners, np.nan),
         covariance=np.where(measured[:, None, None], covariance, np.nan),
         normals=normals,
         points=ends[:, :, 0],
-        tilt_covariance=tilts,
+        lines=lines,
         status=state,
+        whole=whole,
         edge_status=edge_status,
+        counted=counted,
         edge_contrast=np.abs(contrast),
         used=count,
         rejected=np.zeros_like(count),
@@ -178,29 +182,43 @@ def _probabilities(found: Found) -> np.ndarray:
 
 
 @_BLAS.wrap(limits=1)
-def corner_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
-    """Derivative of the corners' (x, y) by the pixels at the very solution of a noise-free image, (2 C, pixels)."""
+def line_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
+    """Derivative of the lines (displacement, rotation) by the pixels at the very solution of a noise-free image.
+
+    Shape (2 E, height * width).
+    """
     ((_, _, tool),) = _parts(clean[None], layout, tool)
     centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
-    rows = np.zeros((2 * tool.arrangement.corners.size, clean.size))
-    rows[:, tool.pixels] = tool.derivative(centre)[tool.index(tool.arrangement.corners)]
+    rows = np.zeros((2 * len(tool.arrangement.required), clean.size))
+    rows[:, tool.pixels] = line_rows(tool, centre) @ tool.derivative(centre)
     return rows
 
 
-def _states(tool, layout, found: Found, normals, edge_status, reliable: bool) -> np.ndarray:
+def _counted(tool: ArrangementEstimator, edge_status: np.ndarray) -> np.ndarray:
+    """Statuses of the edges as they count: what the light says is faint need not be seen."""
+    faint = ~asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
+    return np.where(faint, status.OK, edge_status)
+
+
+def _states(layout: Layout, normals: np.ndarray, counted: np.ndarray, whole: np.ndarray) -> np.ndarray:
     """Status of each image."""
-    first, second = (normals[:, list(side)] for side in zip(*layout.corners, strict=True))
+    pairs = np.array(layout.corners, int).reshape(-1, 2)
+    first, second = normals[:, pairs[:, 0]], normals[:, pairs[:, 1]]
     sines = np.abs(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
     joint = np.where((sines < MIN_SINE).any(1), status.ILL_CONDITIONED, status.OK)
+    each = np.concatenate([counted, np.stack([joint, whole], 1)], 1)
+    return np.array([status.worst(*row) for row in each])
+
+
+def _whole(tool, found: Found, reliable: bool) -> np.ndarray:
+    """What is said of each image as a whole."""
     told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
     rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]
     turned = np.where(_inverted(tool, found.vertices) | rivalled, status.AMBIGUOUS, status.OK)
     near = moved(tool, found.vertices) < FURTHEST
     fits = np.where(near & _fits(found), status.OK, status.MISFIT)
     runs = np.where(near, status.OK, status.LOW_CONTRAST)
-    faint = ~asked(tool) & np.isin(edge_status, [status.LOW_CONTRAST, status.SIGN_CHANGE])
-    edge_status = np.where(faint, status.OK, edge_status)
-    each = np.concatenate([edge_status, np.stack([joint, told, turned, fits, runs], 1)], 1)
+    each = np.stack([told, turned, fits, runs], 1)
     return np.array([status.worst(*row) for row in each])
 
 
@@ -232,15 +250,23 @@ def _corners(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
     return centre.covariance[np.ix_(index, index)]
 
 
-def _tilts(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
-    """Covariance of the required lines' angles, rad^2, (E, E)."""
-    rows = np.zeros((len(tool.arrangement.required), len(centre.covariance)))
+def _lines(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """Covariance of the required lines' displacements at their first ends, px, and rotations, rad, (2 E, 2 E)."""
+    rows = line_rows(tool, centre)
+    return rows @ centre.covariance @ rows.T
+
+
+def line_rows(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
+    """Their derivatives by the parameters, (2 E, q)."""
+    rows = np.zeros((2 * len(tool.arrangement.required), len(centre.covariance)))
     for e, pair in enumerate(tool.arrangement.required):
         along = np.diff(centre.state.vertices[pair], axis=0)[0]
-        normal = np.array([-along[1], along[0]]) / (along @ along)
+        size = np.linalg.norm(along)
+        normal = np.array([-along[1], along[0]]) / size
+        rows[2 * e, tool.index(pair[:1])] += normal
         for vertex, sign in zip(pair, (-1, 1), strict=True):
-            rows[e, tool.index(np.array([vertex]))] += sign * normal
-    return rows @ centre.covariance @ rows.T
+            rows[2 * e + 1, tool.index(np.array([vertex]))] += sign * normal / size
+    return rows
 
 
 def _nothing(count: int, layout: Layout) -> Shape:
@@ -252,9 +278,11 @@ def _nothing(count: int, layout: Layout) -> Shape:
         covariance=np.full((count, 2 * corners, 2 * corners), np.nan),
         normals=np.full((count, edges, 2), np.nan),
         points=np.full((count, edges, 2), np.nan),
-        tilt_covariance=np.full((count, edges, edges), np.nan),
+        lines=np.full((count, 2 * edges, 2 * edges), np.nan),
         status=np.full(count, status.NOT_VISIBLE),
+        whole=np.full(count, status.NOT_VISIBLE),
         edge_status=np.tile(state, (count, 1)),
+        counted=np.tile(state, (count, 1)),
         edge_contrast=np.zeros((count, edges)),
         used=none,
         rejected=none,

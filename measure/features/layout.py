@@ -10,14 +10,14 @@ from skimage.draw import polygon2mask
 
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
-from planner.features.projected_edges import projected_edges, straight
+from planner.features.projected_edges import corner_features, projected_edges, straight
 from planner.imaging.appearance import is_plain
 from planner.imaging.arrangement import Arrangement, arrangement_of, polygon_arrangement
 from planner.imaging.lens import signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
 from planner.models.bias import cluttered
-from scenes import Corner, InvalidInput, Picture, Scene
+from scenes import Picture, Scene
 
 BACKGROUND = -1
 
@@ -153,20 +153,14 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def layout_of(picture: Picture) -> Layout:
-    """The task's edges as a sensor pose projects them, in ideal image coordinates.
+    """The straight edges of a scene's quantities as a sensor pose projects them, in ideal image coordinates.
 
     With the lights known, the shading of each face is known too, and a face that is not lit is background.
 
-    Raises
-    ------
-    InvalidInput
-        If the task is not the distance between two corners.
     """
     scene = picture.scene
-    if scene.task.kind != "distance" or not all(isinstance(feature, Corner) for feature in scene.task.corners):
-        raise InvalidInput(f"{scene.name}: task must be a distance between two corners to be measured, got another")
     pictures, solid, pose = Pictures.of(picture), scene.bodies, np.array(list(picture.sensor))
-    names = tuple(dict.fromkeys(straight(scene)))  # the same edge in both corners is one line
+    names = straight(scene)
     view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
     seen = facing(solid, pictures.sensor_at)
@@ -181,19 +175,19 @@ def layout_of(picture: Picture) -> Layout:
     )
     place = {int(f): i for i, f in enumerate(order)}
     faces = tuple(points[list(solid.faces[f])] for f in order)
-    ends = np.array([points[list(edge.ends)] for edge in required])
+    ends = np.array([points[list(edge.ends)] for edge in required]).reshape(-1, 2, 2)
     return Layout(
         names=view.names,
         ends=ends,
         visible=view.visible & np.isfinite(ends).all((1, 2)),
         shown=view.shown,
-        corners=tuple(tuple(names.index(name) for name in corner.edges) for corner in scene.task.corners),
+        corners=tuple(tuple(names.index(name) for name in corner.edges) for corner in corner_features(scene)),
         joints=_joints([edge.ends for edge in required]),
         beside=tuple(tuple(_away(points, edge, end, turned) for end in (0, 1)) for edge in required),
         apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),
         others=_segments(points, [e for e in shown if e not in required]),
         faces=faces,
-        sides=np.array([_sides(points, edge, solid.faces, place) for edge in required]),
+        sides=np.array([_sides(points, edge, solid.faces, place) for edge in required], int).reshape(-1, 2),
         shadings=tuple(shadings[f] for f in order),
         optics=Optics.of(scene),
         defocus=_defocus(scene, pose, required),
@@ -235,7 +229,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
 
 def _defocus(scene: Scene, pose: np.ndarray, required) -> np.ndarray:
     """Signed radii of confusion at the edges' ends: inverse depth is linear in the image, and so are they."""
-    ends = np.array([list(edge.ends) for edge in required])
+    ends = np.array([list(edge.ends) for edge in required], int).reshape(-1, 2)
     return signed_confusion(scene.camera, depth(scene.solid.vertices, pose, scene.camera)[ends])
 
 

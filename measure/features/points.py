@@ -48,3 +48,14 @@ class UnitNoise(NamedTuple):
     along: np.ndarray
     weights: np.ndarray
     response: sparse.csr_array
+
+
+class EachPoint(NamedTuple):
+    """Edge points of n images at m places, each with its own contrast.
+
+    ``offset`` (n, m), px, 0 where not ``valid``; ``contrast`` (n, m), without its sign, grey levels.
+    """
+
+    offset: np.ndarray
+    valid: np.ndarray
+    contrast: np.ndarray

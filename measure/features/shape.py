@@ -14,7 +14,7 @@ from measure.estimators.registry import CAPTURE, estimator
 from measure.features.alignment import align
 from measure.features.arranged import find_arranged, goodness
 from measure.features.corners import corner_response, intersect, line_equations
-from measure.features.found import MIN_SINE, Shape, gather
+from measure.features.found import MIN_SINE, Shape, gather, nothing
 from measure.features.layout import Layout
 from measure.goodness import WORST
 
@@ -47,6 +47,8 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     within the estimator's capture of their expected place, the layout is moved there first.
     """
     tool = prepared(layout, name, threshold)
+    if not layout.names:
+        return nothing(len(images))
     if isinstance(tool, ArrangementEstimator):
         return find_arranged(images, layout, tool)
     parts = [_find(images[i : i + _BATCH], layout, name, threshold, _PASSES) for i in range(0, len(images), _BATCH)]
@@ -58,8 +60,10 @@ def _judged(found: Shape, images: np.ndarray, layout: Layout) -> Shape:
     """With the goodness of fit of the whole picture: a strip by itself has too few pixels to tell."""
     p_value = goodness(images, layout, prepared(layout, "arrangement", 1.0))
     fits = np.where(p_value < WORST, status.MISFIT, status.OK)
-    state = np.array([status.worst(*pair) for pair in zip(found.status, fits, strict=True)])
-    return replace(found, status=state, p_value=p_value)
+    state, whole = (
+        np.array([status.worst(*pair) for pair in zip(said, fits, strict=True)]) for said in (found.status, found.whole)
+    )
+    return replace(found, status=state, whole=whole, p_value=p_value)
 
 
 def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passes: int) -> Shape:
@@ -112,7 +116,8 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
     calipers = tool.calipers
     normals, points = line_equations(calipers, estimate.level, estimate.slope)
     crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]
-    corners, sines = np.stack([c for c, _ in crossings], 1), np.stack([s for _, s in crossings], 1)
+    corners = np.stack([c for c, _ in crossings], 1) if crossings else np.empty((len(normals), 0, 2))
+    sines = np.stack([s for _, s in crossings], 1) if crossings else np.empty((len(normals), 0))
     fixed = np.array([caliper.status for caliper in calipers])
     edge_status = np.where(fixed == status.OK, estimate.state, np.where(
         (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
@@ -120,7 +125,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
     state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
     measured = np.isin(state, status.MEASURED)
     covariance = np.full((len(state), 2 * len(layout.corners), 2 * len(layout.corners)), np.nan)
-    if measured.any():
+    if measured.any() and layout.corners:
         response = np.concatenate([corner_response(calipers, pair) for pair in layout.corners])
         covariance[measured] = response @ lines[measured] @ response.T
     middle = estimate.contrast[..., 0] + estimate.contrast[..., 1] * np.array([f.length / 2 for f in calipers])
@@ -129,9 +134,11 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
         covariance=covariance,
         normals=normals,
         points=points,
-        tilt_covariance=lines[:, 1::2, 1::2],
+        lines=lines,
         status=state,
+        whole=np.full(len(state), status.OK),
         edge_status=edge_status,
+        counted=edge_status,
         edge_contrast=np.abs(middle),
         used=estimate.used,
         rejected=estimate.rejected,
@@ -146,4 +153,5 @@ def _refuse(shape: Shape, lost: np.ndarray) -> Shape:
     state = np.where(lost & np.isin(shape.status, status.MEASURED), status.LOW_CONTRAST, shape.status)
     gone = ~np.isin(state, status.MEASURED)
     corners = np.where(gone[:, None, None], np.nan, shape.corners)
-    return Shape(**{**vars(shape), "status": state, "corners": corners})
+    whole = np.where(lost, status.LOW_CONTRAST, shape.whole)
+    return replace(shape, status=state, whole=whole, corners=corners)

@@ -1,7 +1,7 @@
-"""A circular edge as the sensor sees it, and how well the centre of its image is found.
+"""A circular edge as the sensor sees it, and how well the circle is found from its rim.
 
-The image of a circle is an ellipse. Moving it by (x, y) and straining it by a symmetric matrix reaches every ellipse
-near by, so these five are the parameters of the fit; a point's residual is its distance along the normal.
+The pose tells in which plane the circle lies, so its parameters are three: two shifts of its centre in that plane and
+the change of its radius. A point's residual is its distance from the rim's image along the normal.
 """
 
 from __future__ import annotations
@@ -10,14 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.appearance import behind, of_sides, signal
-from planner.imaging.lens import image_centre
+from planner.features.locator import reach
+from planner.features.rim_sides import (
+    RIM_POINTS,
+    clearance,
+    contrast_along,
+    equal_angles,
+    outward_normals,
+    radials,
+    steady,
+)
+from planner.features.seen import plane_axes
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame, project_ideal
-from planner.imaging.rays import first_face
-from scenes import Circle, Scene, Solid
+from scenes import Circle
 
-RIM_POINTS = 64
+LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of it is taken and its circle is `clutter`
+LEAST_SEEN = 0.1  # part of the rim that must have contrast
 
 
 @dataclass(frozen=True)
@@ -26,20 +34,31 @@ class Rim:
 
     Attributes
     ----------
-    design : ndarray, shape (..., n, 5)
-        Derivative of each point's distance along its normal by the ellipse's five parameters, the centre first.
+    design : ndarray, shape (..., n, 3)
+        Derivative of each point's place along its normal by the circle's three parameters (`planner.features.seen`), px
+        for the scene's unit.
     arc : ndarray, shape (..., n)
         Length of image that each point stands for, px.
     squared : ndarray, shape (..., n)
         Squared contrast, 0 at hidden points.
     noise_variance : ndarray, shape (..., n), or float
         Mean of both sides, grey levels^2.
+    clear : ndarray of bool, shape (..., n)
+        Whether the locator is undisturbed there: the far rim of the wall beside, where the wall is seen, the straight
+        edges around the circle's face, and jumps of the contrast along the rim are `locator.reach` away.
     """
 
     design: np.ndarray
     arc: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray | float
+    clear: np.ndarray
+
+    @property
+    def crowded(self) -> np.ndarray:
+        """Whether so little of what is seen is undisturbed that all of it has to be taken, bool, shape (...)."""
+        seen = self.squared > 0
+        return (seen & self.clear).mean(-1) < LEAST_CLEAR * np.maximum(seen.mean(-1), LEAST_CLEAR)
 
     @property
     def counted(self) -> np.ndarray:
@@ -49,105 +68,58 @@ class Rim:
 
 def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     """Sample a circular edge at equal angles."""
-    scene, sensors = pictures.scene, pictures.sensors
-    angle = 2 * np.pi * (np.arange(RIM_POINTS) + 0.5) / RIM_POINTS
-    one, two = _axes(circle.axis)
-    radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
-    points = circle.centre + circle.radius * radial
-    step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
-    image = project_ideal(points, sensors, scene.camera)
-    tangent = (project_ideal(points + 1e-4 * step, sensors, scene.camera) - image) / 1e-4
-    speed = np.linalg.norm(tangent, axis=-1)
-    normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1) / speed[..., None]
-    x, y = np.moveaxis(image - ellipse_centre(scene, circle, sensors)[..., None, :], -1, 0)
-    nx, ny = normal[..., 0], normal[..., 1]
-    design = np.stack([nx, ny, nx * x, ny * y, nx * y + ny * x], -1)
-    sides = _sides(pictures, circle, points, radial, fall_off)
-    if not fall_off:
-        squared, noise = (sides[..., 0, :] - sides[..., 1, :]) ** 2, scene.noise.variance
-    else:
-        squared, noise = of_sides(scene, sides)
-    return Rim(design, speed * 2 * np.pi / RIM_POINTS, squared, noise)
+    scene = pictures.scene
+    angle = equal_angles()
+    one, two = plane_axes(circle.axis)
+    radial = radials(circle, angle)
+    normal, slope, speed = outward_normals(pictures, circle, angle)
+    across = np.einsum("...ni,...nij->...nj", normal, slope)
+    design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
+    squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
+    arc, far = speed * 2 * np.pi / RIM_POINTS, reach(scene.locator.scale_px, scene.camera.blur_px)
+    clear = (clearance(pictures, circle, angle) >= far) & steady(squared, arc, far)
+    return Rim(design, arc, squared, noise, clear)
 
 
-def ellipse_centre(scene: Scene, circle: Circle, sensors: np.ndarray) -> np.ndarray:
-    """Centre of the ellipse that is the image of a circle, px; not the image of the circle's centre."""
-    axes, camera = frame(sensors), scene.camera
-    centre = circle.centre - np.array(camera.look_at)
-    columns = np.stack([circle.radius * axis for axis in _axes(circle.axis)] + [centre], -1)
-    rows = np.stack([camera.focal_px * axes.right, camera.focal_px * axes.down, axes.forward], -2) @ columns
-    rows[..., 2, 2] += camera.distance
-    dual = rows @ np.diag([1.0, 1.0, -1.0]) @ np.swapaxes(rows, -1, -2)
-    return dual[..., :2, 2] / dual[..., 2:, 2] + image_centre(camera)
-
-
-def fisher_centre(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
-    """Covariance of the centre from independent points of the given inverse variances (..., n), px^2."""
+def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
+    """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
     information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
-    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 5
-    return _centre(information, None, enough)
+    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 3
+    return _covariance(information, enough)
 
 
-def calibrated_centre(circle: Rim, kappa2: float, correlation_length: float, weakest: float) -> np.ndarray:
-    """Covariance of the centre found by least squares from dense points with correlated errors, px^2.
+def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
+    """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
-    ``kappa2`` is a point's variance over that of the noise at unit contrast. Points of a squared contrast below
-    ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
+    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the
+    noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
+    edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
+    that is used. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are
+    left out; a tenth of the rim must be left.
     """
-    used = np.where(circle.squared >= weakest * circle.noise_variance, circle.arc, 0.0)
-    variance = (
-        kappa2 * circle.noise_variance * correlation_length / np.where(circle.squared > 0, circle.squared, np.inf)
+    taken = circle.clear | circle.crowded[..., None]
+    ratio = circle.squared / circle.noise_variance
+    used = taken & (ratio >= weakest)
+    ends = (used & ~np.roll(used, 1, -1)).astype(int) + (used & ~np.roll(used, -1, -1))
+    information, at_ends = (
+        np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
+        for weight in (circle.arc, ends)
     )
-    information = np.einsum("...n,...ni,...nj->...ij", used, circle.design, circle.design)
-    spread = np.einsum("...n,...ni,...nj->...ij", used * variance, circle.design, circle.design)
-    return _centre(information, spread, (used > 0).mean(-1) >= 0.1)
+    inverse = _covariance(information, used.mean(-1) >= LEAST_SEEN)
+    good = np.isfinite(inverse).all((-1, -2))[..., None, None]
+    known = np.where(good, inverse, 0.0)
+    found = kappa2 * (2 * np.sqrt(np.pi) * scale * known - 2 * scale**2 * known @ at_ends @ known)
+    return np.where(good, found, inverse)
 
 
-def _centre(information: np.ndarray, spread: np.ndarray | None, enough: np.ndarray) -> np.ndarray:
-    """Upper left block of information^-1 [spread information^-1]; infinite diagonal where singular."""
+def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:
+    """The inverse; infinite diagonal where singular."""
     enough = enough & np.isfinite(information).all((-1, -2))
     size = np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1)))
     enough &= (size > 0).all(-1)
     size = np.where(enough[..., None], size, 1.0)
-    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), np.eye(5))
+    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), np.eye(3))
     enough &= np.linalg.eigvalsh(scaled)[..., 0] > 1e-10
-    scaled = np.where(enough[..., None, None], scaled, np.eye(5))
+    scaled = np.where(enough[..., None, None], scaled, np.eye(3))
     inverse = np.linalg.inv(scaled) / (size[..., None] * size[..., None, :])
-    covariance = inverse if spread is None else inverse @ np.where(enough[..., None, None], spread, 0.0) @ inverse
-    return np.where(enough[..., None, None], covariance[..., :2, :2], np.diag([np.inf, np.inf]))
-
-
-def _axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    one = np.cross(axis, helper)
-    one /= np.linalg.norm(one)
-    return one, np.cross(axis, one)
-
-
-def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
-    """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
-    bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
-    wall = -radial if circle.hole else radial
-    chord = np.cos(np.pi / len(circle.edges)) if circle.hole else 1.0  # the mesh's facets reach into the hole
-    probe = circle.centre + chord * (points - circle.centre)
-    lit = tuple(_free(bodies, probe, at[..., None, :]) for at in pictures.lights_at)
-    sides = []
-    for normal in (np.broadcast_to(circle.axis, points.shape), wall):
-        turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
-        sides.append((turned, signal(pictures, points, normal, 1, lit, fall_off=fall_off)))
-    seen = _free(bodies, probe, sensor_at) & (sides[0][0] | sides[1][0])
-    levels = []
-    for turned, level in sides:
-        wanted = seen & ~turned
-        past = behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off)
-        levels.append(np.where(seen, np.where(wanted, past, level), 0.0))
-    return np.stack(np.broadcast_arrays(*levels), -2)
-
-
-def _free(bodies: Solid, probe, position) -> np.ndarray:
-    """Whether nothing stands between the rim's points and a position (..., 1, 3)."""
-    if bodies.is_convex:
-        return np.ones((*position.shape[:-2], len(probe)), bool)
-    vectors = probe - position
-    _, t = first_face(bodies, np.broadcast_to(position, vectors.shape), vectors, ())
-    return t > 1 - 1e-6
+    return np.where(enough[..., None, None], inverse, np.diag(np.full(3, np.inf)))

@@ -1,73 +1,215 @@
-"""What is measured, as a function of the edges' lines: its value, its derivatives, and its scale in the object.
+"""What a scene's pictures are expected to show of its measurands: values, derivatives, required edges.
 
-An edge's line is found with two errors: d, its displacement along its normal (px) at the edge's first end, and theta,
-its rotation (rad). To first order a measured quantity moves by the sum over edges of offset d + tilt theta, and by
-pull . (error of the centre) for each circle. The same edge in both corners is one line, not two.
+To first order a measured quantity moves by gradient . errors, the errors being those of lines and circles as numbered
+in `planner.features.seen`. The same edge in several features is one line, not several.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
-from planner.features.projected_edges import ProjectedEdges, projected_edges, straight
+from planner.features.kinds import Evaluated, in_image, on_plane
+from planner.features.projected_edges import ProjectedEdges, circles, corner_features, projected_edges
+from planner.features.seen import Seen, corner_response, unit_normals
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import from_axis, jacobian_ideal, project_ideal
-from scenes import Centre, Corner, Edge, Scene, Task
+from planner.imaging.projection import from_axis
+from scenes import Centre, Corner, Quantity, Scene, Side, Task
 
-_DEGREE = float(np.degrees(1.0))
+__all__ = ["Measurand", "Measurands", "corner_response", "measurand", "measurands", "normals", "required_edges"]
+
+
+@dataclass(frozen=True)
+class Measurands:
+    """All M quantities of a scene for sensor poses of leading shape (...).
+
+    Values in the image are px, in the object the scene's unit; degrees for angles.
+
+    Attributes
+    ----------
+    quantities : tuple of Quantity
+    view : ProjectedEdges
+        The E different straight edges that they depend on.
+    seen : Seen
+        What they are found from.
+    """
+
+    quantities: tuple[Quantity, ...]
+    view: ProjectedEdges
+    seen: Seen
+
+    @property
+    def circles(self) -> tuple[str, ...]:
+        """The C circles that they depend on."""
+        return self.seen.circles
+
+    @property
+    def value(self) -> np.ndarray:
+        """In the image (ideal coordinates: the lens' distortion undone), shape (..., M)."""
+        return self._image[0]
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """Derivatives of the values in the image by the parameters of `Seen`, shape (..., M, 2 E + 3 C)."""
+        return self._image[1]
+
+    @cached_property
+    def value_object(self) -> np.ndarray:
+        """In the object, shape (M,)."""
+        found = self._plane[0].reshape(-1, len(self.quantities))
+        return found[0] if len(found) else np.full(len(self.quantities), np.nan)
+
+    @property
+    def gradient_object(self) -> np.ndarray:
+        """The same of the values on the planes of the features, shape (..., M, 2 E + 3 C)."""
+        return self._plane[1]
+
+    @cached_property
+    def _image(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._found(in_image)
+
+    @cached_property
+    def _plane(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._found(on_plane)
+
+    def _found(self, kind: Callable[[Seen, Quantity], Evaluated]) -> tuple[np.ndarray, np.ndarray]:
+        lead = self.seen.sensors.shape[:-1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            found = [kind(self.seen, quantity) for quantity in self.quantities]
+            values = np.stack([np.broadcast_to(each.value, lead) for each in found], -1)
+            return values, dense(found, lead, self.seen.count)
+
+    def of_lines(self, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A gradient's parts by displacement and rotation of each line, each (..., M, E)."""
+        last = 2 * len(self.view.names)
+        return gradient[..., 0:last:2], gradient[..., 1:last:2]
+
+    def of_circle(self, gradient: np.ndarray, c: int) -> np.ndarray:
+        """A gradient's part by the three parameters of the c-th circle, (..., M, 3)."""
+        first = 2 * len(self.view.names) + 3 * c
+        return gradient[..., first : first + 3]
+
+    def depends(self) -> np.ndarray:
+        """Which quantity needs which edges, then circles, bool, shape (M, E + C)."""
+        names = [*self.view.names, *self.circles]
+        return np.array([[name in quantity.edges for name in names] for quantity in self.quantities])
 
 
 @dataclass(frozen=True)
 class Measurand:
-    """The measurand for sensor poses of leading shape (...); px and cm for a distance, degrees for an angle.
+    """One of them: that which the task is about, or the first.
 
     Attributes
     ----------
     view : ProjectedEdges
-        The E different straight edges that it depends on.
+        The straight edges of all.
     value : ndarray, shape (...)
-        In the image (ideal coordinates: the lens' distortion undone).
+        px, or degrees.
     value_object : float
-        In the object.
-    scale : ndarray, shape (...)
-        Derivative of the value in the image by the value in the object: px / cm, or 1.
-    offset, tilt : ndarray, shape (..., E)
-        Derivatives of the value in the image by d and theta.
-    pull : ndarray, shape (..., 2)
-        Unit vector along a distance; the derivative by the position of the end, its negative by that of the start.
+        The scene's unit, or degrees.
+    offset, tilt, offset_object, tilt_object : ndarray, shape (..., E)
+        Derivatives of the value in the image and in the object by d and theta.
     points : ndarray, shape (..., 2, 2)
-        Images of the two features (x, y), ideal px; of the edges' middles for an angle.
+        Images of its two features (x, y), ideal px; of an edge the first end; of one feature twice the same.
     """
 
     view: ProjectedEdges
     value: np.ndarray
     value_object: float
-    scale: np.ndarray
     offset: np.ndarray
     tilt: np.ndarray
-    pull: np.ndarray
+    offset_object: np.ndarray
+    tilt_object: np.ndarray
     points: np.ndarray
 
 
-def measurand(pictures: Pictures) -> Measurand:
-    """The task's measurand as the sensors see it, found once for each set of pictures."""
-    return pictures.once("measurand", lambda: _measurand(pictures))
+def measurands(pictures: Pictures) -> Measurands:
+    """The scene's quantities as the sensors see them, found once for each set of pictures."""
+    return pictures.once("measurands", lambda: _measurands(pictures))
 
 
-def _measurand(pictures: Pictures) -> Measurand:
-    scene = pictures.scene
-    view = projected_edges(pictures, tuple(dict.fromkeys(straight(scene))))
+def measurand(pictures: Pictures, number: int = 0) -> Measurand:
+    """One of them by its number."""
+    return pictures.once(("measurand", number), lambda: _one(measurands(pictures), number))
+
+
+def _measurands(pictures: Pictures) -> Measurands:
+    view = projected_edges(pictures)
+    return Measurands(pictures.scene.quantities, view, expected(pictures, view))
+
+
+def dense(found: list[Evaluated], lead: tuple[int, ...], count: int) -> np.ndarray:
+    """Gradients of M quantities by all parameters, shape (*lead, M, count)."""
+    whole = np.zeros((*lead, len(found), count))
+    for m, each in enumerate(found):
+        for k, value in each.gradient.items():
+            whole[..., m, k] = value
+    return whole
+
+
+def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
+    """What sensors see of an object that is as the scene says."""
+    scene, solid, sensors = pictures.scene, pictures.scene.solid, pictures.sensors
+    edges = [solid.edge(name) for name in view.names]
+    starts = from_axis(solid.vertices[np.array([edge.ends[0] for edge in edges], int)], sensors, scene.camera)
+    corners = corner_features(scene)
+    images = from_axis(np.array([solid.vertex(c.vertex) for c in corners]).reshape(-1, 3), sensors, scene.camera)
+    rims = [solid.circle(name) for name in circles(scene)]
+    lead = sensors.shape[:-1]
+    return Seen(
+        solid=solid,
+        camera=scene.camera,
+        sensors=sensors,
+        names=view.names,
+        start=starts,
+        along=view.along,
+        corners={corner: images[..., k, :] for k, corner in enumerate(corners)},
+        circles=tuple(rim.name for rim in rims),
+        centres=np.broadcast_to(np.array([rim.centre for rim in rims]).reshape(-1, 3), (*lead, len(rims), 3)),
+        radii=np.broadcast_to(np.array([rim.radius for rim in rims]), (*lead, len(rims))),
+        expected=True,
+    )
+
+
+def _one(known: Measurands, number: int) -> Measurand:
+    (offset, tilt), (offset_object, tilt_object) = (
+        (part[..., number, :] for part in known.of_lines(gradient))
+        for gradient in (known.gradient, known.gradient_object)
+    )
+    return Measurand(
+        view=known.view,
+        value=known.value[..., number],
+        value_object=float(known.value_object[number]),
+        offset=offset,
+        tilt=tilt,
+        offset_object=offset_object,
+        tilt_object=tilt_object,
+        points=_points(known, known.quantities[number]),
+    )
+
+
+def _points(known: Measurands, quantity: Quantity) -> np.ndarray:
+    seen = known.seen
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (_distance if scene.task.kind == "distance" else _angle)(scene, pictures.sensors, view)
+        places = [
+            seen.start[..., seen.names.index(feature.edge), :]
+            if isinstance(feature, Side)
+            else seen.point(feature, None).at
+            for feature in (quantity.features * 2)[:2]
+        ]
+    return np.stack(places, -2) + image_centre(seen.camera)
 
 
 def required_edges(scene: Scene) -> tuple[Task, ...]:
     """Every task that measures the same with other edges: the paper's required edge list (eq. 11).
 
     A corner can be found from any two edges that meet in it; the circle of a centre and the lines of an angle stay.
+    None for a scene that lists measurands.
 
     Examples
     --------
@@ -75,6 +217,8 @@ def required_edges(scene: Scene) -> tuple[Task, ...]:
     >>> [" ".join(task.edges) for task in required_edges(scenes.load("task1"))][:3]
     ['e2 e4 e6 e7', 'e2 e4 e6 e11', 'e2 e4 e7 e11']
     """
+    if scene.task is None:
+        return ()
     if scene.task.kind == "angle":
         return (scene.task,)
     options = []
@@ -85,82 +229,9 @@ def required_edges(scene: Scene) -> tuple[Task, ...]:
         there = [edge.name for edge in scene.solid.edges_at(feature.vertex)]
         pairs = [(a, b) for i, a in enumerate(there) for b in there[i + 1 :]]
         options.append([Corner(vertex=feature.vertex, edges=pair) for pair in pairs])
-    return tuple(Task(start=start, end=end) for start in options[0] for end in options[1])
-
-
-def _distance(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand:
-    solid = scene.solid
-    places = np.array([_place(scene, feature) for feature in scene.task.corners])
-    points = from_axis(places, sensors, scene.camera)
-    across = points[..., 1, :] - points[..., 0, :]
-    points = points + image_centre(scene.camera)
-    value = np.linalg.norm(across, axis=-1)
-    pull = across / value[..., None]
-    offset = np.zeros((*value.shape, len(view.names)))
-    tilt = np.zeros_like(offset)
-    for sign, feature in zip((-1, 1), scene.task.corners, strict=True):
-        if isinstance(feature, Corner):
-            _add_corner(sign * pull, view, [solid.edge(name) for name in feature.edges], feature, solid, offset, tilt)
-    length = float(np.linalg.norm(places[1] - places[0]))
-    derivative = jacobian_ideal(places, sensors, scene.camera).sum(-3) / 2 @ ((places[1] - places[0]) / length)
-    scale = np.einsum("...i,...i->...", pull, derivative)
-    return Measurand(view, value, length, scale, offset, tilt, pull, points)
-
-
-def _add_corner(gradient, view: ProjectedEdges, edges: list[Edge], feature: Corner, solid, offset, tilt) -> None:
-    """Add a corner's part to the derivatives: it moves by N^-1 (d1, d2), the rows of N being the two normals."""
-    index = [view.names.index(edge.name) for edge in edges]
-    response = np.einsum("...i,...ij->...j", gradient, corner_response(normals(view)[..., index, :]))
-    for k, (i, edge) in enumerate(zip(index, edges, strict=True)):
-        last = edge.ends.index(solid.vertex_names.index(feature.vertex)) == 1
-        offset[..., i] += response[..., k]
-        tilt[..., i] += response[..., k] * (view.lengths[..., i] if last else 0.0)
+    return tuple(Task(start=start, end=end) for start, end in product(*options))
 
 
 def normals(view: ProjectedEdges) -> np.ndarray:
     """Unit normal of each edge's image, (-t_y, t_x) of its direction t, shape (..., E, 2)."""
-    along = view.along / np.where(view.lengths > 0, view.lengths, np.nan)[..., None]
-    return np.stack([-along[..., 1], along[..., 0]], -1)
-
-
-def corner_response(pair: np.ndarray) -> np.ndarray:
-    """Derivative of the crossing of two lines by their displacements: the inverse of their normals (..., 2, 2)."""
-    (a1, b1), (a2, b2) = (np.moveaxis(pair[..., k, :], -1, 0) for k in (0, 1))
-    rows = np.stack([np.stack([b2, -b1], -1), np.stack([-a2, a1], -1)], -2)
-    return rows / (a1 * b2 - a2 * b1)[..., None, None]
-
-
-def _place(scene: Scene, feature: Corner | Centre) -> np.ndarray:
-    if isinstance(feature, Centre):
-        return scene.solid.circle(feature.circle).centre
-    return scene.solid.vertex(feature.vertex)
-
-
-def _angle(scene: Scene, sensors: np.ndarray, view: ProjectedEdges) -> Measurand:
-    """Angle between two edges, from their common vertex if they have one; both turn by half in their common plane."""
-    solid = scene.solid
-    edges = [solid.edge(name) for name in scene.task.lines]
-    ends = [list(edge.ends) for edge in edges]
-    shared = set(ends[0]) & set(ends[1])
-    ends = [e if not shared or e[0] in shared else e[::-1] for e in ends]
-    lines = np.array([solid.vertices[e[1]] - solid.vertices[e[0]] for e in ends])
-    lines /= np.linalg.norm(lines, axis=1, keepdims=True)
-    axis = np.cross(*lines)
-    inside = _DEGREE * np.arctan2(np.linalg.norm(axis), lines[0] @ lines[1])
-    pivots = np.array([solid.vertices[e[0]] if shared else solid.vertices[e].mean(0) for e in ends])
-    derivative = jacobian_ideal(pivots, sensors, scene.camera)
-    images = np.einsum("...kij,kj->...ki", derivative, lines)
-    turning = np.cross(axis / max(np.linalg.norm(axis), np.finfo(float).tiny), lines)
-    moved = np.einsum("...kij,kj->...ki", derivative, turning)
-    rates = _cross(images, moved) / (images**2).sum(-1)
-    crossing = _cross(images[..., 0, :], images[..., 1, :])
-    value = _DEGREE * np.arctan2(np.abs(crossing), (images[..., 0, :] * images[..., 1, :]).sum(-1))
-    sign = np.sign(crossing)
-    scale = sign * rates.sum(-1) / 2
-    tilt = _DEGREE * np.stack([-sign, sign], -1)
-    points = project_ideal(pivots, sensors, scene.camera)
-    return Measurand(view, value, float(inside), scale, np.zeros_like(tilt), tilt, np.zeros((*value.shape, 2)), points)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return unit_normals(view.along)

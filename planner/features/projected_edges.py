@@ -16,7 +16,7 @@ from planner.imaging.lens import image_centre, recorded
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, from_axis
 from planner.imaging.visibility import longest_span, turned
-from scenes import Edge, Scene
+from scenes import Centre, Corner, Edge, Scene
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class ProjectedEdges:
     Attributes
     ----------
     names : tuple of str
-        Edge names, as `Task.edges`.
+        Edge names.
     ends, recorded : ndarray, shape (..., E, 2, 2)
         The two end points (x, y), px: in ideal coordinates, where edges are straight, and where they are recorded.
     along : ndarray, shape (..., E, 2)
@@ -63,9 +63,21 @@ class ProjectedEdges:
 
 
 def straight(scene: Scene) -> tuple[str, ...]:
-    """The task's straight edges, in its order."""
-    circles = {circle.name for circle in scene.solid.circles}
-    return tuple(name for name in scene.task.edges if name not in circles)
+    """The different straight edges that the scene's quantities need, in their order."""
+    rims = set(circles(scene))
+    return tuple(dict.fromkeys(name for q in scene.quantities for name in q.edges if name not in rims))
+
+
+def circles(scene: Scene) -> tuple[str, ...]:
+    """The different circles that they need."""
+    features = (feature for quantity in scene.quantities for feature in quantity.features)
+    return tuple(dict.fromkeys(feature.circle for feature in features if isinstance(feature, Centre)))
+
+
+def corner_features(scene: Scene) -> tuple[Corner, ...]:
+    """The different corners of all quantities."""
+    features = (feature for quantity in scene.quantities for feature in quantity.features)
+    return tuple(dict.fromkeys(feature for feature in features if isinstance(feature, Corner)))
 
 
 def projected_edges(pictures: Pictures, names: tuple[str, ...] | None = None) -> ProjectedEdges:
@@ -76,7 +88,7 @@ def projected_edges(pictures: Pictures, names: tuple[str, ...] | None = None) ->
     pictures : Pictures
         Their lights do not matter.
     names : tuple of str, optional
-        Edges; the task's straight ones when not given.
+        Edges; the straight ones that the scene's quantities need when not given.
     """
     names = straight(pictures.scene) if names is None else names
     return pictures.once(("edges", names), lambda: _project(pictures, names))
@@ -86,14 +98,19 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
     scene, solid, sensors, positions = pictures.scene, pictures.scene.solid, pictures.sensors, pictures.sensor_at
     seen = facing(solid, positions)
     edges = [solid.edge(name) for name in names]
-    needed, clear = _near(solid.edges, edges), reach(scene.locator.scale_px, scene.camera.blur_px)
+    needed, clear, lead = (
+        _near(solid.edges, edges),
+        reach(scene.locator.scale_px, scene.camera.blur_px),
+        sensors.shape[:-1],
+    )
     corners = dict(
         zip(needed, np.moveaxis(from_axis(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True)
     )
     trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
-    trims, ends = _stack(trims, -2), _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], -3)
+    ends = _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], lead, (2, 2))
+    trims = _stack(trims, lead, (2,))
     shown = image_fractions(
-        scene, names, sensors, _stack([longest_span(scene.bodies, e, positions) for e in edges], -2)
+        scene, names, sensors, _stack([longest_span(scene.bodies, e, positions) for e in edges], lead, (2,))
     )
     along = ends[..., 1, :] - ends[..., 0, :]
     lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
@@ -108,7 +125,7 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
         recorded=bent,
         framed=cut(trims, within_image(scene, bent), lengths, 0.0),
         shown=shown,
-        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], -1)
+        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], lead, ()).astype(bool)
         & (shown[..., 1] > 0)
         & np.isfinite(bent).all((-1, -2)),
     )
@@ -152,14 +169,15 @@ def end_depths(scene: Scene, names: tuple[str, ...], sensors: np.ndarray) -> tup
     return found[..., :1], found[..., 1:]
 
 
-def _stack(arrays: list, axis: int) -> np.ndarray:
-    return np.stack(arrays, axis) if arrays else np.empty((0,) * -axis)
+def _stack(arrays: list, lead: tuple[int, ...], tail: tuple[int, ...]) -> np.ndarray:
+    """Arrays (*lead, *tail) of E edges as one, (*lead, E, *tail), also of none."""
+    return np.stack(arrays, len(lead)) if arrays else np.empty((*lead, 0, *tail))
 
 
-def _near(edges: tuple[Edge, ...], wanted: list[Edge]) -> list[int]:
+def _near(edges: tuple[Edge, ...], wanted: list[Edge]) -> np.ndarray:
     """The vertices of the wanted edges and of those that share a vertex with them."""
     ends = {end for edge in wanted for end in edge.ends}
-    return sorted({end for edge in edges if ends & set(edge.ends) for end in edge.ends})
+    return np.array(sorted({end for edge in edges if ends & set(edge.ends) for end in edge.ends}), int)
 
 
 def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np.ndarray, clear: float):

@@ -121,6 +121,9 @@ def side_signals(
     """
     scene, bodies = pictures.scene, pictures.scene.bodies
     edges = [scene.solid.edge(name) for name in names]
+    if not edges:
+        lead = np.broadcast_shapes(*(poses.shape[:-1] for poses in (pictures.sensors, *pictures.lights)))
+        return np.zeros((*lead, 0, 2, points.shape[-2]))
     faces = np.array([edge.faces for edge in edges])
     if is_plain(scene):
         level = signal(pictures, points[..., None, :, :], bodies.normals[faces][:, :, None], 3, fall_off=fall_off)

@@ -12,12 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.features.projected_edges import straight
+from planner.features.projected_edges import corner_features, straight
 from planner.imaging.appearance import is_plain, signal
 from planner.imaging.lens import recorded, signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
-from scenes import Camera, Corner, Edge, Solid
+from scenes import Camera, Edge, Solid
 
 BACKGROUND = 0  # the region outside everything
 _DEGREE = 4  # of the polynomial that a known shading is told by
@@ -174,7 +174,7 @@ def _arrangement(pictures: Pictures) -> Arrangement:
             place[int(face)] = len(regions)
             regions.append(region)
     pieces, sides, owners = [], [], []
-    names = tuple(dict.fromkeys(straight(scene)))
+    names = straight(scene)
     for edge in solid.edges:
         pair = _sides(solid, edge, image, place)
         if pair[0] != pair[1] and np.isfinite(image[list(edge.ends)]).all():
@@ -182,7 +182,7 @@ def _arrangement(pictures: Pictures) -> Arrangement:
             sides.append(pair)
             owners.append(names.index(edge.name) if edge.name in names else -1)
     required = [scene.solid.edge(name) for name in names]
-    vertices = [scene.solid.vertex_names.index(f.vertex) for f in scene.task.corners if isinstance(f, Corner)]
+    vertices = [scene.solid.vertex_names.index(corner.vertex) for corner in corner_features(scene)]
     radii = signed_confusion(camera, depth(solid.vertices, pose, camera))
     drawn = set(owners)
     return Arrangement(

@@ -119,5 +119,5 @@ def above(positions: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np
 
 def edge_points(solid: Solid, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:
     """Points on E edges at fractions (n,) or (..., E, n) of their length, cm, shape (..., E, n, 3)."""
-    ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in names])
+    ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in names]).reshape(-1, 2, 3)
     return ends[:, None, 0] + fractions[..., None] * (ends[:, 1] - ends[:, 0])[:, None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.features.locator import reach
-from planner.features.measurand import Measurand, measurand, normals
+from planner.features.measurand import Measurands, measurands, normals
 from planner.features.projected_edges import ProjectedEdges, cut, end_depths, image_fractions
 from planner.imaging.appearance import edge_contrast
 from planner.imaging.lens import blur_at, lens_jacobian
@@ -48,14 +48,14 @@ class Nodes:
 class Along:
     """Nodes, and the squared contrast and the noise's variance there, (..., E, n) each."""
 
-    measurand: Measurand
+    measurands: Measurands
     nodes: Nodes
     squared: np.ndarray
     noise_variance: np.ndarray | float
 
     @classmethod
     def of(cls, pictures: Pictures, *, trimmed: bool) -> Along:
-        known = measurand(pictures)
+        known = measurands(pictures)
         nodes = place_nodes(pictures, known.view, used_trims(pictures, known.view, trimmed=trimmed))
         return cls(known, nodes, *edge_contrast(pictures, known.view.names, nodes.spatial))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from planner.features.locator import CLEARANCE, edge_blur
-from planner.features.measurand import corner_response, measurand, normals
+from planner.features.measurand import Measurands, corner_response, measurands, normals
 from planner.features.sampling import sampled_line
 from planner.imaging.blurred_segment import Segments, second_and_third
 from planner.imaging.boundaries import Boundaries, Places, boundaries_near
@@ -43,25 +43,31 @@ class Bias:
 
     Attributes
     ----------
-    value : ndarray, shape (...)
-        Shift of the measurand in the image, px or degrees; NaN where it is not known: next to an edge's place there is
-        no zero crossing, or the task needs a circle.
+    values, values_object : ndarray, shape (..., M)
+        Shift of each quantity in the image, px or degrees, and in the object, to first order; NaN where it is not
+        known, for next to an edge's place there is no zero crossing. Circles count as unbiased.
     lines : ndarray, shape (..., E, 2)
         Displacement of each edge's line along its normal, at the edge's two ends, ideal px.
     corners : ndarray, shape (..., 2, 2)
-        Shift of start and end corner (x, y), ideal px; NaN for what is no corner.
-    shares : ndarray, shape (..., E)
-        What each edge adds to ``value``.
+        Shift of the first quantity's two features (x, y), ideal px; NaN for what is no corner.
+    shares : ndarray, shape (..., M, E)
+        What each edge adds to ``values``.
     disturbed : ndarray of bool, shape (..., E)
         Edges of which neither bias nor variance are to be trusted: somewhere along them the crossing is far off, or
         flatter or steeper than a lone step's, for errors by noise are divided by its slope; or an obstacle is near.
     """
 
-    value: np.ndarray
+    values: np.ndarray
+    values_object: np.ndarray
     lines: np.ndarray
     corners: np.ndarray
     shares: np.ndarray
     disturbed: np.ndarray
+
+    @property
+    def value(self) -> np.ndarray:
+        """Of the first quantity in the image, shape (...)."""
+        return self.values[..., 0]
 
 
 def bias(pictures: Pictures) -> Bias:
@@ -72,15 +78,16 @@ def bias(pictures: Pictures) -> Bias:
 def cluttered(pictures: Pictures) -> np.ndarray:
     """Which edges have the status ``clutter``, bool, shape (..., E): the one rule of planner and measurement.
 
-    What lies around the edge disturbs its crossings, or the measurand's bias is above a quarter of its standard
-    deviation and the edge's share in it is no less than an equal one.
+    What lies around the edge disturbs its crossings, or a quantity's bias is above a quarter of its standard deviation
+    and the edge's share in it is no less than an equal one.
     """
     found = bias(pictures)
-    limit = _NEGLIGIBLE * np.sqrt(calibrated(pictures).variance)
+    limit = _NEGLIGIBLE * np.sqrt(calibrated(pictures).variances)
+    equal = np.maximum(measurands(pictures).depends()[:, : found.shares.shape[-1]].sum(-1), 1)
     with np.errstate(invalid="ignore"):
-        biased = np.abs(found.value) > limit
-        large = np.abs(found.shares) >= limit[..., None] / max(found.shares.shape[-1], 1)
-    return found.disturbed | (biased[..., None] & large)
+        biased = np.abs(found.values) > limit
+        large = np.abs(found.shares) >= (limit / equal)[..., None]
+    return found.disturbed | (biased[..., None] & large).any(-2)
 
 
 def _in_blocks(pictures: Pictures) -> Bias:
@@ -97,28 +104,39 @@ def _in_blocks(pictures: Pictures) -> Bias:
 
 def _bias(pictures: Pictures) -> Bias:
     """For pictures with one leading axis."""
-    known = measurand(pictures)
+    known = measurands(pictures)
+    if not known.view.names:
+        return _nothing(np.broadcast_shapes(pictures.sensors.shape, *(p.shape for p in pictures.lights))[0], known)
     nodes = place_nodes(pictures, known.view, used_trims(pictures, known.view, trimmed=True))
-    offset, steepness = _crossings(pictures, nodes, normals(known.view))
-    mean = offset @ NODE_WEIGHTS / 2
-    turn = 6 / nodes.length[..., 0] ** 2 * ((offset * nodes.t[..., 1:-1]) @ NODE_WEIGHTS)
+    moved, steepness = _crossings(pictures, nodes, normals(known.view))
+    mean = moved @ NODE_WEIGHTS / 2
+    turn = 6 / nodes.length[..., 0] ** 2 * ((moved * nodes.t[..., 1:-1]) @ NODE_WEIGHTS)
     by_pixels = _sampled(pictures, nodes)
     mean, turn = mean + by_pixels[0], turn + by_pixels[1]
     start = mean - turn * nodes.middle[..., 0]
-    shares = known.offset * start + known.tilt * turn
+    shares, shares_object = (
+        offset * start[..., None, :] + tilt * turn[..., None, :]
+        for offset, tilt in (known.of_lines(known.gradient), known.of_lines(known.gradient_object))
+    )
     lines = np.stack([start, start + turn * known.view.lengths], -1)
-    disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(offset) <= _FARTHEST)).all(-1)
+    needed = known.depends()[:, : len(known.view.names)]
+    values, values_object = (np.where(needed, each, 0.0).sum(-1) for each in (shares, shares_object))
+    disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
     corners = _corners(pictures.scene, known.view, lines)
-    value = shares.sum(-1)
-    if pictures.scene.task.kind == "distance":
-        value = np.linalg.norm(np.diff(known.points + corners, axis=-2)[..., 0, :], axis=-1) - known.value
-    return Bias(value, lines, corners, shares, disturbed)
+    return Bias(values, values_object, lines, corners, shares, disturbed)
+
+
+def _nothing(count: int, known: Measurands) -> Bias:
+    """Of ``count`` pictures in which no straight edge is needed."""
+    quantities = len(known.quantities)
+    none, lines, corners = np.zeros((count, quantities)), np.zeros((count, 0, 2)), np.full((count, 2, 2), np.nan)
+    return Bias(none, none, lines, corners, np.zeros((count, quantities, 0)), np.zeros((count, 0), bool))
 
 
 def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
     """Shifts (N, 2, 2) of both corners from the displacements (N, E, 2) of the lines at the edges' ends."""
     found = np.full((len(lines), 2, 2), np.nan)
-    for k, feature in enumerate(scene.task.corners):
+    for k, feature in enumerate(scene.quantities[0].features[:2]):
         if isinstance(feature, Corner):
             index = [view.names.index(name) for name in feature.edges]
             vertex = scene.solid.vertex_names.index(feature.vertex)
@@ -129,7 +147,7 @@ def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
 
 def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
     """Mean shift, ideal px, and turn of each line by the sampling, (N, E); a bent edge is taken as its tangent."""
-    scene, view = pictures.scene, measurand(pictures).view
+    scene, view = pictures.scene, measurands(pictures).view
     fraction = nodes.middle / view.lengths[..., None]
     middle = view.ends[..., 0, :] + fraction * view.along
     along = np.einsum("...ij,...j->...i", lens_jacobian(middle, scene.camera), view.along)
@@ -144,7 +162,7 @@ def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
 
 def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Place of the zero crossing across the edge, ideal px, and the slope there over the lone step's, (N, E, n)."""
-    scene, view = pictures.scene, measurand(pictures).view
+    scene, view = pictures.scene, measurands(pictures).view
     fractions = (nodes.middle + nodes.t[..., 1:-1]) / view.lengths[..., None]
     shape, scale = fractions.shape, scene.locator.scale_px
     blur = np.broadcast_to(edge_blur(nodes.blur), nodes.t.shape)[..., 1:-1].ravel()
@@ -182,7 +200,7 @@ def _zero(near: Boundaries, width: np.ndarray, cut_off: Callable | None) -> tupl
 
 def _places(pictures: Pictures, fractions: np.ndarray, normal: np.ndarray) -> Places:
     """The nodes as places of the recorded image; ``normal`` (N, E, 2) is that of the edges' ideal images."""
-    camera, view = pictures.scene.camera, measurand(pictures).view
+    camera, view = pictures.scene.camera, measurands(pictures).view
     lens = lens_jacobian(view.ends[..., :1, :] + fractions[..., None] * view.along[..., None, :], camera)
     normal = np.broadcast_to(normal[..., None, :], lens.shape[:-1])
     if camera.lens.bends:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.features.measurand import Measurand, measurand, normals
+from planner.features.measurand import Measurands, measurands, normals
 from planner.imaging.appearance import is_plain
 from planner.imaging.arrangement import arrangement_of, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
@@ -22,7 +22,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded, sensitivity
 from planner.models.edge_bound import edge_bound
 from planner.models.errors import Errors
-from scenes import Centre, Noise
+from scenes import Noise
 
 REACH = 32.0  # px from a required edge up to which pixels count; levels are hardly better known from more
 KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
@@ -164,52 +164,57 @@ def bound(pictures: Pictures) -> Errors:
     Where things hide or shade each other, and of circles, it is that of each edge by itself.
     """
     alone = edge_bound(pictures)
-    features = pictures.scene.task.corners
-    if not is_plain(pictures.scene) or any(isinstance(feature, Centre) for feature in features):
+    known = alone.measurands
+    if not is_plain(pictures.scene) or known.circles:
         return alone
-    known = alone.measurand
-    lead = alone.variance.shape
-    edges = len(known.view.names)
-    lines, variance = np.full((*lead, edges, 2, 2), np.inf), np.full(lead, np.inf)
-    for index in map(tuple, np.argwhere(np.isfinite(alone.variance))):
-        lines[index], variance[index] = _one(pictures, index, lead)
-    variance = np.where(variance < _FURTHEST * np.maximum(_unit(known), 1e-300), variance, np.inf)
+    lead, count, edges = alone.variance.shape, len(known.quantities), len(known.view.names)
+    lines = np.full((*lead, edges, 2, 2), np.inf)
+    variances, variances_object = np.full((*lead, count), np.inf), np.full((*lead, count), np.inf)
+    for index in map(tuple, np.argwhere(np.isfinite(alone.variances).any(-1))):
+        lines[index], variances[index], variances_object[index] = _one(pictures, index, lead)
+    told = (variances < _FURTHEST * np.maximum(_unit(known), 1e-300)) & np.isfinite(alone.variances)
+    variances = np.where(told, variances, np.inf)
+    variances_object = np.where(told & np.isfinite(variances_object), variances_object, np.inf)
 
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
-    with np.errstate(divide="ignore", invalid="ignore"):
-        in_object = variance / known.scale**2
-    in_object = np.where(np.isfinite(in_object), in_object, np.inf)
-    return Errors(known, variance, in_object, line_variance, alone.contrast, alone.noise_variance, ())
+    joint = variances, variances_object
+    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint)
 
 
-def _unit(known: Measurand) -> np.ndarray:
-    """Largest squared derivative of the measurand by an edge's displacement at its ends: px^2 make units of it."""
-    lengths = np.where(known.view.lengths > 0, known.view.lengths, np.inf)
-    return np.maximum(known.offset**2, (known.tilt / lengths) ** 2).max(-1, initial=0.0)
+def _unit(known: Measurands) -> np.ndarray:
+    """Largest squared derivative of each quantity by an edge's displacement at its ends: px^2 make units of it."""
+    lengths = np.where(known.view.lengths > 0, known.view.lengths, np.inf)[..., None, :]
+    offset, tilt = known.of_lines(known.gradient)
+    return np.maximum(offset**2, (tilt / lengths) ** 2).max(-1, initial=0.0)
 
 
-def _one(pictures: Pictures, index: tuple[int, ...], lead: tuple[int, ...]) -> tuple[np.ndarray, float]:
-    """Covariance of (displacement, rotation) of each line, (E, 2, 2), and variance of the measurand in one picture."""
+def _one(
+    pictures: Pictures, index: tuple[int, ...], lead: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Covariance of (displacement, rotation) of each line, (E, 2, 2), and variances (M,) of the quantities in image and
+    object, in one picture."""
     pick = [np.broadcast_to(poses, (*lead, 2))[index] for poses in (pictures.sensors, *pictures.lights)]
     one = Pictures(pictures.scene, pick[0], tuple(pick[1:]))
-    known = measurand(one)
-    edges = len(known.view.names)
+    known = measurands(one)
+    edges, count = len(known.view.names), len(known.quantities)
+    nothing = np.full((edges, 2, 2), np.inf), np.full(count, np.inf), np.full(count, np.inf)
     if not known.view.visible.all():
-        return np.full((edges, 2, 2), np.inf), np.inf
+        return nothing
     told = information(one)
     required = told.model.arrangement.required
     if (required < 0).any():
-        return np.full((edges, 2, 2), np.inf), np.inf
+        return nothing
     rows = line_rows(known, required, len(told.model.arrangement.vertices))
     covariance = told.vertices()
-    gradient = known.offset @ rows[:, 0] + known.tilt @ rows[:, 1]
     lines = np.einsum("eki,ij,elj->ekl", rows, covariance, rows)
-    return lines, float(gradient @ covariance @ gradient)
+    joint = rows.reshape(2 * edges, -1) @ covariance @ rows.reshape(2 * edges, -1).T
+    image, plane = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, known.gradient_object))
+    return lines, image, plane
 
 
-def line_rows(known: Measurand, required: np.ndarray, count: int) -> np.ndarray:
+def line_rows(known: Measurands, required: np.ndarray, count: int) -> np.ndarray:
     """Derivative of each line's displacement at its first end and of its rotation by all vertices, (E, 2, 2 count)."""
     rows = np.zeros((len(required), 2, count, 2))
     for e, (normal, length, (start, stop)) in enumerate(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.features.circles import calibrated_centre
+from planner.features.circles import calibrated_circle
 from planner.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2
 from planner.imaging.appearance import is_separable
 from planner.imaging.pictures import Pictures
@@ -50,11 +50,10 @@ def calibrated(pictures: Pictures) -> Errors:
                 variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)
         return np.where(weak, np.inf, variance)
 
-    def centre(circle) -> np.ndarray:
-        length = 2 * np.sqrt(np.pi) * scale
-        return calibrated_centre(circle, kappa2(scale, scene.camera.blur_px), length, MIN_CONTRAST**2)
+    def found(circle) -> np.ndarray:
+        return calibrated_circle(circle, kappa2(scale, scene.camera.blur_px), scale, MIN_CONTRAST**2)
 
-    return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), centre)
+    return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), found)
 
 
 def point_variance(nodes: Nodes, scale: float) -> np.ndarray | float:

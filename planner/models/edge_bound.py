@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.features.circles import fisher_centre
+from planner.features.circles import fisher_circle
 from planner.features.locator import information_bound
 from planner.imaging.pictures import Pictures
 from planner.models.along import Along, integral
@@ -29,9 +29,9 @@ def edge_bound(pictures: Pictures) -> Errors:
         lever = b - a * (nodes.middle[..., 0] + mean)
         return a**2 / total + lever**2 / (second - first * mean)
 
-    def centre(circle) -> np.ndarray:
+    def found(circle) -> np.ndarray:
         density = information_bound(np.sqrt(circle.squared), circle.noise_variance, scene.camera.blur_px)
-        return fisher_centre(circle, density * circle.arc, None)
+        return fisher_circle(circle, density * circle.arc, None)
 
     noise = np.mean(along.noise_variance * np.ones(1), -1)
-    return combined(pictures, line_variance, along.squared.mean(-1), noise, centre)
+    return combined(pictures, line_variance, along.squared.mean(-1), noise, found)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from planner.features.circles import Rim, rim
-from planner.features.measurand import Measurand, measurand
+from planner.features.measurand import Measurands, measurands
 from planner.imaging.pictures import Pictures
-from scenes import Centre
 
 LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -25,29 +25,68 @@ class Errors:
 
     Attributes
     ----------
-    measurand : Measurand
+    measurands : Measurands
         What is measured; its arrays have the sensors' leading shape.
-    variance, variance_object : ndarray, shape (...)
-        In the image (px^2, or degrees^2 of an angle) and in the object (cm^2, or degrees^2); infinite where it
-        cannot be measured.
     line_variance : callable
         (A, B) of shape (..., E) to the variance of A d + B theta of each line, px^2.
     contrast : ndarray, shape (..., E)
         Root mean square contrast along each straight edge, grey levels.
     noise_variance : ndarray, shape (..., E)
         Mean variance of the noise along each straight edge, grey levels^2.
-    centres : tuple of ndarray, shape (..., 2, 2)
-        Covariance of each circle's centre, px^2, in the order of the task's features; infinite diagonal where it
-        cannot be found.
+    circles : tuple of ndarray, shape (..., 3, 3)
+        Covariance of each circle's three parameters, the scene's unit squared; infinite diagonal where it cannot be
+        found.
+    crowded : tuple of ndarray of bool, shape (...)
+        Whether something disturbs most of each circle.
+    joint : tuple of ndarray, optional
+        Variances in the image and in the object where a model finds them jointly, not edge by edge.
     """
 
-    measurand: Measurand
-    variance: np.ndarray
-    variance_object: np.ndarray
+    measurands: Measurands
     line_variance: LineVariance
     contrast: np.ndarray
     noise_variance: np.ndarray
-    centres: tuple[np.ndarray, ...]
+    circles: tuple[np.ndarray, ...]
+    crowded: tuple[np.ndarray, ...]
+    joint: tuple[np.ndarray, np.ndarray] | None = None
+
+    @cached_property
+    def variances(self) -> np.ndarray:
+        """Of all quantities in the image, px^2 (degrees^2), shape (..., M); infinite where not measurable."""
+        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
+
+    @cached_property
+    def variances_object(self) -> np.ndarray:
+        """The same in the object, the scene's unit squared (degrees^2)."""
+        return self.joint[1] if self.joint else _variances(self, self.measurands.gradient_object)
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Of the first quantity in the image, shape (...)."""
+        return self.variances[..., 0]
+
+    @property
+    def variance_object(self) -> np.ndarray:
+        """Of the first quantity in the object, shape (...)."""
+        return self.variances_object[..., 0]
+
+    def covariance(self, gradient: np.ndarray) -> np.ndarray:
+        """Joint covariance (..., M, M) of quantities with a gradient (..., M, q); infinite where not measurable.
+
+        From the variances of pairs' sums, each first brought to variance 1.
+        """
+        single = np.stack([_variance(self, gradient[..., m, :]) for m in range(gradient.shape[-2])], -1)
+        size = np.sqrt(np.where(np.isfinite(single) & (single > 0), single, 1.0))
+        unit = gradient / size[..., None]
+        whole = np.empty((*single.shape, single.shape[-1]))
+        for i in range(single.shape[-1]):
+            whole[..., i, i] = single[..., i]
+            for j in range(i):
+                both = _variance(self, unit[..., i, :] + unit[..., j, :])
+                whole[..., i, j] = whole[..., j, i] = (both - 2) / 2 * size[..., i] * size[..., j]
+        lost = ~np.isfinite(single)
+        either = lost[..., :, None] | lost[..., None, :]
+        return np.where(either, np.where(np.eye(single.shape[-1], dtype=bool), np.inf, np.nan), whole)
 
 
 def combined(
@@ -55,26 +94,42 @@ def combined(
     line_variance: LineVariance,
     contrast2: np.ndarray,
     noise_variance: np.ndarray | float,
-    centre_covariance: Callable[[Rim], np.ndarray],
+    circle_covariance: Callable[[Rim], np.ndarray],
     *,
     fall_off: bool = True,
 ) -> Errors:
-    """From the lines' and the centres' errors to the measurand's."""
-    known = measurand(pictures)
+    """From the lines' and the circles' errors to those of all quantities."""
+    known, solid = measurands(pictures), pictures.scene.solid
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        parts = line_variance(known.offset, known.tilt)
-        usable = known.view.visible & np.isfinite(parts)
-        variance = np.where(usable, parts, np.inf).sum(-1)
-        centres = []
-        for feature in pictures.scene.task.corners:
-            if isinstance(feature, Centre):
-                circle = rim(pictures, pictures.scene.solid.circle(feature.circle), fall_off=fall_off)
-                covariance = centre_covariance(circle)
-                moved = np.einsum("...i,...ij,...j->...", known.pull, covariance, known.pull)
-                variance = variance + np.where(np.isfinite(moved), moved, np.inf)
-                centres.append(covariance)
-        variance = np.where(np.isfinite(variance) & np.isfinite(known.value), variance, np.inf)
-        in_object = variance / known.scale**2
-    in_object = np.where(np.isfinite(in_object), in_object, np.inf)
+        rims = [rim(pictures, solid.circle(name), fall_off=fall_off) for name in known.circles]
+        circles = tuple(circle_covariance(each) for each in rims)
     noise = np.broadcast_to(noise_variance, contrast2.shape)
-    return Errors(known, variance, in_object, line_variance, np.sqrt(contrast2), noise, tuple(centres))
+    crowded = tuple(each.crowded for each in rims)
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded)
+
+
+def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:
+    """Variances (..., M) of quantities with a gradient (..., M, q)."""
+    needs = errors.measurands.depends()
+    return np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+
+
+def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = None) -> np.ndarray:
+    """Variance (...) of what moves by gradient . errors; infinite where something it needs cannot be found.
+
+    Without ``needs``, bool (E + C,), it needs whatever its gradient is not 0 for.
+    """
+    known = errors.measurands
+    edges = len(known.view.names)
+    offset, tilt = gradient[..., 0 : 2 * edges : 2], gradient[..., 1 : 2 * edges : 2]
+    needed = (offset != 0) | (tilt != 0) if needs is None else needs[:edges]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        parts = errors.line_variance(offset, tilt)
+        variance = np.where(known.view.visible & np.isfinite(parts), parts, np.inf)
+        variance = np.where(needed, variance, 0.0).sum(-1)
+        for c, covariance in enumerate(errors.circles):
+            pull = known.of_circle(gradient[..., None, :], c)[..., 0, :]
+            moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
+            needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
+            variance = variance + np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0)
+    return np.where(np.isfinite(variance), variance, np.inf)

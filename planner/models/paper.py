@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.features.circles import fisher_centre
-from planner.features.measurand import measurand
+from planner.features.circles import fisher_circle
+from planner.features.measurand import measurands
 from planner.imaging.pictures import Pictures
 from planner.models.errors import Errors, combined
 from planner.models.moments import moments
@@ -22,7 +22,7 @@ def paper(pictures: Pictures) -> Errors:
     I / W (a Monte Carlo test settles it). Its unit of intensity is not printed, so the result is right up to one factor
     for all settings.
     """
-    known, per_point = measurand(pictures), PAPER_KAPPA2 * pictures.scene.noise.sigma**2
+    known, per_point = measurands(pictures), PAPER_KAPPA2 * pictures.scene.noise.sigma**2
     lengths = known.view.lengths
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         total, mean, spread, count = moments(pictures, known.view.names, PAPER_POINTS)
@@ -32,8 +32,8 @@ def paper(pictures: Pictures) -> Errors:
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return a**2 * (1 + tilt) / weight + (b - a * mean) ** 2 * tilt
 
-    def centre(circle) -> np.ndarray:
-        return fisher_centre(circle, circle.squared / per_point, circle.counted)
+    def found(circle) -> np.ndarray:
+        return fisher_circle(circle, circle.squared / per_point, circle.counted)
 
     dark = pictures.scene.noise.variance
-    return combined(pictures, line_variance, total / PAPER_POINTS, dark, centre, fall_off=False)
+    return combined(pictures, line_variance, total / PAPER_POINTS, dark, found, fall_off=False)

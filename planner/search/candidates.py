@@ -6,25 +6,43 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction
-from planner.search.exhaustive import evaluate_pairs
-from scenes import Pose
+from planner.models import variance_model
+from planner.prediction import minimised
+from planner.search.aim import Aim
+from scenes import Pose, Scene
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A setting worth considering: poses, required edges, its variance in both units (px^2 and cm^2, or degrees^2)."""
+    """A setting worth considering.
+
+    Attributes
+    ----------
+    sensor, light : Pose
+    edges : tuple of str
+        Required edges.
+    variance_object, variance_image : float
+        Of the measurand that limits it: cm^2 and px^2, or degrees^2.
+    variance : float
+        What the plan minimises.
+    limiting : str
+        Name of that measurand.
+    """
 
     sensor: Pose
     light: Pose
     edges: tuple[str, ...]
     variance_object: float
     variance_image: float
+    variance: float
+    limiting: str
 
 
-def candidates(options, results, objective: str, count: int = 10):
+def candidates(options, results, aim: Aim, count: int = 10):
     """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges."""
     rows = []
     for k, result in enumerate(results):
@@ -44,17 +62,29 @@ def candidates(options, results, objective: str, count: int = 10):
     for row in rows:
         if all(_differ(row, other) for other in chosen):
             chosen.append(row)
-    made = [_candidate(options[k], sensor, light) for _, k, sensor, light in chosen[: 2 * count]]
-    value = "variance_object" if objective == "object" else "variance_image"
-    return tuple(sorted(made, key=lambda c: getattr(c, value))[:count])
+    made = [_candidate(options[k], sensor, light, aim) for _, k, sensor, light in chosen[: 2 * count]]
+    return tuple(sorted(made, key=lambda c: c.variance)[:count])
 
 
-def _candidate(option, sensor: np.ndarray, light: np.ndarray) -> Candidate:
-    values = [
-        float(evaluate_pairs(option.scene, sensor[None], light[None], option.model, units)[0])
-        for units in ("object", "image")
-    ]
-    return Candidate(Pose(*map(float, sensor)), Pose(*map(float, light)), option.scene.task.edges, *values)
+def _candidate(option, sensor: np.ndarray, light: np.ndarray, aim: Aim) -> Candidate:
+    poses = Pose(*map(float, sensor)), Pose(*map(float, light))
+    found = variance_model(option.model)(Pictures.of(option.scene, *(np.array(list(pose)) for pose in poses)))
+    worst = int(np.argmax(found.variances_object * aim.shares))
+    return Candidate(
+        *poses,
+        edges_of(option.scene),
+        float(found.variances_object[worst]),
+        float(found.variances[worst]),
+        float(minimised(found, aim)),
+        option.scene.quantities[worst].name,
+    )
+
+
+def edges_of(scene: Scene) -> tuple[str, ...]:
+    """The required edges of all quantities: a task's as it names them, each else once."""
+    if scene.task is not None:
+        return scene.task.edges
+    return tuple(dict.fromkeys(name for quantity in scene.quantities for name in quantity.edges))
 
 
 def _spread(directions: np.ndarray, count: int) -> list[int]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.projected_edges import projected_edges, straight
+from planner.features.projected_edges import projected_edges
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction, light_position, project
 from scenes import InvalidInput, Scene
@@ -70,7 +70,7 @@ class Constraints:
         """Which sensor poses (n, 2) are allowed; bool, shape (n,)."""
         allowed = _polar(poses, self.sensor_polar_deg) & _outside(poses, self.forbidden_sensor)
         if self.min_edge_px > 0 or self.min_clearance_px > 0:
-            view = projected_edges(Pictures.of(scene, poses), tuple(dict.fromkeys(straight(scene))))
+            view = projected_edges(Pictures.of(scene, poses))
             allowed &= (view.usable >= self.min_edge_px).all(-1) & view.visible.all(-1)
             if self.min_clearance_px > 0:
                 allowed &= _clearance(scene, view) >= self.min_clearance_px

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.features.projected_edges import circles
 from planner.imaging.appearance import is_separable
 from planner.imaging.pictures import Pictures
 from planner.models import variance_model
 from planner.prediction import minimised
+from planner.search.aim import Aim
 from planner.search.constraints import Constraints
 from planner.search.separable import Separable, separable
 from scenes import Scene
@@ -30,7 +32,7 @@ class Found:
     sensor, light : int
         Indices into the poses searched; -1 where no pair can measure.
     variance : float
-        Of the objective (degrees^2 for an angle).
+        What is minimised (`Aim`).
     pairs : int
         How many pairs were covered, and ...
     evaluated : int
@@ -55,12 +57,11 @@ class Found:
 
 def has_bound(scene: Scene, model: str) -> bool:
     """Whether the fast search applies: a separable scene, straight edges only."""
-    straight = all(name in {edge.name for edge in scene.solid.edges} for name in scene.task.edges)
-    return is_separable(scene) and straight and model in ("paper", "calibrated")
+    return is_separable(scene) and not circles(scene) and model in ("paper", "calibrated")
 
 
 def exhaustive(
-    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str,
+    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str | Aim,
     constraints: Constraints | None = None, report: Report | None = None,
 ) -> Found:  # fmt: skip
     """Search all pairs of sensors (S, 2) and lights (L, 2), degrees.
@@ -72,8 +73,8 @@ def exhaustive(
     return search(scene, sensors, lights, model, objective, constraints, report or (lambda *_: None))
 
 
-def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str) -> np.ndarray:
-    """Variance of pairs (n, 2), (n, 2), in chunks."""
+def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str | Aim) -> np.ndarray:
+    """What is minimised of pairs (n, 2), (n, 2), in chunks."""
     values = np.empty(len(sensors))
     size = _PAIRS // 8
     for at in range(0, len(sensors), size):
@@ -83,7 +84,7 @@ def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str) ->
 
 
 def _by_bound(scene, sensors, lights, model, objective, constraints, report) -> Found:
-    table = separable(scene, sensors, lights, model, objective)
+    table = separable(scene, sensors, lights, model, Aim.of(scene.quantities, objective))
     least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
     done = 0
     for rows, which, bound in _blocks(table, scene, sensors, lights, constraints):

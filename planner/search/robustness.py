@@ -9,6 +9,8 @@ import numpy as np
 
 from planner.imaging.projection import direction
 from planner.planning import Plan
+from planner.search.aim import Aim
+from planner.search.candidates import edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
 from planner.search.refinement import refine, shifted
@@ -119,25 +121,25 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
     """
     if tolerances == Tolerances():
         raise InvalidInput("tolerances must be given for at least one input, got none")
-    names = tolerances.of_the_scene
+    names, aim = tolerances.of_the_scene, Aim.of(plan.scene.quantities, plan.objective, plan.over)
     corners = [dict(zip(names, signs, strict=True)) for signs in product((-1, 1), repeat=len(names))]
     worlds = [altered(plan.scene, {n: 1 + sign * getattr(tolerances, n) for n, sign in c.items()}) for c in corners]
 
     def worst(sensor: np.ndarray, light: np.ndarray) -> float:
         pairs = _with_pose_errors(sensor, light, tolerances)
-        return max(float(evaluate_pairs(world, *pairs, plan.model, plan.objective).max()) for world in worlds)
+        return max(float(evaluate_pairs(world, *pairs, plan.model, aim).max()) for world in worlds)
 
     starts = [(plan.sensor, plan.light)]
-    starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == plan.scene.task.edges]
+    starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == edges_of(plan.scene)]
     starts = [tuple(np.array(list(pose)) for pose in pair) for pair in starts]
     values = [worst(*pair) for pair in starts]
     best = int(np.argmin(values))
     if not np.isfinite(values[best]):
         raise InvalidInput("tolerances must leave a setting that can always measure, got none")
     sensor, light, value = refine(
-        plan.scene, *starts[best], plan.model, plan.objective, 2.0, constraints, value=worst
+        plan.scene, *starts[best], plan.model, aim, 2.0, constraints, value=worst
     )  # fmt: skip
-    nominal = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, plan.objective)[0])
+    nominal = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, aim)[0])
     moves = tuple(
         _move(plan, name, sign * getattr(tolerances, name), constraints) for name in names for sign in (-1, 1)
     )
@@ -164,13 +166,13 @@ def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Toleran
 
 
 def _move(plan: Plan, name: str, by: float, constraints: Constraints | None) -> Move:
-    world = altered(plan.scene, {name: 1 + by})
+    world, aim = altered(plan.scene, {name: 1 + by}), Aim.of(plan.scene.quantities, plan.objective, plan.over)
     sensor, light = (np.array(list(pose)) for pose in plan.poses)
-    here = float(evaluate_pairs(world, sensor[None], light[None], plan.model, plan.objective)[0])
-    before = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, plan.objective)[0])
+    here = float(evaluate_pairs(world, sensor[None], light[None], plan.model, aim)[0])
+    before = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, aim)[0])
     if not np.isfinite(here):
         return Move(name, 1 + by, np.inf, np.inf, np.nan, np.nan)
-    there = refine(world, sensor, light, plan.model, plan.objective, 1.0, constraints)
+    there = refine(world, sensor, light, plan.model, aim, 1.0, constraints)
     apart = [
         float(np.degrees(np.arccos(np.clip(direction(a) @ direction(b), -1, 1))))
         for a, b in zip((sensor, light), there[:2], strict=True)

@@ -1,4 +1,4 @@
-"""A lower bound of the variance of all sensor x light pairs that is one matrix product.
+"""A lower bound of the variances of all sensor x light pairs that is one matrix product a quantity.
 
 On a convex diffuse solid an edge's contrast is K / r (or K / r^3 with fall-off): K depends on the light and on which
 faces the sensor sees, r on the light and the place along the edge. For the paper's model the line's variance is a
@@ -14,15 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.features.locator import MIN_USABLE, correlation
-from planner.features.measurand import Measurand, measurand
+from planner.features.measurand import Measurands, measurands
 from planner.features.projected_edges import image_fractions
 from planner.imaging.appearance import edge_distance2, of_sides, paper_step, side_strengths
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import facing
 from planner.imaging.sensor import headroom, shot_noise
-from planner.models.along import NODE_WEIGHTS, place_nodes
+from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes
 from planner.models.calibrated import SHORT, line_slope, line_weight, point_variance, second_order
 from planner.models.paper import PAPER_KAPPA2, PAPER_POINTS
+from planner.search.aim import Aim
 from scenes import Scene
 
 _DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the smooth functions here
@@ -31,7 +32,8 @@ _MARGIN = 3e-6  # relative; single precision in sums of about 30 terms of like s
 
 @dataclass(frozen=True)
 class Separable:
-    """Lower bound of the variance: sum over k of sensor_part[s, k] light_part[l, k] strength[class of s, l, kind of k].
+    """Lower bound of what is minimised: the most, or the sum, over the quantities m of the sums over k of
+    sensor_part[s, m, k] light_part[l, k] strength[class of s, l, kind of k].
 
     Attributes
     ----------
@@ -39,11 +41,14 @@ class Separable:
         Indices of the sensors that can measure at all.
     classes : ndarray of int, shape (S,)
         Which set of faces each of them sees.
-    sensor_part : ndarray, shape (S, E, k)
+    sensor_part : ndarray, shape (S, M, E, k)
+        Weighted with the share of each quantity in what is minimised.
     light_part : ndarray, shape (L, E, k)
         The k are in equal parts of the kinds of strength.
     strength : ndarray, shape (classes, L, E, kinds)
         What an edge's contrast makes of them; 0 where there is none.
+    aim : Aim
+        What is minimised.
     """
 
     sensors: np.ndarray
@@ -51,6 +56,7 @@ class Separable:
     sensor_part: np.ndarray
     light_part: np.ndarray
     strength: np.ndarray
+    aim: Aim
 
     def of_class(self, which: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Indices of sensors (into `sensors`) and lights that see contrast on all edges, and the lights' matrix."""
@@ -62,28 +68,29 @@ class Separable:
 
     def rows(self, which: np.ndarray, lights: np.ndarray) -> np.ndarray:
         """Bound for some sensors (indices into `sensors`) and the matrix of `of_class`, single precision."""
-        part = self.sensor_part[which]
-        return part.reshape(len(part), -1).astype(np.float32) @ lights
+        part = self.sensor_part[which].astype(np.float32)
+        bounds = (part[:, m].reshape(len(part), -1) @ lights for m in range(part.shape[1]))
+        return self.aim.joined(bounds)
 
 
-def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str) -> Separable:
-    """Set up the bound for a separable scene and a task of straight edges.
+def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim | str) -> Separable:
+    """Set up the bound for a separable scene and quantities of straight edges.
 
     Parameters
     ----------
     sensors, lights : ndarray, shape (n, 2), (m, 2)
         Poses, degrees.
     model : {"paper", "calibrated"}
-    objective : {"image", "object"}
+    aim : Aim, or objective of one quantity
     """
-    pictures = Pictures.of(scene, sensors)
+    pictures, aim = Pictures.of(scene, sensors), Aim.of(scene.quantities, aim)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        known = measurand(pictures)
+        known = measurands(pictures)
         make = _paper if model == "paper" else _calibrated
-        sensor_part, good = make(pictures, known)
-        if objective == "object":
-            sensor_part = sensor_part / known.scale[:, None, None] ** 2
-    good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2))
+        gradient = known.gradient if aim.unit == "image" else known.gradient_object
+        sensor_part, good = make(pictures, known, *known.of_lines(gradient))
+        sensor_part = sensor_part * aim.shares[:, None, None]
+    good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2, -3))
     light_part = _light_part(scene, known.view.names, lights, model)
     slack = 1 - _MARGIN * np.sign(sensor_part * light_part.mean(0))  # less where it adds, more where it takes away
     seen = facing(scene.solid, pictures.sensor_at[good])
@@ -91,7 +98,7 @@ def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str,
     first = [int(np.flatnonzero(good)[np.argmax(classes == k)]) for k in range(len(kinds))]
     strength = [_strengths(scene, known.view.names, sensors[k], lights, model) for k in first]
     return Separable(
-        np.flatnonzero(good), classes.ravel(), (sensor_part * slack)[good], light_part, np.array(strength)
+        np.flatnonzero(good), classes.ravel(), (sensor_part * slack)[good], light_part, np.array(strength), aim
     )  # fmt: skip
 
 
@@ -157,32 +164,33 @@ def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, model:
     return np.concatenate(dark + shot, -1)
 
 
-def _paper(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
+def _paper(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tangent at equal weights: 2 sum h^2 - sum h^2 w, h the weight of each point's error in A d + B theta."""
     scene, sensors = pictures.scene, pictures.sensors
     names, lengths = known.view.names, known.view.lengths[..., None]
     fractions = np.linspace(0, 1, PAPER_POINTS)
-    part = np.empty((len(sensors), len(names), _DEGREE + 1))
+    part = np.empty((*a.shape, _DEGREE + 1))
     for at in range(0, len(sensors), 1024):
         s = slice(at, at + 1024)
-        influence = _influence(lengths[s] * image_fractions(scene, names, sensors[s], fractions), known, s)
-        nodes = _influence(lengths[s] * image_fractions(scene, names, sensors[s], _nodes()), known, s,
-                           lengths[s] * image_fractions(scene, names, sensors[s], fractions))  # fmt: skip
-        missed = np.abs(influence - nodes @ _lagrange(fractions).T).max(-1)
-        part[s, :, 0] = 2 * influence.sum(-1) - 1.5 * PAPER_POINTS * missed
-        part[s, :, 1:] = -nodes
+        points = lengths[s] * image_fractions(scene, names, sensors[s], fractions)
+        places = lengths[s] * image_fractions(scene, names, sensors[s], _nodes())
+        for m in range(a.shape[1]):
+            influence = _influence(points, a[s, m], b[s, m], points)
+            nodes = _influence(places, a[s, m], b[s, m], points)
+            missed = np.abs(influence - nodes @ _lagrange(fractions).T).max(-1)
+            part[s, m, :, 0] = 2 * influence.sum(-1) - 1.5 * PAPER_POINTS * missed
+            part[s, m, :, 1:] = -nodes
     return part * PAPER_KAPPA2 * scene.noise.sigma**2, (lengths > 0).all((-1, -2))
 
 
-def _influence(u: np.ndarray, known: Measurand, s: slice, points: np.ndarray | None = None) -> np.ndarray:
-    """h^2 at places u (px) for the unweighted line through ``points`` (px; u itself when not given)."""
-    points = u if points is None else points
+def _influence(u: np.ndarray, a: np.ndarray, b: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """h^2 of A d + B theta at places u (px) for the unweighted line through ``points`` (px)."""
     mean = points.mean(-1, keepdims=True)
-    a, b = known.offset[s][..., None], known.tilt[s][..., None]
+    a, b = a[..., None], b[..., None]
     return (a / points.shape[-1] + (b - a * mean) * (u - mean) / ((points - mean) ** 2).sum(-1, keepdims=True)) ** 2
 
 
-def _calibrated(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.ndarray]:
+def _calibrated(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of r^6 and of r^3 at the interpolation's nodes; the first of each takes the square of its range.
 
     r^3 itself is no polynomial of the place: what the interpolation misses of it is 1e-9.
@@ -190,8 +198,15 @@ def _calibrated(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.nd
     scene, scale = pictures.scene, pictures.scene.locator.scale_px
     nodes = place_nodes(pictures, known.view, known.view.framed)
     good = (nodes.length[..., 0] >= MIN_USABLE).all(-1)
-    weight, slope = (make(nodes, known.offset, known.tilt) for make in (line_weight, line_slope))
     per_point = point_variance(nodes, scale) * np.ones(1)
+    part = np.stack([_coefficients(nodes, a[:, m], b[:, m], per_point, scale, good) for m in range(a.shape[1])], 1)
+    dark = scene.noise.variance * part
+    return np.concatenate([dark, part], -1) if scene.noise.gain > 0 else dark, good
+
+
+def _coefficients(nodes: Nodes, a: np.ndarray, b: np.ndarray, per_point, scale: float, good: np.ndarray) -> np.ndarray:
+    """Those of r^6 for A d + B theta of each edge at unit noise, shape (S, E, 1 + _DEGREE)."""
+    weight, slope = (make(nodes, a, b) for make in (line_weight, line_slope))
     factor = second_order(nodes, weight, slope, scale) * per_point
     extra = np.zeros_like(nodes.length)
     short = good & np.isfinite(nodes.length[..., 0]).all(-1) & (nodes.length[..., 0] < SHORT * scale).any(-1)
@@ -202,9 +217,7 @@ def _calibrated(pictures: Pictures, known: Measurand) -> tuple[np.ndarray, np.nd
     factor[short] = np.where(is_short, crowd, factor[short])
     extra[short] = np.where(is_short, -spare, 0.0)
     values = np.einsum("...j,...jk->...k", factor, _lagrange(nodes.spatial))
-    part = np.concatenate([extra, values], -1)
-    dark = scene.noise.variance * part
-    return np.concatenate([dark, part], -1) if scene.noise.gain > 0 else dark, good
+    return np.concatenate([extra, values], -1)
 
 
 def _short(weighted: np.ndarray, t: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,15 +13,16 @@ import numpy as np
 
 from planner import Pictures
 from planner.features.locator import edge_blur
-from planner.features.measurand import normals
-from planner.features.projected_edges import projected_edges, straight
+from planner.features.measurand import measurands
+from planner.features.projected_edges import circles, straight
 from planner.imaging.appearance import signal
 from planner.imaging.projection import edge_points, facing, project_ideal
 from render.phenomena.base import Influence, largest
-from scenes import Corner, Scene
+from scenes import Scene
 
 NEAR_STEP = float(np.exp(-0.5))
 _FRACTIONS = np.linspace(0.03, 0.97, 24)
+_STAND_INS = 4  # straight edges that stand for a circle
 _INWARD = 1e-3  # of the object's size: how far inside a face its slope is taken
 
 
@@ -55,7 +56,7 @@ def sides(pictures: Pictures, *, fall_off: bool = True) -> Sides:
 
 
 def _sides(pictures: Pictures, fall_off: bool) -> Sides:
-    scene, solid, names = pictures.scene, pictures.scene.solid, straight(pictures.scene)
+    scene, solid, names = pictures.scene, pictures.scene.solid, required(pictures.scene)
     points = edge_points(solid, names, _FRACTIONS)
     faces = np.array([solid.edge(name).faces for name in names])
     inner = points[:, None] + _inward(scene, faces)[:, :, None]
@@ -116,25 +117,31 @@ def px_per_cm(pictures: Pictures) -> np.ndarray:
 
 
 def lever(pictures: Pictures) -> np.ndarray:
-    """|d distance / d offset| of each required edge when all its points may move by up to 1 px, shape (S, E).
+    """|d value / d offset| of each required edge when all its points may move by up to 1 px, shape (S, E).
 
-    Twice the response to a shift of the whole edge: extrapolating a fitted line from the points to its end at most
-    doubles what moves them. For anything but a distance between two corners the plain bound 2.
+    Twice the response to shifts of both ends: extrapolating a fitted line from the points to its end at most doubles
+    what moves them. The most over the lengths that are measured; angles are told in other units and do not count. For
+    the edges that stand for a circle the plain bound 2.
     """
-    scene = pictures.scene
-    if not all(isinstance(feature, Corner) for feature in scene.task.corners) or scene.task.kind != "distance":
-        return np.full((len(pictures.sensors), len(straight(scene))), 2.0)
-    with np.errstate(all="ignore"):
-        across = normals(projected_edges(pictures))
-        start, end = (
-            project_ideal(scene.solid.vertex(corner.vertex)[None], pictures.sensors, scene.camera)[:, 0]
-            for corner in scene.task.corners
-        )
-        unit = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
-        found = [
-            np.abs(np.einsum("si,sij->sj", unit, np.linalg.pinv(np.nan_to_num(across[:, k : k + 2])))) for k in (0, 2)
-        ]
-    return 2 * np.concatenate(found, -1)
+    known, names = measurands(pictures), required(pictures.scene)
+    lengths = np.array([not quantity.is_angle for quantity in known.quantities])
+    found = np.full((len(pictures.sensors), len(names)), 2.0)
+    if lengths.any() and known.view.names:
+        with np.errstate(all="ignore"):
+            offset, tilt = (part[:, lengths] for part in known.of_lines(known.gradient))
+            tilt = tilt / known.view.lengths[:, None]
+            found[:, : len(known.view.names)] = 2 * (np.abs(offset - tilt) + np.abs(tilt)).max(1)
+    return found
+
+
+def required(scene: Scene) -> tuple[str, ...]:
+    """The straight edges that are needed, then those around the face of each circle, which stand for it."""
+    solid, names = scene.solid, list(straight(scene))
+    rims = {name for circle in solid.circles for name in circle.edges}
+    for name in circles(scene):
+        face = solid.circle(name).face
+        names += [edge.name for edge in solid.edges if face in edge.faces and edge.name not in rims][:_STAND_INS]
+    return tuple(dict.fromkeys(names))
 
 
 def _loss(share: np.ndarray) -> np.ndarray:
@@ -147,7 +154,7 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
     """Small steps (cm) from each edge into its two faces, shape (E, 2, 3)."""
     solid = scene.solid
     steps = []
-    for name, pair in zip(straight(scene), faces, strict=True):
+    for name, pair in zip(required(scene), faces, strict=True):
         ends = solid.vertices[list(solid.edge(name).ends)]
         along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
         for face in pair:

@@ -6,11 +6,10 @@ import numpy as np
 
 from planner import Pictures
 from planner.features.locator import edge_blur
-from planner.features.projected_edges import straight
 from planner.imaging.lens import confusion, lens_jacobian, recorded
 from planner.imaging.projection import depth, edge_points, project_ideal
 from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
-from render.phenomena.edges import lever, sides
+from render.phenomena.edges import lever, required, sides
 from scenes import Lens, Scene
 
 
@@ -46,7 +45,7 @@ class LensDistortion(Effect):
     def influence(self, pictures: Pictures) -> Influence:
         """How far the required edges' points move, and how much the image is stretched there."""
         scene = pictures.scene
-        points = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 33))
+        points = edge_points(scene.solid, required(scene), np.linspace(0, 1, 33))
         image = project_ideal(points.reshape(-1, 3), pictures.sensors, scene.camera)
         moved = np.linalg.norm(recorded(image, scene.camera) - image, axis=-1)
         bias = moved.reshape(len(moved), *points.shape[:2]).max(-1)
@@ -76,7 +75,7 @@ class DepthOfField(Effect):
         """
         scene = pictures.scene
         camera = scene.camera
-        ends = edge_points(scene.solid, straight(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
+        ends = edge_points(scene.solid, required(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
         z = depth(ends, pictures.sensors, camera)
         if (z <= 0).any():
             return EVERYTHING

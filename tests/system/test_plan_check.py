@@ -88,11 +88,14 @@ def test_the_same_order_where_the_formulas_know_all(task1, objective):
     assert [row.ratio for row in found.settings] == pytest.approx([1, 1, 1], abs=0.03)
 
 
-def test_what_cannot_be_measured_is_said():
-    """The plate's task is a hole's centre, which no picture is measured for: nothing is rendered."""
-    found = check_plan(planner.plan(scenes.load("plate"), sensor=(30, 0), light=(0, 0)))
-    assert (found.settings, found.proposed, found.order_changed) == ((), None, None)
-    assert "task must be a distance between two corners" in found.reason
+def test_several_measurands_are_checked_together():
+    """The plate's worst ratio of sigma to tolerance, with and without a picture, circles and all."""
+    found = check_plan(planner.plan(scenes.load("plate"), sensor=(30, 80), light=(35, 335)))
+    (row,) = found.settings
+    assert found.proposed == row
+    assert row.status == "ok"
+    assert row.calibrated == pytest.approx(planner.predict(scenes.load("plate"), (30, 80), (35, 335)).worst_ratio ** 2)
+    assert row.ratio == pytest.approx(1, abs=0.1)
 
 
 def test_best_of_other_edges_is_measured_with_those(task1):

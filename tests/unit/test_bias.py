@@ -107,9 +107,14 @@ def test_the_bound_has_no_bias(task1):
     assert planner.predict(task1, *narrow, "bound").status == "ok"
 
 
-def test_unknown_for_circles():
+def test_circles_count_as_unbiased():
+    """What is left is what the corner's two lines add along the distance."""
     found = planner.predict(scenes.load("plate"), (35, 40), (20, 80))
-    assert np.isnan(found.bias_px)
+    start, end = found.corners
+    pull = (end - start) / np.linalg.norm(end - start)
+    shift = bias(Pictures.of(scenes.load("plate"), (35, 40), (20, 80))).corners
+    assert np.isnan(shift[0]).all()
+    assert found.bias_px == pytest.approx(shift[1] @ pull, rel=1e-9)
 
 
 def test_nothing_surrounds_a_plain_edge(task1):

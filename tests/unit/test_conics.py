@@ -1,15 +1,18 @@
-"""The model of a circle's centre is what fitting an ellipse to points with the predicted errors gives."""
+"""The model of a circle is what fitting it to points with the predicted errors gives."""
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
-import measure
 import planner
 import scenes
-from planner.features.circles import fisher_centre, rim
+from planner.features.circles import fisher_circle, rim
+from planner.features.seen import plane_axes
 from planner.imaging.pictures import Pictures
+from planner.imaging.projection import project
 from planner.models.paper import PAPER_KAPPA2, paper
 
+SENSOR = np.array([40.0, 30.0])
 COUNT = 1500
 TOLERANCE = 4 * np.sqrt(2 / (COUNT - 1))  # four standard errors of a variance
 
@@ -22,34 +25,48 @@ def check(empirical, predicted):
         assert ours > TOLERANCE * theirs
 
 
-def test_rim_is_measured_from_the_ellipses_own_centre():
+def test_design_against_central_differences():
+    """How far each place of the rim moves along its normal when the circle moves in its plane or grows."""
     plate = scenes.load("plate")
-    seen = rim(Pictures.of(plate, (50, 30), (20, 100)), plate.solid.circle("c2"))
-    normal = seen.design[:, :2]
-    points = seen.design[:, 2:4] / normal
-    assert np.linalg.norm(normal, axis=1) == pytest.approx(np.ones(len(normal)))
-    assert seen.design[:, 4] == pytest.approx((normal * points[:, ::-1]).sum(1), rel=1e-6, abs=1e-6)
-    assert measure.fit_ellipse(points).centre == pytest.approx([0, 0], abs=1e-6)
+    circle, pictures = plate.solid.circle("c2"), Pictures.of(plate, SENSOR, (20, 100))
+    one, two = plane_axes(circle.axis)
+    angle = 2 * np.pi * (np.arange(64) + 0.5) / 64
+    radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+
+    def image(x, y, wider):
+        return project(circle.centre + x * one + y * two + (2 + wider) * radial, SENSOR, plate.camera)
+
+    along = np.roll(image(0, 0, 0), -1, 0) - np.roll(image(0, 0, 0), 1, 0)
+    normal = np.stack([along[:, 1], -along[:, 0]], -1) / np.linalg.norm(along, axis=1)[:, None]
+    normal *= np.sign((normal * (image(0, 0, 0) - image(0, 0, -2))).sum(1))[:, None]  # outwards
+    for k, step in enumerate(1e-4 * np.eye(3)):
+        moved = ((image(*step) - image(*-step)) / 2e-4 * normal).sum(1)
+        assert rim(pictures, circle).design[:, k] == pytest.approx(moved, rel=2e-3, abs=2e-3)
 
 
-def test_centre_of_a_hole_by_fitting(rng):
-    """The paper model of the plate's hole is that of an ellipse fitted to points with the paper's errors."""
+def test_circle_of_a_hole_by_fitting(rng):
+    """The paper model of the plate's hole is that of a circle fitted to points with the paper's errors."""
     plate = scenes.load("plate")
-    pictures = Pictures.of(plate, (40, 30), (25, 100))
-    seen = rim(pictures, plate.solid.circle("c2"), fall_off=False)
-    used = seen.counted
-    weight = seen.squared[used] / (PAPER_KAPPA2 * plate.noise.sigma**2)
-    x, y = (seen.design[used, i] / seen.design[used, i - 2] for i in (2, 3))
-    points, sigma = np.stack([x, y], -1), 1 / np.sqrt(weight)
-    keep = sigma < 1.0  # a point worse than a pixel is nearly no point, and its distance is not linear
-    predicted = fisher_centre(seen, seen.squared / (PAPER_KAPPA2 * plate.noise.sigma**2) * 1.0, used)
+    pictures = Pictures.of(plate, SENSOR, (25, 100))
+    circle = plate.solid.circle("c2")
+    seen = rim(pictures, circle, fall_off=False)
+    weight = seen.squared / (PAPER_KAPPA2 * plate.noise.sigma**2)
+    used = weight > 1.0  # a point worse than a pixel is nearly no point, and its distance is not linear
+    predicted = fisher_circle(seen, np.where(used, weight, 0.0), used)
+    one, two = plane_axes(circle.axis)
+    angle = 2 * np.pi * (np.arange(64) + 0.5) / 64
+    radial = (np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two)[used]
+    outward = seen.design[used, 2]  # px along the normal for a unit of the radius
+    fits = []
+    for _ in range(COUNT):
+        away = rng.standard_normal(used.sum()) / np.sqrt(weight[used]) / outward
+        points = circle.centre + (circle.radius + away)[:, None] * radial
+        x, y = ((points - circle.centre) @ axis for axis in (one, two))
+
+        def residual(q, x=x, y=y):
+            return (np.hypot(x - q[0], y - q[1]) - circle.radius - q[2]) * outward * np.sqrt(weight[used])
+
+        fits.append(least_squares(residual, np.zeros(3), method="lm").x)
+    check(np.var(fits, axis=0, ddof=1), np.diag(predicted))
     evaluated = paper(pictures)
-    assert evaluated.centres[0] == pytest.approx(predicted)
-    centres = [
-        measure.fit_ellipse(
-            points[keep] + sigma[keep, None] * rng.standard_normal((keep.sum(), 2)), sigma[keep] ** 2
-        ).centre
-        for _ in range(COUNT)
-    ]
-    check(np.var(centres, axis=0, ddof=1), np.diag(predicted))
-    assert planner.predict(plate, (40, 30), (25, 100), "paper").variance_px2 == pytest.approx(evaluated.variance)
+    assert planner.predict(plate, SENSOR, (25, 100), "paper").variance_px2 == pytest.approx(float(evaluated.variance))

@@ -61,7 +61,7 @@ def predicted(task1):
 @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0, 1.7])
 def test_the_papers_line_variance_against_monte_carlo(task1, fitted, predicted, fraction):
     """Eq. 3 at both ends, the middle and beyond; 1.3 x the truth and 0 are refused by the same sample."""
-    for e, name in enumerate(predicted.measurand.view.names):
+    for e, name in enumerate(predicted.measurands.view.names):
         place = fraction * fitted[name][2]
         ones = np.ones(len(task1.task.edges))
         variance = predicted.line_variance(ones, place * ones)[e]
@@ -74,7 +74,7 @@ def test_the_papers_line_variance_against_monte_carlo(task1, fitted, predicted, 
 def test_the_papers_tilt_against_monte_carlo(task1, fitted, predicted):
     """The line's angle, rad^2: A = 0 and B = 1."""
     ones = np.ones(len(task1.task.edges))
-    for e, name in enumerate(predicted.measurand.view.names):
+    for e, name in enumerate(predicted.measurands.view.names):
         _, direction, _, _, normal, _ = fitted[name]
         sine = normal @ direction * np.sign(normal @ [-direction[1], direction[0]])
         variance = predicted.line_variance(0 * ones, ones)[e]
@@ -84,7 +84,7 @@ def test_the_papers_tilt_against_monte_carlo(task1, fitted, predicted):
 def test_the_printed_gamma_variance_fails_the_same_test(task1, fitted, predicted):
     """In V(gamma) the last term is 1/W; the printed I/W is off by a factor I = 100, and the sample refuses it."""
     ones = np.ones(len(task1.task.edges))
-    for e, name in enumerate(predicted.measurand.view.names):
+    for e, name in enumerate(predicted.measurands.view.names):
         middle, total = fitted[name][2] / 2, fitted[name][-1]
         repaired = predicted.line_variance(ones, middle * ones)[e]
         printed = repaired + (100 - 1) / total

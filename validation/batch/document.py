@@ -83,6 +83,7 @@ def _row(row: Row) -> dict[str, Any]:
         **main,
         "bound": row.bound,
         "classic": [asdict(judged) for judged in row.classic],
+        "measurands": [asdict(each) for each in row.measurands],
     }
 
 

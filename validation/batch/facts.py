@@ -45,6 +45,21 @@ class _Identity(BaseModel):
     code: str
 
 
+class _PredictedMeasurand(BaseModel):
+    """The same of one measurand in the object."""
+
+    model_config = _Strict
+
+    name: Annotated[str, Field(max_length=1000)]
+    kind: Annotated[str, Field(max_length=20)]
+    unit: Annotated[str, Field(max_length=20)]
+    value: _Length
+    paper: _Variance
+    calibrated: _Variance
+    bound: _Variance
+    predicted_bias: _Length
+
+
 class _Predicted(BaseModel):
     """Predictions that need no image; variances may be infinite."""
 
@@ -55,6 +70,7 @@ class _Predicted(BaseModel):
     bound: _Variance
     value_px: _Length
     predicted_bias: _Length
+    measurands: Annotated[list[_PredictedMeasurand], Field(min_length=1, max_length=1000)]
 
 
 _Scalar = str | int | float | bool | None

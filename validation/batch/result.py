@@ -15,7 +15,9 @@ from scenes import InvalidInput
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
-from validation.batch.rows import Found, Row, Rows
+from validation.batch.found import Found
+from validation.batch.measurands import column
+from validation.batch.rows import Row, Rows
 from validation.batch.store import RunFile
 from validation.batch.work import methods
 from validation.statistics import Verdict
@@ -64,7 +66,9 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         model = store.predicted(i)
         if model:
             scene = campaign.case(i).scene
-            rows.add(i, scene.name, model, {m.name: _found(i, m.name, store) for m in methods(scene)})
+            found = {method.name: _found(i, method.name, store) for method in methods(scene)}
+            each = [_found(i, column(next(iter(found)), k), store) for k in range(len(model["measurands"]))]
+            rows.add(i, scene.name, model, found, each)
         else:
             refused[i] = store.trouble(i) or _WAITING
     if not rows:
@@ -82,7 +86,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         refused=refused,
         search=_search(campaign, scale),
         correlation=_correlations(campaign, rows),
-        verdict=_judge(rows.judged(), sum(reason != _WAITING for reason in refused.values())),
+        verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values())),
         classic_verdicts={name: _judge(rows.judged(name)) for name in rows.others},
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
@@ -106,6 +110,16 @@ def _free_scale(campaign: Campaign, rows: Rows) -> float | None:
     return float(np.median(ratios)) if ratios else None
 
 
+def _verdict(rows: Rows, refused: int) -> Verdict:
+    """About every measurand of every setting; where there is one a setting, about its value in the image."""
+    measured = rows.measured
+    if measured.are_single:
+        return _judge(rows.judged(), refused)
+    names = ("ratio", "n", "failed", "bias", "predicted_bias", "ok", "independent")
+    found = {name: measured.column(name) for name in names}
+    return _judge({**found, "propagated": measured.column("predicted")}, refused)
+
+
 def _judge(found: dict[str, np.ndarray], refused: int = 0) -> Verdict:
     """Of one method; a setting that could not be worked on counts as one that was not measured."""
 
@@ -120,6 +134,7 @@ def _judge(found: dict[str, np.ndarray], refused: int = 0) -> Verdict:
         predicted_bias_px=column("predicted_bias", 0.0),
         sigma_px=np.sqrt(column("propagated", np.inf)),
         ok=column("ok", 0) > 0,
+        independent=column("independent", 1.0),
     )
 
 
@@ -147,6 +162,6 @@ def _search(campaign: Campaign, scale: float | None):
     found = []
     for other in map(scenes.load, campaign.scenes[0].same_scale):
         for setting in other.settings:
-            ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_px2 * scale
+            ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_image * scale
             found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
     return tuple(found)

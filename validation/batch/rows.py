@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from measure import status as statuses
 from validation import statistics
 from validation.batch.campaign import Campaign
-
-_STATUSES = tuple(sorted(statuses.ALL))
+from validation.batch.found import STATUSES, Found, row_status
+from validation.batch.measurands import JudgedMeasurand, Measured
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,9 @@ class Judged:
 class Row:
     """One setting. ``paper`` has the one free scale; ``main`` is the verdict's method, ``classic`` are the others.
 
+    They are about the first measurand, in the image; ``measurands`` are all of them by the verdict's method, in the
+    scene's unit.
+
     ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
     """
 
@@ -61,16 +63,7 @@ class Row:
     bound: float
     main: Judged
     classic: tuple[Judged, ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What one method measured in one setting: the numbers that a `Judged` follows from."""
-
-    propagated: float
-    distances: np.ndarray
-    failures: dict[str, int]
-    clean: str
+    measurands: tuple[JudgedMeasurand, ...]
 
 
 MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias")
@@ -79,7 +72,7 @@ MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias")
 def _record(methods: int) -> np.dtype:
     judged = [
         ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
-        ("failed", "i4"), ("failures", "i4", (len(_STATUSES),)), ("clean", "u1"),
+        ("failed", "i4"), ("failures", "i4", (len(STATUSES),)), ("clean", "u1"),
     ]  # fmt: skip
     return np.dtype([
         ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", judged, (methods,)),
@@ -100,21 +93,33 @@ class Rows(Sequence[Row]):
         self._records = np.zeros(len(campaign), _record(1))  # memory is taken where it is written to
         self._kinds: list[tuple[str, tuple[str, ...]]] = []  # scene and methods, which few settings differ in
         self._places: dict[tuple[str, tuple[str, ...]], int] = {}
+        self.measured = Measured()
 
-    def add(self, index: int, scene: str, model: dict[str, float], found: dict[str, Found]) -> None:
-        """Append a setting: its predictions without an image, and what each method found, the verdict's first."""
+    def add(self, index: int, scene: str, model: dict[str, Any], found: dict[str, Found], each: list[Found]) -> None:
+        """Append a setting.
+
+        Parameters
+        ----------
+        model : dict
+            Predictions without an image.
+        found : dict of Found
+            Of the first measurand by each method, the verdict's first.
+        each : list of Found
+            Of each measurand, in the scene's unit, by the verdict's method.
+        """
         kind = self._kind(scene, tuple(found))
         record = self._records[self._size]
         record["index"], record["kind"] = index, kind
         for name in MODEL:
             record[name] = model[name]
-        for place, each in zip(record["judged"], found.values(), strict=False):
-            good = each.distances[np.isfinite(each.distances)]
-            place["propagated"], place["clean"] = each.propagated, _STATUSES.index(each.clean)
+        for place, one in zip(record["judged"], found.values(), strict=False):
+            good = one.distances[np.isfinite(one.distances)]
+            place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
             place["empirical"] = np.var(good, ddof=1) if good.size > 1 else np.nan
             place["bias"] = good.mean() - model["value_px"] if good.size else np.nan
-            place["n"], place["failed"] = each.distances.size, each.distances.size - good.size
-            place["failures"] = [each.failures.get(status, 0) for status in _STATUSES]
+            place["n"], place["failed"] = one.distances.size, one.distances.size - good.size
+            place["failures"] = [one.failures.get(status, 0) for status in STATUSES]
+        self.measured.add(model["measurands"], each)
         self._size += 1
 
     def _kind(self, scene: str, methods: tuple[str, ...]) -> int:
@@ -139,6 +144,7 @@ class Rows(Sequence[Row]):
         judged = self._records["judged"]
         ratio = self._ratio(judged)
         judged["low"], judged["high"] = statistics.ratio_intervals(ratio, judged["n"] - judged["failed"])
+        self.measured.finish()
 
     def __len__(self) -> int:
         return self._size
@@ -146,10 +152,10 @@ class Rows(Sequence[Row]):
     def __getitem__(self, which):
         if isinstance(which, slice):
             return [self[i] for i in range(*which.indices(self._size))]
-        return self._row(self._records[: self._size][which])
+        return self._row(range(self._size)[which])
 
     def __iter__(self):
-        return (self._row(record) for record in self._records[: self._size])
+        return map(self._row, range(self._size))
 
     def column(self, name: str) -> np.ndarray:
         """A number of `Row`, all settings."""
@@ -174,7 +180,7 @@ class Rows(Sequence[Row]):
         stray = numbers("failures").sum(-1) <= statistics.STRAY * found["n"]
         return {
             **found, "ratio": self._ratio(found), "predicted_bias": self._records["predicted_bias"][chosen],
-            "ok": stray & (numbers("clean") == _STATUSES.index("ok")),
+            "ok": stray & (numbers("clean") == STATUSES.index("ok")), "independent": np.ones(chosen.size),
         }  # fmt: skip
 
     @property
@@ -189,7 +195,8 @@ class Rows(Sequence[Row]):
         usable = np.isfinite(judged["empirical"]) & np.isfinite(predicted) & (predicted > 0)
         return np.divide(judged["empirical"], predicted, out=np.full(usable.shape, np.nan), where=usable)
 
-    def _row(self, record: np.void) -> Row:
+    def _row(self, number: int) -> Row:
+        record = self._records[number]
         index = int(record["index"])
         setting, parameters = self._campaign.at(index)
         scene, names = self._kinds[int(record["kind"])]
@@ -199,14 +206,14 @@ class Rows(Sequence[Row]):
         return Row(
             index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=tuple(setting.light),
             paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=judged[0], classic=tuple(judged[1:]),
-            **numbers,
+            measurands=self.measured[number], **numbers,
         )  # fmt: skip
 
 
 def _judged(method: str, place: np.void, predicted_bias: float) -> Judged:
     n, propagated = int(place["n"]), float(place["propagated"])
     empirical, bias = _known(place["empirical"]), _known(place["bias"])
-    failures = {name: int(count) for name, count in zip(_STATUSES, place["failures"], strict=True) if count}
+    failures = {name: int(count) for name, count in zip(STATUSES, place["failures"], strict=True) if count}
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
     return Judged(
         method=method,
@@ -220,31 +227,9 @@ def _judged(method: str, place: np.void, predicted_bias: float) -> Judged:
         bias=bias,
         predicted_bias=predicted_bias,
         rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
-        status=row_status(_STATUSES[place["clean"]], failures, n),
+        status=row_status(STATUSES[place["clean"]], failures, n),
     )
 
 
 def _known(number: np.float64) -> float | None:
     return None if math.isnan(number) else float(number)
-
-
-def row_status(clean: str, others: dict[str, int], images: int) -> str:
-    """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.
-
-    Parameters
-    ----------
-    clean : str
-        Status of the noise-free image.
-    others : dict
-        Number of noisy images by status, of those that are not ``ok``.
-    images : int
-        Noisy images in all; `statistics.STRAY` of them may be lost.
-
-    Examples
-    --------
-    >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
-    ('ok', 'low_contrast')
-    """
-    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
-        return clean
-    return max(others, key=others.get)

@@ -22,6 +22,7 @@ from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
 from scenes.camera import MOST_PIXELS
+from validation.batch import measurands
 from validation.batch.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
@@ -85,21 +86,26 @@ class Clean:
     ----------
     image : Packed
     propagated : dict
-        Variance (px^2), distance in the image (px) and status, by method.
+        Variance (px^2), value of the first measurand in the image (px, or degrees) and status, by method; and of each
+        measurand in the scene's unit, by `measurands.column`.
     predicted : dict
-        Variances that need no image, px^2 (``paper`` without its free scale), the model's distance ``value_px`` and the
-        classic locators' ``predicted_bias``, px.
+        Variances that need no image, px^2 (``paper`` without its free scale), the model's ``value_px`` and the classic
+        locators' ``predicted_bias``, px, of the first measurand; those of all in the scene's unit as ``measurands``.
     """
 
     image: Packed
     propagated: dict[str, tuple[float, float, str]]
-    predicted: dict[str, float]
+    predicted: dict[str, Any]
     seconds: dict[str, float]
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Distances of one chunk of images, one array a method; statuses of the images that failed."""
+    """Values of one chunk of images; statuses of the images that failed.
+
+    One array a method, of the first measurand in the image (px, or degrees), and of the verdict's method one more for
+    each measurand (`measurands.column`), in the scene's unit.
+    """
 
     distances: dict[str, np.ndarray]
     failures: dict[str, dict[int, str]]
@@ -191,17 +197,21 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     clock = _Clock()
     scene, picture = case.scene, case.picture
     predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
-    numbers = {model: found.variance_px2 for model, found in predicted.items()}
-    numbers |= {"value_px": predicted["calibrated"].value_px, "predicted_bias": predicted["calibrated"].bias_px}
+    numbers = {model: found.variance_image for model, found in predicted.items()}
+    numbers |= {"value_px": predicted["calibrated"].value_image, "predicted_bias": predicted["calibrated"].bias_image}
+    numbers["measurands"] = measurands.predicted(predicted)
     clock.lap("predict")
     image = render.image(picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance)
     clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
-    spread = float(planner.pose_spread(shaken, np.array([list(picture.sensor)])).variance[0])
+    spread = planner.pose_scatter(shaken, np.array([list(picture.sensor)]))
     propagated = {}
-    for method in methods(scene):
+    for i, method in enumerate(methods(scene)):
         found = measure.propagate(image, picture, estimator=method.locator, threshold=method.threshold)
-        propagated[method.name] = found.variance_px2 + spread, found.value_px, found.status
+        propagated[method.name] = found.variance_px2 + float(spread.covariance[0, 0, 0]), found.value_px, found.status
+        if i == 0:
+            in_object = np.diag(spread.covariance_object[0])
+            propagated |= measurands.propagated(method.name, found.measurands, in_object)
     clock.lap("propagate")
     return Clean(Packed.of(image), propagated, numbers, clock.seconds)
 
@@ -221,18 +231,22 @@ def measure_chunk(
     scene, picture = case.scene, case.picture
     where = measure.region_of_interest(picture)
     clock.lap("prepare")
-    parts: dict[str, list[measure.Measurement]] = {method.name: [] for method in methods(scene)}
+    parts: dict[str, list[measure.Measurements]] = {method.name: [] for method in methods(scene)}
     for batch, first in enumerate(range(0, count, _BATCH)):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
         many = min(_BATCH, count - first)
         pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
         clock.lap("expose")
         for method in methods(scene):
-            found = measure.distance(pictures, picture, estimator=method.locator, threshold=method.threshold)
-            parts[method.name].append(found)
+            parts[method.name] += measure.measure_by(pictures, picture, ((method.locator, method.threshold),))
             clock.lap(method.name)
-    distances = {name: np.concatenate([part.value_px for part in found]) for name, found in parts.items()}
-    statuses = {name: np.concatenate([part.status for part in found]) for name, found in parts.items()}
+    distances = {name: np.concatenate([part.value_image[:, 0] for part in found]) for name, found in parts.items()}
+    statuses = {name: np.concatenate([part.status[:, 0] for part in found]) for name, found in parts.items()}
+    main = methods(scene)[0].name
+    for k in range(len(scene.quantities)):
+        name = measurands.column(main, k)
+        distances[name] = np.concatenate([part.value[:, k] for part in parts[main]])
+        statuses[name] = np.concatenate([part.status[:, k] for part in parts[main]])
     failures = {
         name: {int(i): str(statuses[name][i]) for i in np.flatnonzero(np.isnan(values))}
         for name, values in distances.items()

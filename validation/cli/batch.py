@@ -73,8 +73,8 @@ def validate_command(
 ) -> None:
     """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
 
-    Writes run.sqlite, table.csv, result.json and pictures to DIR. Exit status 1 if the measurements contradict the
-    predictions.
+    Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements
+    contradict the predictions.
     """
     started = time.perf_counter()
     check_number("renders", renders, 2, _MOST_RENDERS)
@@ -136,6 +136,7 @@ def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> Non
     from validation.report import export, figures
 
     export.write_csv(found, directory / "table.csv")
+    export.write_measurands(found, directory / "measurands.csv")
     export.write_json(found, directory / "result.json")
     store = RunFile.reopen(directory)
     try:

@@ -10,6 +10,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput
+from validation.cli import measurands
 from validation.cli.common import (
     Effects,
     Json,
@@ -25,6 +26,7 @@ from validation.cli.common import (
     tolerance,
 )
 from validation.cli.outputs import check_file
+from validation.report.terminal import console
 
 if TYPE_CHECKING:
     import measure
@@ -83,9 +85,9 @@ def measure_command(
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure an image: the distance of a known scene, or else the quadrilateral that it shows.
+    """Measure an image: the measurands of a known scene, or else the quadrilateral that it shows.
 
-    Exit status 1 if it cannot be measured.
+    Exit status 1 if something cannot be measured.
     """
     import measure
     from validation import picture_file
@@ -101,10 +103,21 @@ def measure_command(
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
     known = scenes.load(scene)
-    distance = measure.distance(picture, known, *poses, estimator or measure.best_estimator(known), threshold)
-    facts = {"file": str(file), **_distance_facts(distance)}
-    say(facts, as_json, _distance_text(distance, facts["edges"]))
-    raise typer.Exit(0 if np.isfinite(distance.value_px) else 1)
+    found = measure.measure(picture, known, *poses, estimator, threshold)
+    rows = measurands.facts(found)
+    told = {"measurands": rows, "covariance": measurands.covariance(found)}
+    distance = None
+    if known.task is not None and known.task.kind == "distance":
+        distance = measure.distance(picture, known, *poses, estimator or measure.best_estimator(known), threshold)
+        told |= _distance_facts(distance)
+    if as_json:
+        say({"file": str(file), **told}, True, "")
+    else:
+        shown = console()
+        shown.print(measurands.table(rows))
+        if distance is not None:
+            shown.print(_distance_text(distance, told["edges"]), highlight=False)
+    raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 
 def _distance_facts(found: measure.Measurement) -> dict:

@@ -24,6 +24,7 @@ commands = commands()
 _MOST_CHECKED = 1000
 
 Objective = Annotated[str, typer.Option(help="object (cm^2) or image (px^2)")]
+Over = Annotated[str, typer.Option(help="Of several measurands: minimax (worst sigma / tolerance) or sum (weighted).")]
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
 Model = Annotated[str, typer.Option(help="calibrated or paper")]
 Edges = Annotated[str, typer.Option(help="given, or best of all sets that measure the same")]
@@ -50,6 +51,7 @@ Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all picture
 def plan_command(
     scene: SceneName,
     objective: Objective = "object",
+    over: Over = "minimax",
     search: Search = "exhaustive",
     model: Model = "calibrated",
     edges: Edges = "given",
@@ -84,7 +86,7 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
-    how = {"model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
+    how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
@@ -171,6 +173,8 @@ def _facts(
     found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path]
 ) -> dict:
     """The plan for JSON."""
+    import planner
+
     p = found.prediction
     return {
         "scene": found.scene.name,
@@ -178,8 +182,12 @@ def _facts(
         "model": found.model,
         "sensor": list(found.sensor),
         "light": list(found.light),
-        "edges": list(found.scene.task.edges),
+        "edges": list(planner.edges_of(found.scene)),
+        "over": found.over,
         "variance": found.variance,
+        "limiting": found.limiting,
+        "worst_ratio": p.worst_ratio,
+        "measurands": [_measurand(each) for each in p.measurands],
         "variance_object": p.variance_object,
         "variance_image": p.variance_image,
         "status": p.status,
@@ -193,6 +201,25 @@ def _facts(
         "robust": None if safe is None else _with_poses(safe),
         "pictures": [str(path) for path in pictures],
         "seconds": seconds,
+    }
+
+
+def _measurand(each: planner.Forecast) -> dict:
+    zone = each.tolerance
+    sigma, sigma_image = (
+        math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image)
+    )
+    return {
+        "name": each.name,
+        "kind": each.kind,
+        "unit": each.unit,
+        "value": each.value_object,
+        "nominal": each.nominal,
+        "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
+        "sigma": sigma,
+        "sigma_image": sigma_image,
+        "ratio": each.ratio if sigma is not None else None,
+        "status": each.status,
     }
 
 

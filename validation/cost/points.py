@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.features.projected_edges import image_fractions
+from planner.features.projected_edges import image_fractions, straight
 from planner.imaging.appearance import edge_contrast
 from planner.imaging.pictures import Pictures
 from validation.batch.campaign import Case
@@ -70,7 +70,7 @@ def points_parameter(case: Case) -> Parameter:
 
 def _end_variance(case: Case, fractions: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Variance at the end of each required edge's line, its length and information density being 1, shape (E,)."""
-    names = case.scene.task.edges
+    names = straight(case.scene)
     pictures = Pictures.of(case.picture)
     u = image_fractions(case.scene, names, pictures.sensors, fractions)
     density = edge_contrast(pictures, names, fractions).squared * weights

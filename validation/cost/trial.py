@@ -145,7 +145,7 @@ class _Tried:
             moved = Pose(abs(sensor.polar_deg + shift), sensor.azimuth_deg)
             try:
                 image = self.image if not shift else self._image(moved, self.how.quality)
-                smooth = planner.predict(self.case.scene, moved, light).variance_px2
+                smooth = planner.predict(self.case.scene, moved, light).variance_image
                 logs.append(math.log(self._propagate(image, moved).variance_px2 / smooth))
             except (InvalidInput, ValueError):
                 continue  # the object hides its edge from there
@@ -161,7 +161,7 @@ class _Tried:
         where = measure.region_of_interest(scene, sensor)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.case.index, 1 << 30)))
         pictures = render.expose(self.image, scene.noise, rng, _IMAGES, where)
-        values = measure.distance(pictures, scene, sensor).value_px
+        values = measure.measure(pictures, scene, sensor, estimator="gradient").value_image[:, 0]
         linear = np.einsum("nij,ij->n", pictures - self.image, self.found.response)
         good = np.isfinite(values)
         if good.sum() < 3:

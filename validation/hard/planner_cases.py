@@ -40,9 +40,7 @@ def _reference(scene: Scene, sensor, light, kind: str, objective: str) -> Refere
     from validation.hard import precise, precise_models
 
     def value(inputs, **how):
-        found = getattr(precise_models, kind)(scene, inputs, **how)
-        plain = objective == "image" or isinstance(found, str)
-        return found if plain else found / precise_models.object_scale(scene, inputs) ** 2
+        return getattr(precise_models, kind)(scene, inputs, objective=objective, **how)
 
     inputs = precise.Inputs.of(scene, sensor, light)
     exact = value(inputs)

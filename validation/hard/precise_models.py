@@ -25,8 +25,8 @@ _WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned")
 _NODES = [tuple(map(mpf, pair)) for pair in zip(*map(list, leggauss(8)), strict=True)]
 
 
-def paper(scene, inputs: Inputs, points: int = 100):
-    """Variance of the distance in the image, px^2, by eq. 3-10 with all moments formed plainly."""
+def paper(scene, inputs: Inputs, points: int = 100, objective: str = "image"):
+    """Variance of the distance in the image, px^2, or on the object, cm^2, by eq. 3-10, all moments formed plainly."""
     view, focal = View.of(scene, inputs), mpf(scene.camera.focal_px)
 
     def offset_variance(name, normal, corner):
@@ -51,10 +51,10 @@ def paper(scene, inputs: Inputs, points: int = 100):
         s2 = dot(along, along) - dot(along, normal) ** 2
         return (s2 + 1 / total) * tilt + 1 / total
 
-    return _distance_variance(scene, inputs, offset_variance)
+    return _distance_variance(scene, inputs, offset_variance, objective)
 
 
-def _distance_variance(scene, inputs: Inputs, offset_variance):
+def _distance_variance(scene, inputs: Inputs, offset_variance, objective: str):
     """Eq. 5 and 6: corners from lines, the distance from corners; the four edges are different ones."""
     focal = mpf(scene.camera.focal_px)
     images = [image_of(v, inputs, focal) for v in inputs.vertices]
@@ -83,29 +83,43 @@ def _distance_variance(scene, inputs: Inputs, offset_variance):
         ))  # fmt: skip
     if reasons:
         return next(worst for worst in _WORST_FIRST if worst in reasons)
-    x, y = minus(*corners)
-    xx, yy, xy = (sum(parts) for parts in zip(*covariances, strict=True))
-    return (x * x * xx + y * y * yy + 2 * x * y * xy) / (x * x + y * y)
+    if objective == "object":
+        pulls = _pulls(scene, inputs)
+    else:
+        across = minus(*corners)
+        size = mp.sqrt(dot(across, across))
+        pulls = [(across[0] / size, across[1] / size)] * 2
+    return sum(
+        x * x * xx + y * y * yy + 2 * x * y * xy for (x, y), (xx, yy, xy) in zip(pulls, covariances, strict=True)
+    )
 
 
-def object_scale(scene, inputs: Inputs):
-    """Derivative of the image's distance by the object's, both ends moving apart alike, px / cm."""
-    step = mpf(10) ** -20
-    names = scene.solid.vertex_names
-    ends = [inputs.vertices[names.index(feature.vertex)] for feature in scene.task.corners]
+def _pulls(scene, inputs: Inputs):
+    """Derivative of the object's distance by each end's image, both ends moving in the face that they share."""
+    step, focal = mpf(10) ** -20, mpf(scene.camera.focal_px)
+    index = [scene.solid.vertex_names.index(feature.vertex) for feature in scene.task.corners]
+    ends = [inputs.vertices[i] for i in index]
     across = minus(ends[1], ends[0])
+    size = mp.sqrt(dot(across, across))
+    (face,) = (face for face in scene.solid.faces if set(index) <= set(face))
+    sides = [minus(inputs.vertices[face[k]], inputs.vertices[face[0]]) for k in (1, -1)]
+    found = []
+    for sign, end in zip((-1, 1), ends, strict=True):
+        columns, longer = [], []
+        for side in sides:
+            ahead, behind = (
+                image_of(tuple(x + s * step * d for x, d in zip(end, side, strict=True)), inputs, focal)
+                for s in (1, -1)
+            )
+            columns.append(tuple(x / (2 * step) for x in minus(ahead, behind)))
+            longer.append(sign * dot(across, side) / size)
+        (a, c), (b, d) = columns  # the image moves by (a, c) and (b, d), the distance by longer
+        size2 = a * d - b * c
+        found.append(((d * longer[0] - c * longer[1]) / size2, (a * longer[1] - b * longer[0]) / size2))
+    return found
 
-    def length(t):
-        moved = [
-            tuple(x + s * t / 2 * d for x, d in zip(e, across, strict=True)) for s, e in zip((-1, 1), ends, strict=True)
-        ]
-        away = minus(*(image_of(p, inputs, mpf(scene.camera.focal_px)) for p in moved))
-        return mp.sqrt(dot(away, away))
 
-    return (length(step) - length(-step)) / (2 * step) / mp.sqrt(dot(across, across))
-
-
-def calibrated(scene, inputs: Inputs, adaptive: bool = True):
+def calibrated(scene, inputs: Inputs, adaptive: bool = True, objective: str = "image"):
     """The documented closed form of the calibrated model, its integrals by adaptive quadrature.
 
     For objects that lie within the image. Without ``adaptive`` 8 nodes an edge, good enough for a condition number.
@@ -157,7 +171,7 @@ def calibrated(scene, inputs: Inputs, adaptive: bool = True):
         inside = integral(lambda t: g2(t) - scale**2 * slope2 / squared(t))
         return 2 * mp.sqrt(mp.pi) * scale * inside - 2 * scale**2 * (g2(-used / 2) + g2(used / 2))
 
-    return _distance_variance(scene, inputs, offset_variance)
+    return _distance_variance(scene, inputs, offset_variance, objective)
 
 
 def _trim(scene, view: View, images, edge, end: int, clear):

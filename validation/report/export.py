@@ -9,6 +9,7 @@ from pathlib import Path
 
 from scenes import InvalidInput
 from validation.batch.document import pieces
+from validation.batch.measurands import JudgedMeasurand
 from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
 
@@ -17,10 +18,19 @@ _PART = 10_000  # settings that become columns at a time
 
 def write_csv(found: Validation, path: Path) -> Path:
     """One line a setting; variances in px^2, angles in degrees, empty where there is no number."""
+    return _write(columns(found), lines(found), path)
+
+
+def write_measurands(found: Validation, path: Path) -> Path:
+    """One line a setting and measurand; variances in the scene's unit squared or degrees^2."""
+    return _write(list(next(measurands(found))), measurands(found), path)
+
+
+def _write(keys: list[str], lines: Iterator[dict[str, object]], path: Path) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=columns(found))
+        writer = csv.DictWriter(file, fieldnames=keys)
         writer.writerow({key: _inert(key) for key in writer.fieldnames})
-        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines(found))
+        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines)
     return path
 
 
@@ -92,3 +102,21 @@ def _judged(judged: Judged) -> dict[str, object]:
         "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
         "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
     }  # fmt: skip
+
+
+def measurands(found: Validation) -> Iterator[dict[str, object]]:
+    """One flat record a setting and measurand, variances in the scene's unit squared or degrees^2."""
+    for row in found.rows:
+        place = {
+            "index": row.index, "scene": row.scene, "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
+            "light_polar": row.light[0], "light_azimuth": row.light[1],
+        }  # fmt: skip
+        yield from ({**place, **_flat(each)} for each in row.measurands)
+
+
+def _flat(each: JudgedMeasurand) -> dict[str, object]:
+    low, high = each.ratio_interval or (None, None)
+    return {key: value for key, value in vars(each).items() if key != "ratio_interval"} | {
+        "ratio_low": low,
+        "ratio_high": high,
+    }

@@ -80,8 +80,10 @@ def _covered(case: Case, picture: np.ndarray) -> np.ndarray:
 
 def edge_pixels(scene: Scene, sensor: Pose, picture: np.ndarray) -> np.ndarray:
     """The pixels, bool, from which the estimator ``canny`` makes its edge points at the scene's first threshold."""
-    tool = prepared(layout_of(Picture.of(scene, sensor)), "canny", scene.locator.thresholds[0])
-    found = np.zeros(picture.shape, bool)
+    layout, found = layout_of(Picture.of(scene, sensor)), np.zeros(picture.shape, bool)
+    if not layout.names:
+        return found
+    tool = prepared(layout, "canny", scene.locator.thresholds[0])
     for part in tool.parts:
         if part:
             found[tuple(part.locator.edge_pixels(picture).T)] = True

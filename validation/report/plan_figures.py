@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from planner import Pictures, Plan, ViewingSpace, variance_map
-from planner.features.projected_edges import projected_edges, straight
+from planner.features.projected_edges import circles, projected_edges
 from planner.imaging.appearance import is_separable, signal
 from planner.imaging.lens import recorded
 from planner.imaging.projection import direction, facing, project
@@ -83,8 +83,10 @@ def _draw_map(figure, axis, plan, space, values, best, title) -> None:
     axis.set(aspect="equal", xlim=(-1.08, 1.08), ylim=(-1.08, 1.08), xticks=[], yticks=[])
     axis.set_title(f"{title}\nbest at {_short(best)}; rings: polar angle 30, 60, 90, rays: azimuth", fontsize=9)
     axis.axis("off")
-    unit = {"object": "cm", "image": "px"}[plan.objective] if plan.scene.task.kind == "distance" else "degrees"
-    figure.colorbar(shown, ax=axis, shrink=0.8, label=f"standard deviation, {unit}")
+    first, several = plan.prediction.measurands[0], len(plan.prediction.measurands) > 1
+    unit = "px" if plan.objective == "image" and first.unit != "degrees" else first.unit
+    label = "worst sigma / tolerance" if several else f"standard deviation, {unit}"
+    figure.colorbar(shown, ax=axis, shrink=0.8, label=label)
 
 
 def _pixels(frame: np.ndarray, space: ViewingSpace, values: np.ndarray, size: int) -> np.ndarray:
@@ -147,13 +149,12 @@ def _seen(plan: Plan, path: Path) -> Path:
     for edge in solid.edges:
         for span in visible_spans(scene.bodies, edge, position):
             _segment(axis, scene, pose, edge, span, color="0.5", lw=0.7)
-    view = projected_edges(pictures, tuple(dict.fromkeys(straight(scene))))
+    view = projected_edges(pictures)
     for i, name in enumerate(view.names):
         for span in visible_spans(scene.bodies, solid.edge(name), position):
             _segment(axis, scene, pose, solid.edge(name), span, color=f"C{i % 10}", lw=2.5, label=name)
-    for name in dict.fromkeys(scene.task.edges):
-        if name not in view.names:
-            _rim(axis, scene, pose, solid.circle(name))
+    for name in circles(scene):
+        _rim(axis, scene, pose, solid.circle(name))
     axis.plot(*recorded(plan.prediction.corners, camera).T, "o", mfc="none", color="w", ms=11, mew=1.5)
     low, high = (f(project(solid.vertices, pose, camera), axis=0) for f in (np.min, np.max))
     axis.set(

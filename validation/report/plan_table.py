@@ -30,7 +30,9 @@ def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust 
 
 def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
     """The best setting, what it gives, and what is known of it."""
-    p, edges = found.prediction, " ".join(found.scene.task.edges)
+    p, edges = found.prediction, " ".join(planner.edges_of(found.scene))
+    if len(p.measurands) > 1:
+        return _head_of_several(found, edges, seconds)
     return (
         f"{found.scene.title or found.scene.name}\n"
         f"Best {found.objective} variance ({found.model} model), required edges {edges}:\n"
@@ -42,29 +44,61 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
     )
 
 
+def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
+    p = found.prediction
+    how = "worst ratio" if found.over == "minimax" else "weighted sum of the squared ratios"
+    lines = [
+        found.scene.title or found.scene.name,
+        f"Least {how} of sigma to tolerance ({found.model} model), required edges {edges}:",
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}",
+        f"  Limited by {found.limiting}: sigma is {p.worst_ratio:.3g} of its tolerance.",
+    ]
+    for each in p.measurands:
+        ratio = "" if each.ratio is None else f", {each.ratio:.3g} of +-{each.tolerance.half:g}"
+        sigma = f"{each.variance_object**0.5:.3g} {each.unit}"
+        lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{ratio}, {each.status}")
+    lines += [
+        f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one",
+        f"  Guarantee: {found.guarantee}.",
+    ]
+    return "\n".join(lines)
+
+
 def _units(found: planner.Plan) -> tuple[str, str]:
     """Of the measurand in the object and in the image."""
-    return ("cm", "px") if found.prediction.kind == "distance" else ("degrees", "degrees")
+    first = found.prediction.measurands[0]
+    return ("degrees", "degrees") if first.unit == "degrees" else (first.unit, "px")
 
 
 def _trace(found: planner.Plan, units: tuple[str, str]) -> Table:
-    unit = units[0] if found.objective == "object" else units[1]
     gap = "" if found.gap is None else f", {100 * found.gap:.1f} % above the best"
-    table = _table(f"\nAlternating search{gap}", "fixed", "", "found", "", f"variance, {unit}^2")
+    table = _table(f"\nAlternating search{gap}", "fixed", "", "found", "", _minimised(found, units))
     for step in found.trace:
         row = step.fixed, _pose(step.fixed_pose), step.found, _pose(step.found_pose), f"{step.variance:.4g}"
         table.add_row(*row)
     return table
 
 
+def _minimised(found: planner.Plan, units: tuple[str, str]) -> str:
+    """What is minimised, in words."""
+    if len(found.prediction.measurands) > 1:
+        return "worst ratio^2" if found.over == "minimax" else "sum of ratios^2"
+    return f"variance, {units[0 if found.objective == 'object' else 1]}^2"
+
+
 def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     names = (f"object, 1e-6 {units[0]}^2", f"image, 1e-6 {units[1]}^2")
+    best, several = found.candidates[0], len(found.prediction.measurands) > 1
+    if several:
+        names = ("limited by", _minimised(found, units))
     table = _table("\nClearly different settings, the best first", "sensor", "light", "edges", *names, "over best")
-    best = found.candidates[0]
     for c in found.candidates:
-        ratio = c.variance_object / best.variance_object
-        if found.objective == "image":
-            ratio = c.variance_image / best.variance_image
+        ratio = c.variance / best.variance
+        if several:
+            table.add_row(
+                _pose(c.sensor), _pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", f"{ratio:.3f}"
+            )
+            continue
         values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
         table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
     return table
@@ -85,7 +119,8 @@ def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
 
 
 def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
-    unit = f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
+    several = len(found.prediction.measurands) > 1
+    unit = "1e-6" if several else f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
     columns = (
         "place",
         "now",

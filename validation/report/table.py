@@ -19,6 +19,8 @@ _UNIT = 1e-4  # px^2; what the measured variances are printed in
 def report(found: Validation) -> Group:
     """Everything that ``ice validate`` prints."""
     parts = [Text(found.title, style="bold"), _variances(found), _ratios(found)]
+    if any(len(row.measurands) > 1 for row in found.rows):
+        parts.append(_measurands(found))
     if found.search:
         parts.append(_search(found))
     if found.refused:
@@ -75,6 +77,12 @@ def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list
     return [*(["scene"] if many else []), *keys, "sensor", "light"], cells
 
 
+def _what(found: Validation) -> str:
+    """What the tables in px are about."""
+    several = any(len(row.measurands) > 1 for row in found.rows)
+    return f"the first measurand, {found.rows[0].measurands[0].name}, in the image" if several else "the distance"
+
+
 def _variances(found: Validation) -> Table:
     rows, which = far(found)
     headings, cells = names(found, rows)
@@ -86,7 +94,7 @@ def _variances(found: Validation) -> Table:
     ]
     captions = [*(captions if printed else ["1e-4 px^2, absolute."]), which]
     table = _table(
-        "\nTable 3: variance of the distance", *headings, *paper, "predicted\ncalibrated", "\npropagated",
+        f"\nTable 3: variance of {_what(found)}", *headings, *paper, "predicted\ncalibrated", "\npropagated",
         f"measured\n{rows[0].main.method}", *(f"\n{name}" for name in others), "Cramer-Rao\nbound",
         caption="\n".join([*filter(None, captions), "- : the paper prints N/A, or nothing could be measured."]),
     )  # fmt: skip
@@ -125,6 +133,29 @@ def _ratios(found: Validation) -> Table:
             str(row.main.n), failed(row), shift(row.main.predicted_bias), *errors(row.main), row.main.status,
         )  # fmt: skip
     return table
+
+
+def _measurands(found: Validation) -> Table:
+    """Every measurand of the rows that are shown, in the scene's unit."""
+    rows, which = far(found)
+    headings, cells = names(found)
+    table = _table(
+        "\nAll measurands, in the scene's unit (1 sigma)",
+        *headings, "measurand", "value", "unit", "calibrated", "propagated", "measured", "ratio", "bias", "status",
+        caption="\n".join(filter(None, ["ratio: of variances, measured / propagated; all are judged.", which])),
+    )  # fmt: skip
+    for row in rows:
+        for each in row.measurands:
+            sigmas = (small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical))
+            bias = "-" if each.bias is None else f"{each.bias:+.2g}"
+            about = each.name, f"{each.value:.6g}", each.unit
+            table.add_row(*cells[row.index], *about, *sigmas, ratio(each), bias, each.status)
+    return table
+
+
+def small_sigma(variance: float | None) -> str:
+    """Standard deviation of a variance."""
+    return "-" if variance is None or not math.isfinite(variance) else f"{math.sqrt(variance):.3g}"
 
 
 def shift(px: float | None) -> str:

@@ -16,7 +16,7 @@ import render
 from measure import status
 from scenes import InvalidInput
 from tests.proofs.agreement.settings import Place
-from validation.batch.rows import row_status
+from validation.batch.found import row_status
 from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 

@@ -34,8 +34,9 @@ class Place:
 
 
 def groups() -> tuple[str, ...]:
-    """Names of all groups: the bundled scenes that have settings, and the two made from Task1."""
-    return (*(name for name in scenes.names() if scenes.load(name).settings), DISTORTED, POSES)
+    """Names of all groups: the bundled scenes that have settings and one distance, and the two made from Task1."""
+    loaded = {name: scenes.load(name) for name in scenes.names()}
+    return (*(name for name, scene in loaded.items() if scene.settings and scene.task), DISTORTED, POSES)
 
 
 def places(wanted: tuple[str, ...], poses: int, seed: int) -> list[Place]:

@@ -1,0 +1,284 @@
+"""Circles in images: edge points along the rim of a circle in its known plane, and the circle through them.
+
+The pose tells the circle's plane, so that three numbers are sought: two shifts of the centre in that plane and the
+change of the radius. The centre so found is the circle's own, not that of the ellipse which is its image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from measure import status
+from measure.estimators.crossing import CrossingLocator
+from measure.estimators.gradient import gradient_along
+from measure.features.optics import Optics
+from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
+from planner.features.locator import MIN_CONTRAST, edge_blur, reach
+from planner.features.rim_sides import (
+    RIM_POINTS,
+    clearance,
+    contrast_along,
+    equal_angles,
+    outward_normals,
+    radials,
+    seen_along,
+    shading_shift,
+    steady,
+)
+from planner.features.seen import plane_axes
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import project_ideal
+from scenes import Circle, Picture, Solid
+
+SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
+_MOST = 64  # times the planner's places
+_MIN_FOUND = 0.7  # part of the places taken at which a point must be found
+_CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
+_GRID = 0.25  # px to which a new expectation is rounded, so that images can share it
+_PASSES = 6
+_SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
+_BEND = 1e-3  # rad: step of the curvature's differences
+
+
+@dataclass(frozen=True, eq=False)
+class RimTool:
+    """What measures one circle from one expected place.
+
+    Attributes
+    ----------
+    locator : CrossingLocator
+    design : ndarray, shape (m, 3)
+        Derivative of each place's offset by the circle's parameters, ideal px for the scene's unit.
+    weights : ndarray, shape (m,)
+        Of the places in the least squares: the length that each stands for, and where the light is known the squared
+        contrast over the noise's variance; 0 where it is not taken.
+    inward : ndarray, shape (m,)
+        How far inside the rim the zero crossing lies, for the rim is curved and its sides are shaded, ideal px.
+    state : str
+        ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
+    optics : Optics
+    """
+
+    locator: CrossingLocator
+    design: np.ndarray
+    weights: np.ndarray
+    inward: np.ndarray
+    state: str
+    optics: Optics
+
+    @cached_property
+    def response(self):
+        """Derivative of the offsets by the locator's pixels at unit contrast, (m, P)."""
+        return self.locator.unit_response()
+
+    def fit(self, valid: np.ndarray) -> np.ndarray:
+        """Least-squares maps (n, 3, m) from offsets at the valid places (n, m) to the circle's parameters."""
+        weights = self.weights * valid
+        gram = np.einsum("nm,mi,mj->nij", weights, self.design, self.design)
+        scale = np.sqrt(np.einsum("nii->ni", gram))
+        good = (scale > 0).all(-1)
+        scale[~good], gram[~good] = 1.0, np.eye(3)
+        unit = gram / (scale[:, :, None] * scale[:, None, :])
+        good &= np.linalg.eigvalsh(unit)[:, 0] > 1e-8
+        unit[~good] = np.eye(3)
+        found = np.linalg.inv(unit) / (scale[:, :, None] * scale[:, None, :])
+        found = np.einsum("nij,mj,nm->nim", found, self.design, weights)
+        found[~good] = np.nan
+        return found
+
+
+@dataclass(frozen=True)
+class Circles:
+    """One circle in n images.
+
+    Attributes
+    ----------
+    errors : ndarray, shape (n, 3)
+        Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius.
+    covariance : ndarray, shape (n, 3, 3)
+    state : ndarray of str, shape (n,)
+    """
+
+    errors: np.ndarray
+    covariance: np.ndarray
+    state: np.ndarray
+
+
+def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
+    """A circle of the object in images (n, height, width)."""
+    return _find(images, picture, name, (0.0, 0.0, 0.0), _PASSES)
+
+
+def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarray:
+    """Derivative of the circle's three parameters by the pixels of a noise-free image, (3, height * width)."""
+    moved = (0.0, 0.0, 0.0)
+    for _ in range(_PASSES):
+        tool = rim_tool(picture, name, moved)
+        points, response = tool.locator.respond_each(clean)
+        fit = tool.fit(points.valid)
+        change = (fit @ (points.offset + tool.inward)[..., None])[0, :, 0]
+        if not _is_far(tool, change[None])[0]:
+            break
+        moved = _rounded(tool, np.array(moved) + change)
+    taken = points.valid[0] & (tool.weights > 0)
+    return fit[0][:, taken] @ response[np.flatnonzero(taken)]
+
+
+def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, ...], passes: int) -> Circles:
+    """From a circle expected at some errors; images in which it is elsewhere are measured again from there."""
+    tool = rim_tool(picture, name, moved)
+    found = _measured(images, tool)
+    found = replace(found, errors=found.errors + np.array(moved))
+    good = np.isin(found.state, status.MEASURED)
+    far = good & _is_far(tool, found.errors - np.array(moved))
+    if not far.any():
+        return found
+    if passes == 0:
+        return replace(found, state=np.where(far, status.LOW_CONTRAST, found.state))
+    errors, covariance, state = found.errors.copy(), found.covariance.copy(), found.state.astype(object)
+    keys = np.array([_rounded(tool, row) for row in found.errors[far]])
+    for key in np.unique(keys, axis=0):
+        which = np.flatnonzero(far)[(keys == key).all(1)]
+        again = _find(images[which], picture, name, tuple(key.tolist()), passes - 1)
+        errors[which], covariance[which], state[which] = again.errors, again.covariance, again.state
+    return Circles(errors, covariance, state.astype(str))
+
+
+def _measured(images: np.ndarray, tool: RimTool) -> Circles:
+    count = len(images)
+    if tool.state not in status.MEASURED:
+        return Circles(np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan), np.full(count, tool.state))
+    points = tool.locator.locate_each(images)
+    taken = tool.weights > 0
+    fit = tool.fit(points.valid)
+    errors = np.einsum("nim,nm->ni", fit, points.offset + tool.inward)
+    clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
+    enough = (points.valid & clear)[:, taken].mean(1) >= _MIN_FOUND
+    determined = np.isfinite(errors).all(1)
+    state = np.where(determined, np.where(enough, tool.state, status.LOW_CONTRAST), status.ILL_CONDITIONED)
+    return Circles(errors, _covariance(images, tool, fit, points), state)
+
+
+def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
+    """Covariance (n, 3, 3) at the contrast that each image shows."""
+    contrast = np.where(points.valid, points.contrast, 0.0)
+    number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
+    smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
+    inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
+    rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
+    rows = rows.reshape(len(images), 3, -1)
+    used = images.reshape(len(images), -1)[:, tool.locator.pixels]
+    variance = tool.optics.noise_at(used)
+    variance = tool.optics.noise_variance if variance is None else variance[:, None]
+    return np.einsum("nip,njp->nij", rows * variance, rows)
+
+
+def _is_far(tool: RimTool, errors: np.ndarray) -> np.ndarray:
+    """Whether circles with errors (n, 3) are farther from the expected one than the locator captures, bool (n,)."""
+    return np.abs(np.nan_to_num(errors) @ tool.design.T).max(-1) > _CAPTURE
+
+
+def _rounded(tool: RimTool, errors: np.ndarray) -> tuple[float, ...]:
+    """Errors to about `_GRID` px."""
+    step = _GRID / np.abs(tool.design).max()
+    return tuple((np.round(errors / step) * step).tolist())
+
+
+@lru_cache(maxsize=256)
+def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
+    """What measures a circle of the object, expected with some errors."""
+    scene, solid = picture.scene, picture.scene.solid
+    optics, pictures, camera = Optics.of(scene), Pictures.of(picture), scene.camera
+    nominal = solid.circle(name)
+    angle = equal_angles(_count(pictures, nominal, optics.scale_px))
+    circle = _with_errors(nominal, moved)
+    one, two = plane_axes(circle.axis)
+    radial = radials(circle, angle)
+    spokes = radial * (circle.radius * facets(solid, nominal, angle))[:, None]
+    ideal, smooth, ahead, behind = (
+        project_ideal(circle.centre + away, pictures.sensors, camera)
+        for away in (spokes, *(circle.radius * radials(circle, angle + s * _BEND) for s in (0, 1, -1)))
+    )
+    normal, slope, speed = outward_normals(pictures, circle, angle)
+    across = np.einsum("ni,nij->nj", normal, slope)
+    design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
+    curvature = -((ahead - 2 * smooth + behind) / _BEND**2 * normal).sum(-1) / speed**2
+    inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature
+    if pictures.lights:
+        inward = inward - shading_shift(pictures, nominal, angle)
+    places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
+    size = np.linalg.norm(gradient, axis=-1)
+    arc = speed * 2 * np.pi / angle.size
+    weight, state = _weights(pictures, nominal, angle, places, arc, optics)
+    taken = weight > 0
+    keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
+    recorded_normals = gradient / size[:, None]
+    locator = gradient_along(optics, angle[keep], _held(places[keep], optics), recorded_normals[keep], size[keep])
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
+
+
+def _held(places: np.ndarray, optics: Optics) -> np.ndarray:
+    """Places, those outside the image held at its border: they are not taken, but a kernel needs pixels."""
+    margin = optics.window_px + 4 * optics.scale_px + 1
+    return np.clip(np.nan_to_num(places), margin, np.maximum(np.array(optics.shape[::-1]) - 1 - margin, margin))
+
+
+def _count(pictures: Pictures, circle: Circle, scale: float) -> int:
+    """Number of places: the planner's, or as many times that as the image's length needs."""
+    places = circle.centre + circle.radius * radials(circle, equal_angles())
+    rim = project_ideal(places, pictures.sensors, pictures.scene.camera)
+    length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()
+    return RIM_POINTS * int(np.clip(np.ceil(length / (SPACING * scale * RIM_POINTS)), 1, _MOST))
+
+
+def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
+    one, two = plane_axes(circle.axis)
+    return replace(circle, centre=circle.centre + errors[0] * one + errors[1] * two, radius=circle.radius + errors[2])
+
+
+def _weights(
+    pictures: Pictures, circle: Circle, angle: np.ndarray, places: np.ndarray, arc: np.ndarray, optics: Optics
+) -> tuple[np.ndarray, str]:
+    """Weights of places (m,), 0 where they are not taken, and the status that this makes.
+
+    The rules are those of `planner.features.circles`.
+    """
+    margin = optics.window_px + 4 * optics.scale_px + 1
+    inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(-1)
+    seen = inside & seen_along(pictures, circle, angle)
+    if seen.mean() < LEAST_SEEN:
+        return np.zeros(seen.size), status.NOT_VISIBLE
+    strong, weight, far = seen, arc, reach(optics.scale_px, optics.blur_px)
+    clear = clearance(pictures, circle, angle) >= far
+    if pictures.lights:
+        squared, noise = contrast_along(pictures, circle, angle)
+        strong = seen & (squared >= MIN_CONTRAST**2 * noise)
+        weight, clear = arc * squared / noise, clear & steady(squared, arc, far)
+        if strong.mean() < LEAST_SEEN:
+            return np.zeros(seen.size), status.LOW_CONTRAST
+    part = (strong & clear).mean()
+    if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or part < LEAST_SEEN:
+        return np.where(strong, weight, 0.0), status.CLUTTER
+    return np.where(strong & clear, weight, 0.0), status.OK
+
+
+def facets(solid: Solid, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Radius of the mesh's rim, a polygon, over the circle's at angles (m,).
+
+    The picture is one of the mesh: between its vertices, which lie on the circle, the rim runs inside it.
+    """
+    one, two = plane_axes(circle.axis)
+    ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in circle.edges]) - circle.centre
+    first, last = np.moveaxis(np.stack([ends @ one, ends @ two], -1), 1, 0)
+    toward = np.stack([np.cos(angle), np.sin(angle)], -1)
+    along = last - first
+    turn = toward[:, None, 0] * along[:, 1] - toward[:, None, 1] * along[:, 0]  # (m, pieces)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (first[:, 0] * along[:, 1] - first[:, 1] * along[:, 0]) / turn
+        share = (first[:, 0] * toward[:, None, 1] - first[:, 1] * toward[:, None, 0]) / turn
+    hit = (share >= -1e-9) & (share <= 1 + 1e-9) & (far > 0)
+    found = np.where(hit, far, np.nan)
+    return np.nan_to_num(np.nanmax(found, axis=1) / circle.radius, nan=1.0)

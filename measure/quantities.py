@@ -1,0 +1,182 @@
+"""All quantities of a scene in a stack of images, from the lines and circles found in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from measure import status
+from measure.features.corners import intersect
+from measure.features.found import MIN_SINE, Shape
+from measure.features.layout import Layout, layout_of
+from measure.features.rims import Circles, find_circle
+from measure.features.shape import find_shape
+from planner.features.kinds import Evaluated, in_image, on_plane
+from planner.features.measurand import Measurands, dense, measurands
+from planner.features.seen import Seen, plane_axes
+from planner.imaging.lens import image_centre
+from planner.imaging.pictures import Pictures
+from scenes import Corner, Picture, Quantity
+
+
+@dataclass(frozen=True)
+class Values:
+    """Values (n, M), derivatives (n, M, q) by lines and circles (`Seen`), and joint covariance (n, M, M)."""
+
+    value: np.ndarray
+    gradient: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is found in n images.
+
+    Attributes
+    ----------
+    known : Measurands
+        What is expected.
+    shape : Shape
+        The lines.
+    circles : tuple of Circles
+    seen : Seen
+    errors : ndarray, shape (n, q, q)
+        Joint covariance of lines and circles; those of different circles, and of circles and lines, count as
+        independent, for they are found from different pixels.
+    image, plane : Values
+        In the image (px, degrees) and on the planes of the features (the scene's unit, degrees).
+    status : ndarray of str, shape (n, M)
+    """
+
+    known: Measurands
+    shape: Shape
+    circles: tuple[Circles, ...]
+    seen: Seen
+    errors: np.ndarray
+    image: Values
+    plane: Values
+    status: np.ndarray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the straight edges."""
+        return self.known.view.names
+
+    def with_errors(self, errors: np.ndarray) -> Found:
+        """The same of one image with another covariance (q, q) of its lines and circles."""
+        return replace(self, errors=errors[None])
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """The first quantity's two corners or centres (n, 2, 2), px, and their joint covariance (n, 4, 4)."""
+        points = [self.seen.point(feature, None) for feature in self.known.quantities[0].features]
+        rows = np.zeros((len(self.status), 4, self.seen.count))
+        for i, point in enumerate(points):
+            for k, move in point.moves.items():
+                rows[:, 2 * i : 2 * i + 2, k] = move
+        corners = np.stack([point.at for point in points], 1) + image_centre(self.seen.camera)
+        return corners, _spread(rows, self.errors)
+
+
+def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None = None) -> Found:
+    """All quantities in images, shape (n, height, width).
+
+    Straight edges by the estimator; circles by edge points around their rims, whatever the estimator.
+    """
+    known, layout = measurands(Pictures.of(picture)), layout_of(picture)
+    first = picture.scene.locator.thresholds[0]
+    shape = find_shape(images, layout, estimator, first if threshold is None else threshold)
+    circles = tuple(find_circle(images, picture, name) for name in known.circles)
+    seen = found_in_images(known, layout, shape.normals, shape.points, np.array([c.errors for c in circles]))
+    errors = _errors(shape, circles)
+    return Found(
+        known=known,
+        shape=shape,
+        circles=circles,
+        seen=seen,
+        errors=errors,
+        image=values(seen, known.quantities, in_image, errors),
+        plane=values(seen, known.quantities, on_plane, errors),
+        status=_states(known, layout, shape, circles),
+    )
+
+
+def found_in_images(
+    known: Measurands, layout: Layout, normals: np.ndarray, points: np.ndarray, circle_errors: np.ndarray
+) -> Seen:
+    """What is seen in n images: lines of unit normals and points (n, E, 2), and errors (C, n, 3) of the circles."""
+    expected, count = known.seen, len(normals)
+    names = known.view.names
+    corners = {}
+    for corner in expected.corners:
+        pair = [names.index(name) for name in corner.edges]
+        corners[corner] = intersect(normals[:, pair], points[:, pair])[0] - image_centre(expected.camera)
+    lengths = np.linalg.norm(expected.along, axis=-1)[:, None]
+    centres = np.broadcast_to(expected.centres, (count, *expected.centres.shape)).copy()
+    radii = np.broadcast_to(expected.radii, (count, *expected.radii.shape)).copy()
+    for c, (name, errors) in enumerate(zip(known.circles, circle_errors, strict=True)):
+        centres[:, c] += errors[:, :2] @ np.array(plane_axes(expected.solid.circle(name).axis))
+        radii[:, c] += errors[:, 2]
+    return Seen(
+        solid=expected.solid,
+        camera=expected.camera,
+        sensors=expected.sensors,
+        names=names,
+        start=points - image_centre(expected.camera),
+        along=lengths * np.stack([normals[..., 1], -normals[..., 0]], -1),
+        corners=corners,
+        circles=known.circles,
+        centres=centres,
+        radii=radii,
+        expected=False,
+    )
+
+
+def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarray) -> Values:
+    """Values in the image or on the plane, with their joint covariance; NaN where something is not found."""
+    count = len(errors)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        found: list[Evaluated] = [kind(seen, quantity) for quantity in quantities]
+        gradient = dense(found, (count,), seen.count)
+        value = np.stack([np.broadcast_to(each.value, count) for each in found], -1)
+        return Values(value, gradient, _spread(gradient, errors))
+
+
+def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Covariance (n, k, k) of what moves by rows (n, k, q); NaN where it depends on what is not found."""
+    lost = ~np.isfinite(np.einsum("nqq->nq", errors))
+    whole = np.where(lost[:, :, None] | lost[:, None, :], 0.0, errors)
+    used = np.where((rows == 0) | lost[:, None], 0.0, rows)
+    spread = used @ whole @ np.swapaxes(used, -1, -2)
+    missing = ((rows != 0) & lost[:, None]).any(-1)
+    return np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread)
+
+
+def _errors(shape: Shape, circles: tuple[Circles, ...]) -> np.ndarray:
+    count, edges = len(shape.lines), shape.lines.shape[-1]
+    whole = np.zeros((count, edges + 3 * len(circles), edges + 3 * len(circles)))
+    whole[:, :edges, :edges] = shape.lines
+    for c, circle in enumerate(circles):
+        part = slice(edges + 3 * c, edges + 3 * c + 3)
+        whole[:, part, part] = circle.covariance
+    return whole
+
+
+def _states(known: Measurands, layout: Layout, shape: Shape, circles: tuple[Circles, ...]) -> np.ndarray:
+    """Status of each quantity in each image, (n, M): the worst of what it needs."""
+    names = known.view.names
+    found = np.empty((len(shape.status), len(known.quantities)), object)
+    for m, quantity in enumerate(known.quantities):
+        columns = [shape.counted[:, names.index(name)] for name in quantity.edges if name in names]
+        columns += [circles[known.circles.index(name)].state for name in quantity.edges if name in known.circles]
+        columns += [_crossing(shape, names, f) for f in quantity.features if isinstance(f, Corner)]
+        if any(name in names for name in quantity.edges):
+            columns.append(shape.whole)
+        found[:, m] = [status.worst(*row) for row in zip(*columns, strict=True)]
+    return found.astype(str)
+
+
+def _crossing(shape: Shape, names: tuple[str, ...], corner: Corner) -> np.ndarray:
+    first, second = (shape.normals[:, names.index(name)] for name in corner.edges)
+    sine = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return np.where(sine < MIN_SINE, status.ILL_CONDITIONED, status.OK)

@@ -1,0 +1,219 @@
+"""What lies beside a circular edge: levels on both sides, what disturbs a locator, and what shading does to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.features.locator import edge_blur
+from planner.features.seen import plane_axes
+from planner.imaging.appearance import behind, of_sides, signal
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import from_axis, jacobian_ideal
+from planner.imaging.rays import first_face
+from scenes import Circle, Solid
+
+RIM_POINTS = 64
+_JUMP = 0.2  # of the contrast between neighbouring places
+_MOST_AWAY = 16  # places beyond which no jump is looked for
+_STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
+_AT_ONCE = 1 << 17  # numbers
+_STEP = 0.25  # px that a slope is taken over
+
+
+def equal_angles(count: int = RIM_POINTS) -> np.ndarray:
+    """Angles all around a rim."""
+    return 2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Unit vectors from a circle's centre, shape (n, 3)."""
+    one, two = plane_axes(circle.axis)
+    return np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+
+
+def outward_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the rim's image: unit normals away from its middle (..., n, 2), the projection's derivative (..., n, 2, 3),
+    and image lengths for a radian (..., n), ideal px."""
+    one, two = plane_axes(circle.axis)
+    radial = radials(circle, angle)
+    slope = jacobian_ideal(circle.centre + circle.radius * radial, pictures.sensors, pictures.scene.camera)
+    step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
+    tangent = np.einsum("...nij,nj->...ni", slope, step)
+    speed = np.linalg.norm(tangent, axis=-1)
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1) / speed[..., None]
+    away = np.einsum("...ni,...nij,nj->...n", normal, slope, radial)
+    return np.where(away[..., None] < 0, -normal, normal), slope, speed
+
+
+def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """How far outwards shading moves the zero crossing along a rim, ideal px, shape (..., n); 0 where nothing is known.
+
+    S^2 (m_b - m_a) / (B - A), levels A inside and B outside and their slopes m per px outwards, S^2 the variance of the
+    smoothed edge. Along a wall that is seen at a slant the brightness changes across the rim as it does around it.
+    """
+    scene = pictures.scene
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    one, two = plane_axes(circle.axis)
+    along = np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one
+    normal, slope, _ = outward_normals(pictures, circle, angle)
+    sense = 1.0 if circle.hole else -1.0  # the face lies outside a hole, inside the end of a cylinder
+    face_step = _step_on(slope, along, radial, sense * _STEP * normal)
+    wall_step = _step_on(slope, along, np.broadcast_to(-circle.axis, radial.shape), -sense * _STEP * normal)
+    turned = angle + wall_step[..., 0] / circle.radius
+    spokes = np.cos(turned)[..., None] * one + np.sin(turned)[..., None] * two
+    face_at = points + face_step[..., :1] * along + face_step[..., 1:] * radial
+    wall_at = circle.centre + circle.radius * spokes - wall_step[..., 1:] * circle.axis
+    levels = _sides(pictures, circle, points, radial, True)
+    slopes = []
+    for level, at, facing in ((levels[..., 0, :], face_at, circle.axis), (levels[..., 1, :], wall_at, -sense * spokes)):
+        there = signal(pictures, at, np.broadcast_to(facing, at.shape), 1)
+        towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), pictures.sensor_at[..., None, :] - at)
+        slopes.append(np.where((level > 0) & (there > 0) & (towards > 0), (there - level) / _STEP, 0.0))
+    contrast = levels[..., 0, :] - levels[..., 1, :]  # face less wall; outside less inside, or the other way round
+    variance = scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = sense * variance * (slopes[0] + slopes[1]) / contrast
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _step_on(slope: np.ndarray, first: np.ndarray, second: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Steps (..., n, 2) along two directions (n, 3) of a surface that move the image by ``moved`` (..., n, 2), px."""
+    columns = np.stack([np.einsum("...nij,nj->...ni", slope, d) for d in (first, second)], -1)
+    (a, b), (c, d) = np.moveaxis(columns, (-2, -1), (0, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.moveaxis(moved, -1, 0)
+        steps = np.stack([d * x - b * y, a * y - c * x], -1) / (a * d - b * c)[..., None]
+    return np.where(np.isfinite(steps) & (np.abs(steps) < 1e9), steps, 0.0)
+
+
+def steady(squared: np.ndarray, arc: np.ndarray, far: float) -> np.ndarray:
+    """Whether a rim's squared contrast (..., n) does not jump within ``far`` px along it, bool, shape (..., n).
+
+    Where a shadow or another edge meets the rim it does. ``arc`` (..., n) is the length that each place stands for, px.
+    """
+    contrast = np.sqrt(squared)
+    onward = np.roll(contrast, -1, -1)
+    jump = np.abs(onward - contrast) > _JUMP * np.maximum(onward, contrast)  # between a place and the next
+    arc = np.broadcast_to(arc, jump.shape)
+    good, ahead, behind = ~(jump | np.roll(jump, 1, -1)), np.zeros(jump.shape), np.zeros(jump.shape)
+    for k in range(1, _MOST_AWAY):
+        ahead, behind = ahead + np.roll(arc, 1 - k, -1), behind + np.roll(arc, k - 1, -1)
+        if not ((ahead < far) | (behind < far)).any():
+            break
+        good &= ~(np.roll(jump, -k, -1) & (ahead < far)) & ~(np.roll(jump, k + 1, -1) & (behind < far))
+    return good
+
+
+def contrast_along(
+    pictures: Pictures, circle: Circle, angle: np.ndarray, *, fall_off: bool = True
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """Squared contrast at angles of a rim, 0 where it is hidden, and the noise's variance there."""
+    radial = radials(circle, angle)
+    sides = _sides(pictures, circle, circle.centre + circle.radius * radial, radial, fall_off)
+    if not fall_off:
+        return (sides[..., 0, :] - sides[..., 1, :]) ** 2, pictures.scene.noise.variance
+    return of_sides(pictures.scene, sides)
+
+
+def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees a rim at angles, whatever the light, bool, shape (..., n)."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    sensor_at = pictures.sensor_at[..., None, :]
+    turned = [
+        np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        for normal in (np.broadcast_to(circle.axis, points.shape), -radial if circle.hole else radial)
+    ]
+    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(circle, points), sensor_at)
+
+
+def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
+
+    Boundaries are the wall's other rim, where the wall beside the place is seen, and straight edges of the face.
+    """
+    solid, radial = pictures.scene.solid, radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    there = _image(pictures, points)
+    nearest = np.full(there.shape[:-1], np.inf)
+    for other in solid.circles:
+        if _coaxial(circle, other):
+            wall = -radial if circle.hole else radial
+            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - points) > 0
+            away = _to_curve(there, _image(pictures, other.centre + other.radius * radials(other, equal_angles())))
+            nearest = np.where(turned, np.minimum(nearest, away), nearest)
+    own = {name for rim in solid.circles for name in rim.edges}
+    for edge in solid.edges:
+        if circle.face in edge.faces and edge.name not in own:
+            start, stop = solid.vertices[list(edge.ends)]
+            places = start + np.linspace(0, 1, _STRAIGHT)[:, None] * (stop - start)
+            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, places), closed=False))
+    return nearest
+
+
+def _image(pictures: Pictures, points: np.ndarray) -> np.ndarray:
+    return from_axis(points, pictures.sensors, pictures.scene.camera)
+
+
+def _coaxial(circle: Circle, other: Circle) -> bool:
+    """Whether another circle is the far rim of the same wall, or may be: on the same axis, about as wide."""
+    across = other.centre - circle.centre
+    along = across @ circle.axis
+    near = 1e-3 * circle.radius
+    return (
+        other is not circle
+        and other.hole == circle.hole
+        and abs(along) > near
+        and np.linalg.norm(across - along * circle.axis) < near
+        and abs(other.radius - circle.radius) < circle.radius / 2
+    )
+
+
+def _to_curve(points: np.ndarray, curve: np.ndarray, *, closed: bool = True) -> np.ndarray:
+    """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n)."""
+    start, stop = (curve, np.roll(curve, -1, -2)) if closed else (curve[..., :-1, :], curve[..., 1:, :])
+    nearest = np.full(points.shape[:-1], np.inf)
+    pieces = start.shape[-2]
+    many = max(1, _AT_ONCE // max(points.size, 1))
+    for k in range(0, pieces, many):
+        a, b = (ends[..., None, k : k + many, :] for ends in (start, stop))
+        along, away = b - a, points[..., None, :] - a
+        size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
+        share = np.clip((away * along).sum(-1) / size, 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(away - share[..., None] * along, axis=-1).min(-1))
+    return nearest
+
+
+def _probe(circle: Circle, points: np.ndarray) -> np.ndarray:
+    """Places that stand for those of a rim where it is asked what they see: the mesh's facets reach into a hole."""
+    chord = np.cos(np.pi / len(circle.edges)) if circle.hole else 1.0
+    return circle.centre + chord * (points - circle.centre)
+
+
+def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
+    """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
+    bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
+    wall = -radial if circle.hole else radial
+    probe = _probe(circle, points)
+    lit = tuple(_free(bodies, probe, at[..., None, :]) for at in pictures.lights_at)
+    sides = []
+    for normal in (np.broadcast_to(circle.axis, points.shape), wall):
+        turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        sides.append((turned, signal(pictures, points, normal, 1, lit, fall_off=fall_off)))
+    seen = _free(bodies, probe, sensor_at) & (sides[0][0] | sides[1][0])
+    levels = []
+    for turned, level in sides:
+        wanted = seen & ~turned
+        past = behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off)
+        levels.append(np.where(seen, np.where(wanted, past, level), 0.0))
+    return np.stack(np.broadcast_arrays(*levels), -2)
+
+
+def _free(bodies: Solid, probe, position) -> np.ndarray:
+    """Whether nothing stands between the rim's points and a position (..., 1, 3)."""
+    if bodies.is_convex:
+        return np.ones((*position.shape[:-2], len(probe)), bool)
+    vectors = probe - position
+    _, t = first_face(bodies, np.broadcast_to(position, vectors.shape), vectors, ())
+    return t > 1 - 1e-6

@@ -1,0 +1,110 @@
+"""How precisely each quantity of a scene will be measured in one picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.features.measurand import Measurands
+from planner.features.seen import unit_normals
+from planner.models.errors import Errors
+from scenes import Corner, Quantity, Scene, Tolerance
+
+_WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned", "clutter", "ok")
+_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What is predicted of one quantity.
+
+    Attributes
+    ----------
+    name, kind : str
+    unit : str
+        Of the values in the object: the scene's unit, or "degrees". In the image they are px, or degrees.
+    value_image, value_object : float
+        The quantity itself, as the model projects it and in the object.
+    variance_image, variance_object : float
+        Variance (not sigma); infinite, with the reason in `status`, where it cannot be measured.
+    bias_image, bias_object : float
+        What the classic locators (``gradient``; ``canny`` nearly) find without noise, less the value; NaN where it is
+        not known. Circles count as unbiased.
+    nominal : float
+        The scene's, or the object's own.
+    tolerance : Tolerance or None
+    status : str
+        As of `Prediction`, from the edges and circles that the quantity needs.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    value_image: float
+    value_object: float
+    variance_image: float
+    variance_object: float
+    bias_image: float
+    bias_object: float
+    nominal: float
+    tolerance: Tolerance | None
+    status: str
+
+    @property
+    def ratio(self) -> float | None:
+        """Standard deviation over half of the tolerance zone; None without a tolerance."""
+        return None if self.tolerance is None else float(np.sqrt(self.variance_object)) / self.tolerance.half
+
+
+def unit_of(scene: Scene, quantity: Quantity) -> str:
+    """Of a quantity in the object: the scene's unit of length, or degrees."""
+    return "degrees" if quantity.is_angle else getattr(scene, "units", "cm")
+
+
+def forecasts(
+    scene: Scene, evaluated: Errors, edge_status: dict[str, str], biases: tuple[np.ndarray, np.ndarray]
+) -> tuple[Forecast, ...]:
+    """One for each quantity of one picture, from the errors, the edges' statuses, and biases in image and object."""
+    known = evaluated.measurands
+    crowds = zip(known.circles, evaluated.crowded, strict=False)
+    edge_status = edge_status | {name: "clutter" for name, crowded in crowds if crowded}
+    found = []
+    for m, quantity in enumerate(known.quantities):
+        nominal = known.value_object[m] if quantity.nominal is None else quantity.nominal
+        found.append(
+            Forecast(
+                name=quantity.name,
+                kind=quantity.kind,
+                unit=unit_of(scene, quantity),
+                value_image=float(known.value[m]),
+                value_object=float(known.value_object[m]),
+                variance_image=float(evaluated.variances[m]),
+                variance_object=float(evaluated.variances_object[m]),
+                bias_image=float(biases[0][m]),
+                bias_object=float(biases[1][m]),
+                nominal=float(nominal),
+                tolerance=quantity.tolerance,
+                status=_status(known, quantity, edge_status, evaluated.variances[m]),
+            )
+        )
+    return tuple(found)
+
+
+def _status(known: Measurands, quantity: Quantity, edge_status: dict[str, str], variance: float) -> str:
+    states = [edge_status[name] for name in quantity.edges if name in edge_status]
+    if set(states) & set(_WORST_FIRST[:3]):
+        return min(states, key=_WORST_FIRST.index)
+    directions = dict(zip(known.view.names, unit_normals(known.view.along), strict=True))
+    corners = [feature for feature in quantity.features if isinstance(feature, Corner)]
+    sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
+    if min(sines, default=1.0) < _MIN_SINE:
+        states.append("ill_conditioned")
+    if not np.isfinite(variance) and "ill_conditioned" not in states:
+        states.append("not_visible")
+    return min(states, key=_WORST_FIRST.index, default="ok")
+
+
+def worst(forecasts: tuple[Forecast, ...]) -> str:
+    """The most serious of several statuses."""
+    return min((each.status for each in forecasts), key=_WORST_FIRST.index)

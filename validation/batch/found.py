@@ -1,0 +1,56 @@
+"""What a run has found of one quantity in one setting, and its status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from measure import status as statuses
+from validation import statistics
+
+STATUSES = tuple(sorted(statuses.ALL))
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one method measured in one setting.
+
+    Attributes
+    ----------
+    propagated : float
+        Predicted variance.
+    distances : ndarray, shape (n,)
+        Measured values, NaN where there is none.
+    failures : dict
+        Number of images by status, of those that are not ``ok``.
+    clean : str
+        Status of the noise-free image.
+    """
+
+    propagated: float
+    distances: np.ndarray
+    failures: dict[str, int]
+    clean: str
+
+
+def row_status(clean: str, others: dict[str, int], images: int) -> str:
+    """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.
+
+    Parameters
+    ----------
+    clean : str
+        Status of the noise-free image.
+    others : dict
+        Number of noisy images by status, of those that are not ``ok``.
+    images : int
+        Noisy images in all; `statistics.STRAY` of them may be lost.
+
+    Examples
+    --------
+    >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
+    ('ok', 'low_contrast')
+    """
+    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
+        return clean
+    return max(others, key=others.get)

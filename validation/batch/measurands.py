@@ -1,0 +1,154 @@
+"""Every measurand of a setting: what is predicted of it, and how it was measured, in the scene's unit."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import planner
+from measure.propagation import PropagatedValues
+from validation import statistics
+from validation.batch.found import STATUSES, Found, row_status
+
+FIELDS = ("paper", "calibrated", "bound")
+
+
+def column(method: str, number: int) -> str:
+    """Under which name a method's values of a measurand stand in a run file, in the scene's unit or degrees.
+
+    >>> column("gradient", 2)
+    'gradient:2'
+    """
+    return f"{method}:{number}"
+
+
+def predicted(forecasts: dict[str, planner.Prediction]) -> list[dict[str, Any]]:
+    """What the variance models say of each measurand, by model; variances in the object."""
+    told = []
+    for k, each in enumerate(forecasts["calibrated"].measurands):
+        variances = {model: forecasts[model].measurands[k].variance_object for model in FIELDS}
+        about = {"name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object}
+        told.append({**about, "predicted_bias": each.bias_object, **variances})
+    return told
+
+
+def propagated(method: str, found: PropagatedValues, spread: np.ndarray) -> dict[str, tuple[float, float, str]]:
+    """Variance, value and status of each measurand, with the scatter of the poses added, by `column`."""
+    return {
+        column(method, k): (float(found.covariance[k, k] + spread[k]), float(found.value[k]), state)
+        for k, state in enumerate(found.status)
+    }
+
+
+@dataclass(frozen=True)
+class JudgedMeasurand:
+    """One measurand of one setting, by the verdict's method, in the scene's unit or degrees.
+
+    ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
+    ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of
+    `Judged`. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    value: float
+    paper: float
+    calibrated: float
+    predicted: float
+    empirical: float | None
+    n: int
+    failed: int
+    ratio: float | None
+    ratio_interval: tuple[float, float] | None
+    bias: float | None
+    predicted_bias: float
+    bound: float
+    status: str
+    independent: float
+
+
+_NUMBERS = ("value", *FIELDS, "predicted_bias", "predicted", "empirical", "ratio", "bias", "independent", "low", "high")
+_RECORD = np.dtype(
+    [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
+)
+
+
+class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
+    """The measurands of each setting of a run, kept as columns and made when they are asked for."""
+
+    def __init__(self) -> None:
+        self._records, self._size, self._first = np.zeros(64, _RECORD), 0, array("q", [0])
+        self._about: dict[tuple[str, str, str], int] = {}  # name, kind and unit, which few settings differ in
+
+    def add(self, told: list[dict[str, Any]], found: list[Found]) -> None:
+        """Append a setting: what is predicted of each measurand (`predicted`), and what was measured."""
+        self._grow(len(told))
+        share = _independent([each.distances for each in found])
+        for about, each in zip(told, found, strict=True):
+            record, good = self._records[self._size], each.distances[np.isfinite(each.distances)]
+            key = about["name"], about["kind"], about["unit"]
+            record["about"] = self._about.setdefault(key, len(self._about))
+            for name in ("value", *FIELDS, "predicted_bias"):
+                record[name] = about[name]
+            record["predicted"], record["independent"] = each.propagated, share
+            record["empirical"] = np.var(good, ddof=1) if good.size > 1 else np.nan
+            record["bias"] = good.mean() - about["value"] if good.size else np.nan
+            record["n"], record["failed"] = each.distances.size, each.distances.size - good.size
+            record["status"] = STATUSES.index(row_status(each.clean, each.failures, each.distances.size))
+            self._size += 1
+        self._first.append(self._size)
+
+    def _grow(self, more: int) -> None:
+        if self._size + more > len(self._records):
+            self._records = np.concatenate([self._records, np.zeros(len(self._records) + more, _RECORD)])
+
+    def finish(self) -> None:
+        """Once all are there: all ratios and intervals at a time."""
+        found = self._records = self._records[: self._size]
+        usable = np.isfinite(found["empirical"]) & np.isfinite(found["predicted"]) & (found["predicted"] > 0)
+        found["ratio"] = np.nan
+        np.divide(found["empirical"], found["predicted"], out=found["ratio"], where=usable)
+        found["low"], found["high"] = statistics.ratio_intervals(found["ratio"], found["n"] - found["failed"])
+
+    def __len__(self) -> int:
+        return len(self._first) - 1
+
+    def __getitem__(self, which):
+        number = range(len(self))[which]
+        texts = list(self._about)
+        return tuple(_judged(record, texts) for record in self._records[self._first[number] : self._first[number + 1]])
+
+    @property
+    def are_single(self) -> bool:
+        """Whether there is one measurand a setting."""
+        return self._size == len(self)
+
+    def column(self, name: str) -> np.ndarray:
+        """A number of all measurands of all settings, NaN where there is none; ``ok`` as bool."""
+        return self._records["status"] == STATUSES.index("ok") if name == "ok" else self._records[name]
+
+
+def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:
+    name, kind, unit = texts[record["about"]]
+    known = {key: None if np.isnan(record[key]) else float(record[key]) for key in ("empirical", "ratio", "bias")}
+    return JudgedMeasurand(
+        name=name, kind=kind, unit=unit, n=int(record["n"]), failed=int(record["failed"]),
+        status=STATUSES[record["status"]],
+        ratio_interval=None if known["ratio"] is None else (float(record["low"]), float(record["high"])),
+        **{key: float(record[key]) for key in ("value", *FIELDS, "predicted_bias", "predicted", "independent")},
+        **known,
+    )  # fmt: skip
+
+
+def _independent(values: list[np.ndarray]) -> float:
+    """For how many independent sample variances each of M correlated ones counts: M over the sum of rho^2."""
+    together = np.stack(values)
+    together = together[:, np.isfinite(together).all(0)]
+    if len(together) < 2 or together.shape[1] < 3 or not (np.ptp(together, axis=1) > 0).all():
+        return 1.0
+    return len(together) / float((np.corrcoef(together) ** 2).sum())

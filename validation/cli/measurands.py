@@ -1,0 +1,74 @@
+"""The table of ``ice measure IMAGE SCENE``: each measurand with its uncertainty, and whether it keeps its tolerance."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+
+if TYPE_CHECKING:
+    import measure
+
+
+def facts(found: measure.Measurements) -> list[dict[str, Any]]:
+    """One record a measurand, of one image; null for what is not known."""
+    from validation.conformity import decide
+
+    rows = []
+    sigma, sigma_image = found.sigma, np.sqrt(np.einsum("mm->m", found.covariance_image))
+    for k, quantity in enumerate(found.quantities):
+        zone, nominal = quantity.tolerance, float(found.nominal[k])
+        good = bool(np.isfinite(found.value[k]))
+        value, spread = float(found.value[k]), float(sigma[k])
+        rows.append({
+            "name": quantity.name,
+            "kind": quantity.kind,
+            "unit": found.units[k],
+            "value": value if good else None,
+            "sigma": spread if good else None,
+            "value_image": float(found.value_image[k]) if good else None,
+            "sigma_image": float(sigma_image[k]) if good else None,
+            "nominal": nominal,
+            "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
+            "decision": zone and decide(value, spread, nominal, zone),
+            "status": str(found.status[k]),
+        })  # fmt: skip
+    return rows
+
+
+def covariance(found: measure.Measurements) -> list[list[float | None]]:
+    """Joint covariance of all values; null for what is not known."""
+    return [[float(v) if math.isfinite(v) else None for v in row] for row in found.covariance]
+
+
+def table(rows: list[dict[str, Any]]) -> Table:
+    """The same for a terminal."""
+    shown = Table(title="Measurands (+- 1 sigma)", title_justify="left", box=None, padding=(0, 1), title_style="bold",
+                  caption=_CAPTION, caption_justify="left")  # fmt: skip
+    for name in ("name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status"):
+        shown.add_column(name, justify="left" if name in ("name", "kind", "unit") else "right", no_wrap=True)
+    for row in rows:
+        digits = _digits(row["sigma"])
+        value = "-" if row["value"] is None else f"{row['value']:.{digits}f}"
+        sigma = "" if row["sigma"] is None else f"+- {row['sigma']:.{digits}f}"
+        nominal, zone = f"{row['nominal']:.6g}", row["tolerance"]
+        limits = "-" if zone is None else _limits(zone)
+        about = row["name"], row["kind"], value, sigma, row["unit"]
+        shown.add_row(*about, nominal, limits, row["decision"] or "-", row["status"])
+    return shown
+
+
+_CAPTION = "pass, fail: by more than the expanded uncertainty of 2 sigma within or beyond the tolerance (ISO 14253-1)."
+
+
+def _digits(sigma: float | None) -> int:
+    """Decimal places that show two digits of a standard deviation."""
+    return 4 if not sigma else int(np.clip(1 - math.floor(math.log10(sigma)), 0, 9))
+
+
+def _limits(zone: dict[str, float]) -> str:
+    if zone["plus"] == zone["minus"]:
+        return f"+-{zone['plus']:g}"
+    return f"+{zone['plus']:g} -{zone['minus']:g}"

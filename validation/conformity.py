@@ -1,0 +1,45 @@
+"""Does a measured value keep its tolerance? The decision rule of ISO 14253-1, with a guard band of k sigma."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from scenes import InvalidInput, Tolerance
+
+COVERAGE = 2.0  # k: the expanded uncertainty U = k sigma covers about 95 % of a normal distribution
+Decision = Literal["pass", "fail", "undecided"]
+
+
+def decide(value: float, sigma: float, nominal: float, tolerance: Tolerance, k: float = COVERAGE) -> Decision:
+    """Whether conformity is proved, disproved, or neither.
+
+    Parameters
+    ----------
+    value, sigma : float
+        Measured value and its standard deviation (not variance); NaN where nothing was measured.
+    nominal : float
+    tolerance : Tolerance
+        Of the same unit, as `nominal`.
+    k : float
+        Coverage factor, at least 0.
+
+    Returns
+    -------
+    {"pass", "fail", "undecided"}
+        ``pass`` where the value keeps both limits by k sigma, ``fail`` where it breaks one by more than that.
+
+    Examples
+    --------
+    >>> zone = Tolerance(plus=0.02, minus=0.02)
+    >>> [decide(value, 0.004, 10.0, zone) for value in (10.011, 10.013, 10.027, 10.029)]
+    ['pass', 'undecided', 'undecided', 'fail']
+    """
+    if not k >= 0:
+        raise InvalidInput(f"k must be at least 0, got {k}")
+    if not (math.isfinite(value) and math.isfinite(sigma)):
+        return "undecided"
+    inside = min(value - (nominal - tolerance.minus), nominal + tolerance.plus - value)
+    if inside >= k * sigma:
+        return "pass"
+    return "fail" if inside < -k * sigma else "undecided"
