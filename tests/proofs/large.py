@@ -18,6 +18,7 @@ import typer
 import scenes
 from validation.batch.campaign import Campaign, Grid
 from validation.batch.job import _identity
+from validation.batch.measurands import column
 from validation.batch.store import RunFile
 from validation.batch.work import Rendering, methods
 
@@ -62,7 +63,11 @@ def fabricate(settings: int, directory: Path) -> int:
     store.note("effects", {})
     every = range(len(campaign))
     predicted = {"paper": 0.1, "calibrated": _SIGMA_PX**2, "bound": _SIGMA_PX**2 / 2, "value_px": 60.0}
-    texts = json.dumps(predicted | {"predicted_bias": 0.0}), json.dumps({"predict": 0.01, "render": 0.1})
+    about = {"name": "distance", "kind": "distance", "unit": "cm", "value": 60.0, "predicted_bias": 0.0}
+    about |= {name: predicted[name] for name in ("paper", "calibrated", "bound")}
+    facts = predicted | {"predicted_bias": 0.0, "measurands": [about]}
+    texts = json.dumps(facts), json.dumps({"predict": 0.01, "render": 0.1})
+    names.append(column(names[0], 0))
 
     def distances() -> Iterator[tuple]:
         for index in every:

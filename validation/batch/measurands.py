@@ -79,10 +79,16 @@ _RECORD = np.dtype(
 
 
 class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
-    """The measurands of each setting of a run, kept as columns and made when they are asked for."""
+    """The measurands of each setting of a run, kept as columns and made when they are asked for.
 
-    def __init__(self) -> None:
-        self._records, self._size, self._first = np.zeros(64, _RECORD), 0, array("q", [0])
+    Parameters
+    ----------
+    settings : int
+        How many there may be.
+    """
+
+    def __init__(self, settings: int) -> None:
+        self._records, self._size, self._first = np.zeros(settings, _RECORD), 0, array("q", [0])
         self._about: dict[tuple[str, str, str], int] = {}  # name, kind and unit, which few settings differ in
 
     def add(self, told: list[dict[str, Any]], found: list[Found]) -> None:

@@ -93,7 +93,7 @@ class Rows(Sequence[Row]):
         self._records = np.zeros(len(campaign), _record(1))  # memory is taken where it is written to
         self._kinds: list[tuple[str, tuple[str, ...]]] = []  # scene and methods, which few settings differ in
         self._places: dict[tuple[str, tuple[str, ...]], int] = {}
-        self.measured = Measured()
+        self.measured = Measured(len(campaign))
 
     def add(self, index: int, scene: str, model: dict[str, Any], found: dict[str, Found], each: list[Found]) -> None:
         """Append a setting.
