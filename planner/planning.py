@@ -34,7 +34,7 @@ class Plan:
         Continuous if refined, else on the grid.
     objective, model : str
     variance : float
-        What was minimised: cm^2 or px^2 (degrees^2 for an angle).
+        What was minimised: the scene's unit squared or px^2 (degrees^2 for an angle).
     grid_sensor, grid_light, grid_variance
         The best pair of the grid.
     prediction : Prediction

@@ -14,7 +14,8 @@ from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
-from scenes import Corner, InvalidInput, Picture, Scene
+from scenes import Corner, InvalidInput, Picture, Scene, Unit
+from scenes.units import in_unit
 
 Objective = Literal["object", "image"]
 DEFAULT_OBJECTIVE: Objective = "object"
@@ -53,9 +54,9 @@ class Prediction:
     kind : str
         ``distance`` or ``angle``.
     value_image, value_object : float
-        The measurand itself, as the model projects it and in the object: px and cm, or degrees.
+        The measurand itself, as the model projects it and in the object: px and the scene's unit, or degrees.
     variance_image, variance_object : float
-        Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
+        Variance (not sigma): px^2 and unit^2, or degrees^2; infinite, with the reason in `status`, where it
         cannot be measured. The ``paper`` model is right only up to one factor common to all settings, and infinite
         only where an edge is hidden or without any contrast.
     bias_image : float
@@ -70,6 +71,8 @@ class Prediction:
     status : str
         ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
         is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
+    units : str
+        The scene's unit of length.
     """
 
     model: str
@@ -83,6 +86,7 @@ class Prediction:
     covariances: np.ndarray
     edges: tuple[EdgePrediction, ...]
     status: str
+    units: Unit = "cm"
 
     @property
     def value_px(self) -> float:
@@ -96,8 +100,8 @@ class Prediction:
 
     @property
     def variance_cm2(self) -> float:
-        """Variance of the physical length, cm^2."""
-        return self._of_a_distance("variance_cm2", self.variance_object)
+        """Variance of the physical length, cm^2 whatever the scene's unit."""
+        return self._of_a_distance("variance_cm2", self.variance_object) * in_unit(1.0, self.units, "cm") ** 2
 
     @property
     def bias_px(self) -> float:
@@ -126,8 +130,8 @@ def variances(
         Poses (polar, azimuth) in degrees, broadcast against each other.
     model : {"calibrated", "paper", "bound"}
     objective : {"object", "image"}
-        In the object (cm^2: px^2 over the squared derivative of the image's distance by the object's, both ends moving
-        apart alike) or in the image (px^2); degrees^2 for an angle.
+        In the object (unit^2: px^2 over the squared derivative of the image's distance by the object's, both ends
+        moving apart alike) or in the image (px^2); degrees^2 for an angle.
 
     Returns
     -------
@@ -210,6 +214,7 @@ def predict(
         covariances=_covariances(scene, evaluated),
         edges=edges,
         status=_status(scene, evaluated, edges),
+        units=scene.units,
     )
 
 

@@ -15,9 +15,10 @@ from scenes.picture import Picture
 from scenes.pose import Pose
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.units import Unit
 
 __all__ = [
     "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
-    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Scene", "Setting", "Solid", "Task", "block",
-    "load", "names",
+    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Scene", "Setting", "Solid", "Task", "Unit",
+    "block", "load", "names",
 ]  # fmt: skip

@@ -8,13 +8,16 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenes.lens import Lens
 from scenes.model import Model
-from scenes.ranges import Coordinate, Curve, Length, Level, rising
+from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
 
 MOST_PIXELS = 40_000_000  # 320 MB as float64
 
 
 class Camera(Model):
-    """A pinhole camera on a sphere around ``look_at`` (cm; the origin as in the paper), which it looks at, z axis up.
+    """A pinhole camera on a sphere around ``look_at`` (the origin as in the paper), which it looks at, z axis up.
+
+    Instead of ``width`` and ``height``, ``distance`` and ``focal_px`` a scene may say ``sensor_size_mm``,
+    ``working_distance_mm``, and ``focal_length_mm`` with ``pixel_pitch_um`` (`scenes.data_sheet.completed`).
 
     ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
     blur and ``exposure`` the grey level above darkness that the light gives a white diffuse surface at the reference
@@ -35,6 +38,10 @@ class Camera(Model):
     analyser_deg: float | None = None
     transmission: Curve = ()
     responsivity: Curve = ()
+    pixel_pitch_um: Positive | None = None
+    focal_length_mm: Positive | None = None
+    sensor_size_mm: tuple[Positive, Positive] | None = None
+    working_distance_mm: Positive | None = None
 
     @model_validator(mode="after")
     def _not_too_large(self) -> Camera:
@@ -43,6 +50,11 @@ class Camera(Model):
                 f"camera.width x height must be at most {MOST_PIXELS} pixels, got {self.width * self.height}"
             )
         return self
+
+    @property
+    def field_of_view(self) -> tuple[float, float]:
+        """Width and height of what it sees at its distance, in the scene's unit."""
+        return tuple(self.distance / self.focal_px * pixels for pixels in (self.width, self.height))
 
     @field_validator("transmission", "responsivity")
     @classmethod

@@ -1,6 +1,7 @@
 """Everything that a prediction, a render or a measurement has to know, in one checked description.
 
-Lengths in space are cm, lengths in the image px, brightness is in grey levels.
+Lengths in space are in the scene's unit (cm as in the paper, if it says none), lengths in the image px,
+brightness is in grey levels.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 from pydantic import Discriminator, Tag, model_validator
 
 from scenes.camera import Camera
+from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.lights import Light
 from scenes.materials import Material
@@ -24,6 +26,8 @@ from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.units import UNITS, Unit
+from scenes.view import check_view
 
 
 def _tag_of_object(value: Any) -> str:
@@ -59,6 +63,7 @@ class Scene(Model):
     """
 
     name: FileName
+    units: Unit = "cm"
     title: Title = ""
     object: Object
     material: Material
@@ -76,7 +81,7 @@ class Scene(Model):
     @property
     def solid(self) -> Solid:
         """Vertices, faces and edges of the object."""
-        return self.object.solid
+        return self.object.solid_in(self.units)
 
     @property
     def bodies(self) -> Solid:
@@ -89,7 +94,7 @@ class Scene(Model):
         return (self.light,)
 
     def position(self, role: Literal["sensor", "light"], pose: Pose) -> np.ndarray:
-        """Where the sensor or the light stands, cm, shape (3,): on a sphere around the reference point."""
+        """Where the sensor or the light stands, shape (3,): on a sphere around the reference point."""
         polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
         direction = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
         radius = (self.camera if role == "sensor" else self.light).distance
@@ -109,7 +114,7 @@ class Scene(Model):
             raise InvalidInput(f"{key or role}: {error}") from None
         if self.solid.height_above(self.position(role, pose)) <= 1e-6 * self.solid.extent:
             radius = (self.camera if role == "sensor" else self.light).distance
-            raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
+            raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} {self.units}")
         if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
             raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
@@ -127,8 +132,20 @@ class Scene(Model):
         rest = {key: value for key, value in camera.items() if key != "black_level"}
         return {**data, "camera": rest, "noise": {**noise, "dark_level": level}}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _as_on_a_data_sheet(cls, data: Any) -> Any:
+        """What a camera's data sheets say of its focal length in px, its width, height and distance."""
+        camera = data.get("camera") if isinstance(data, dict) else None
+        unit = data.get("units", "cm") if isinstance(data, dict) else None
+        if not isinstance(camera, dict) or unit not in UNITS:
+            return data
+        return {**data, "camera": completed(camera, unit)}
+
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
+        mesh = self.object if isinstance(self.object, Mesh) else None
+        check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
         self._check_task()
         self._check_surroundings()
         for i, setting in enumerate(self.settings):

@@ -29,8 +29,8 @@ class CheckedSetting:
     edges : tuple of str
         Required edges.
     calibrated, propagated : float
-        Predicted variance (not sigma) without and with the picture, in the plan's unit (cm^2 or px^2); infinite where
-        it cannot be measured.
+        Predicted variance (not sigma) without and with the picture, in the plan's unit (the scene's squared, or px^2);
+        infinite where it cannot be measured.
     status : str
         Of the measurement of the noise-free picture.
     without_formula : tuple of str

@@ -21,15 +21,15 @@ FORMATS = (".stl", ".ply", ".obj")
 MOST_BYTES = 32 << 20
 MOST_TRIANGLES = 20_000
 MOST_FACES = 2_000  # plane ones: what is computed grows with the square of their edges
-_FARTHEST = 1e9  # cm; beyond, its faces cannot be told to be flat
+_FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
 _PLAIN = {"obj": {"skip_materials": True}}
 _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
 _MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
 _ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
 
 
-def read(path: Path) -> Solid:
-    """Solid from an STL, PLY or OBJ file, lengths in cm.
+def read(path: Path, scale: float = 1.0) -> Solid:
+    """Solid from an STL, PLY or OBJ file, its lengths multiplied by ``scale``.
 
     Raises
     ------
@@ -55,6 +55,8 @@ def read(path: Path) -> Solid:
         raise InvalidInput(f"object.file must be a readable mesh, got {path} ({reason})") from None
     if isinstance(mesh, trimesh.Trimesh):
         _check_mesh(path, mesh)
+        if scale != 1:
+            mesh.vertices *= scale
     with np.errstate(all="ignore"):
         return solid(mesh)
 
@@ -77,7 +79,7 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
             f"object.file must be of at most {MOST_TRIANGLES} triangles, got {path} with {len(mesh.faces)}"
         )
     if len(mesh.vertices) and not (np.isfinite(mesh.vertices).all() and np.abs(mesh.vertices).max() <= _FARTHEST):
-        raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g} cm, got others in {path}")
+        raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g}, got others in {path}")
 
 
 def solid(mesh: trimesh.Trimesh) -> Solid:
@@ -126,7 +128,7 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
 
 
 def renamed(plain: Solid, names: dict[str, tuple[float, float, float]]) -> Solid:
-    """The same solid with the vertices nearest to the given positions (cm) named as wished."""
+    """The same solid with the vertices nearest to the given positions named as wished."""
     vertex_names = list(plain.vertex_names)
     for name, position in names.items():
         away = np.linalg.norm(plain.vertices - np.array(position), axis=1)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 commands = commands()
 _MOST_CHECKED = 1000
 
-Objective = Annotated[str, typer.Option(help="object (cm^2) or image (px^2)")]
+Objective = Annotated[str, typer.Option(help="object (the scene's unit, squared) or image (px^2)")]
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
 Model = Annotated[str, typer.Option(help="calibrated or paper")]
 Edges = Annotated[str, typer.Option(help="given, or best of all sets that measure the same")]

@@ -83,7 +83,8 @@ def _draw_map(figure, axis, plan, space, values, best, title) -> None:
     axis.set(aspect="equal", xlim=(-1.08, 1.08), ylim=(-1.08, 1.08), xticks=[], yticks=[])
     axis.set_title(f"{title}\nbest at {_short(best)}; rings: polar angle 30, 60, 90, rays: azimuth", fontsize=9)
     axis.axis("off")
-    unit = {"object": "cm", "image": "px"}[plan.objective] if plan.scene.task.kind == "distance" else "degrees"
+    length = plan.scene.units if plan.objective == "object" else "px"
+    unit = length if plan.scene.task.kind == "distance" else "degrees"
     figure.colorbar(shown, ax=axis, shrink=0.8, label=f"standard deviation, {unit}")
 
 

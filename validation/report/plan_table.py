@@ -44,7 +44,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
 
 def _units(found: planner.Plan) -> tuple[str, str]:
     """Of the measurand in the object and in the image."""
-    return ("cm", "px") if found.prediction.kind == "distance" else ("degrees", "degrees")
+    return (found.scene.units, "px") if found.prediction.kind == "distance" else ("degrees", "degrees")
 
 
 def _trace(found: planner.Plan, units: tuple[str, str]) -> Table:
