@@ -158,7 +158,7 @@ class Scene(Model):
             check = self._check_corner if isinstance(feature, Corner) else self._check_centre
             check(f"task.{end}", feature)
         if self.task.kind == "angle":
-            known = [edge.name for edge in self.solid.edges]
+            known = [edge.name for edge in self.solid.sharp]
             for name in self.task.lines:
                 if name not in known:
                     raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")
@@ -188,8 +188,9 @@ class Scene(Model):
             raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")
 
     def _check_corner(self, key: str, corner: Corner) -> None:
-        if corner.vertex not in self.solid.vertex_names:
-            raise ValueError(f"{key}.vertex must be one of {', '.join(self.solid.vertex_names)}, got {corner.vertex!r}")
+        known = self.solid.corner_names
+        if corner.vertex not in known:
+            raise ValueError(f"{key}.vertex must be one of {', '.join(known)}, got {corner.vertex!r}")
         there = [edge.name for edge in self.solid.edges_at(corner.vertex)]
         for name in corner.edges:
             if name not in there:
