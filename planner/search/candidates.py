@@ -15,7 +15,7 @@ _APART = 15.0  # degrees between two sensors, or two lights, that are clearly di
 
 @dataclass(frozen=True)
 class Candidate:
-    """A setting worth considering: poses, required edges, its variance in the object (unit^2) and in the image (px^2)."""
+    """A setting worth considering: poses, required edges, its variance in the object and in the image."""
 
     sensor: Pose
     light: Pose

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
@@ -26,7 +26,7 @@ class Mesh(Model):
     units: Unit | None = None
     names: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
 
-    _made: tuple[tuple, Solid] | None = PrivateAttr(None)  # what the file held when it was read
+    _made: _Made | None = PrivateAttr(None)  # what the file held when it was read
 
     def __hash__(self) -> int:
         return hash((self.file, self.units, tuple(sorted(self.names.items()))))
@@ -52,10 +52,20 @@ class Mesh(Model):
 
     def solid_in(self, unit: Unit | None) -> Solid:
         """The same in another unit; read once."""
-        from scenes.parts import mesh  # loads trimesh
-
         scale = 1.0 if None in (unit, self.units) else in_unit(1.0, self.units, unit)
-        key = self.file, scale, tuple(self.names.items())
-        if self._made is None or self._made[0] != key:
-            self._made = key, mesh.renamed(mesh.read(self.file, scale), self.names)
-        return self._made[1]
+        made = self._made
+        if made is None or not (made.file is self.file and made.names is self.names and made.scale == scale):
+            from scenes.parts import mesh  # loads trimesh
+
+            made = _Made(self.file, self.names, scale, mesh.renamed(mesh.read(self.file, scale), self.names))
+            self._made = made
+        return made.solid
+
+
+class _Made(NamedTuple):
+    """A solid, and what it was read from."""
+
+    file: Path
+    names: dict[str, tuple[float, float, float]]
+    scale: float
+    solid: Solid
