@@ -51,7 +51,7 @@ def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
 
     What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
     """
-    towards = above(positions, solid.normals, solid.offsets).reshape(-1, len(solid.faces)).any(0)
+    towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
     towards[list(edge.faces)] = False
     triangles = solid.triangles[towards[solid.triangle_faces]]
     start, stop = (solid.vertices[end] - positions for end in edge.ends)
@@ -60,7 +60,7 @@ def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
         normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
     sides = _coordinates(triangles, positions, normal)
     some = (sides.max(-1) >= 0) & (sides.min(-1) < 0)  # the others do not reach the plane of position and edge
-    some = some.reshape(-1, len(triangles)).any(0)
+    some = some.any(tuple(range(some.ndim - 1)))
     a, b = (
         _coordinates(triangles[some], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start))
     )
