@@ -45,12 +45,12 @@ def _flat(corners: np.ndarray, holes: list[Hole], height: float, more: np.ndarra
     clear = [p for p in more if all(np.hypot(p[0] - h.x, p[1] - h.y) > 1.02 * h.radius for h in holes)]
     points = np.concatenate([corners, *(hole.rim(0)[:, :2] for hole in holes), np.array(clear).reshape(-1, 2)])
     found = points[Delaunay(points).simplices]
-    inside = found.mean(1)
     for hole in holes:
         chord = hole.radius * (1 + 1e-9)
         own = (np.hypot(found[..., 0] - hole.x, found[..., 1] - hole.y) <= chord).all(1)
-        found, inside = found[~own], inside[~own]
-    ways = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+        found = found[~own]
+    one, two = found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]
+    ways = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     found = found[np.abs(ways) > 1e-12]
     ways = ways[np.abs(ways) > 1e-12]
     found = np.where((ways > 0)[:, None, None] == up, found, found[:, ::-1])

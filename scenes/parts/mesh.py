@@ -23,7 +23,7 @@ from scenes.parts.solid import Circle, Edge, Solid
 
 FORMATS = (".stl", ".ply", ".obj")
 MOST_BYTES = 32 << 20
-MOST_TRIANGLES = 20_000
+MOST_TRIANGLES = 100_000
 MOST_FACES = 2_000  # plane ones: what is computed grows with the square of their edges
 _FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
 _PLAIN = {"obj": {"skip_materials": True}}
