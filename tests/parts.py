@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay
 
 @dataclass(frozen=True)
 class Hole:
-    """A round hole along z: centre (x, y), radius, angles of its rim's vertices, and the heights that it runs between."""
+    """A round hole along z: centre (x, y), radius, angles of its rim's vertices, heights that it runs between."""
 
     x: float
     y: float
@@ -70,7 +70,7 @@ def prism(profile: list[tuple[float, float]], width: float, holes: list[Hole] = 
     Parameters
     ----------
     profile : list of (x, z)
-        Each point is seen from the first one and from the last one's side: a fan of triangles about the first covers it.
+        A fan of triangles about the first point has to cover it.
     width : float
         From y = 0.
     holes : list of Hole

@@ -29,4 +29,4 @@ def test_only_what_nothing_is_measured_by_gets_fewer_rays(name, monkeypatch):
     assert off.max() < 0.12 * contrast
     if name != "plate":
         found = [measure.distance(image, scene, *poses, "gradient") for image in (whole, sparse)]
-        assert abs(found[0].value_px - found[1].value_px) < 0.3 * np.sqrt(found[0].variance_px2)
+        assert abs(found[0].value_px - found[1].value_px) < 0.5 * np.sqrt(found[0].variance_px2)

@@ -80,7 +80,7 @@ def rounded(steps, radius=4.0):
 
 @pytest.mark.parametrize("steps", [3, 8, 40])
 def test_a_fillet_has_no_sharp_edges_of_its_own(steps):
-    """Its facets, and where it runs into the planes beside it, are smooth; its ends are curved. Eleven edges are left."""
+    """Its facets, and where it runs into the planes beside it, are smooth; its ends are curved: 11 are left."""
     solid = mesh.solid(rounded(steps))
     assert len(solid.sharp) == 11
     kinds = [edge.kind for edge in solid.edges]
