@@ -4,7 +4,7 @@ from scenes.camera import Camera
 from scenes.errors import InvalidInput
 from scenes.lens import Lens
 from scenes.lights import Light
-from scenes.load import load, names
+from scenes.load import find, load, names
 from scenes.materials import Material
 from scenes.measurands import Centre, Corner, Locator, Task
 from scenes.noise import Noise
@@ -15,10 +15,35 @@ from scenes.picture import Picture
 from scenes.pose import Pose
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
-from scenes.units import Unit
+from scenes.units import UNITS, Unit
 
 __all__ = [
-    "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
-    "Locator", "Material", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Scene", "Setting", "Solid", "Task", "Unit",
-    "block", "load", "names",
+    "UNITS",
+    "Block",
+    "Camera",
+    "Centre",
+    "Circle",
+    "Corner",
+    "Edge",
+    "Floor",
+    "InvalidInput",
+    "Jitter",
+    "Lens",
+    "Light",
+    "Locator",
+    "Material",
+    "Mesh",
+    "Noise",
+    "Obstacle",
+    "Picture",
+    "Pose",
+    "Scene",
+    "Setting",
+    "Solid",
+    "Task",
+    "Unit",
+    "block",
+    "find",
+    "load",
+    "names",
 ]  # fmt: skip

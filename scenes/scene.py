@@ -43,12 +43,16 @@ def _bodies(measured: Solid, obstacles: tuple[Obstacle, ...]) -> Solid:
 
 
 class Setting(Model):
-    """One pair of sensor and light, with what the paper printed for it (variances, px^2)."""
+    """One pair of sensor and light, with what the paper printed for it."""
 
     sensor: PoseField
+    """Polar angle and azimuth [degrees]."""
     light: PoseField
+    """The same of the light [degrees]."""
     paper_ice: Positive | None = None
+    """The paper's predicted variance [px^2]."""
     paper_real: tuple[Positive, Positive] | None = None
+    """The paper's measured variances, for both thresholds [px^2]."""
 
 
 class Scene(Model):
@@ -63,20 +67,35 @@ class Scene(Model):
     """
 
     name: FileName
+    """The file's name where not given."""
     units: Unit = "cm"
+    """Unit of all lengths in space."""
     title: Title = ""
+    """What it is about, for tables."""
     object: Object
+    """What is measured."""
     material: Material
+    """Of the object and the obstacles."""
     camera: Camera
+    """The camera."""
     light: Light
+    """The light."""
     noise: Noise
+    """The sensor's noise."""
     task: Task
+    """What is measured."""
     locator: Locator = Locator()
+    """How edge points are found."""
     settings: tuple[Setting, ...] = ()
+    """Poses to predict, render and measure."""
     same_scale: tuple[str, ...] = ()
+    """Scenes whose settings share the paper's free scale with this one's."""
     floor: Floor | None = None
+    """What the object stands on; left out: darkness."""
     obstacles: tuple[Obstacle, ...] = ()
+    """What stands beside it."""
     jitter: Jitter = Jitter()
+    """How exactly poses are set."""
 
     @property
     def solid(self) -> Solid:

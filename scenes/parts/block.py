@@ -15,7 +15,9 @@ class Block(Model):
     """A rectangular block with a corner at the origin and its sides along the axes."""
 
     kind: Literal["block"] = "block"
+    """A block."""
     size: tuple[Length, Length, Length]
+    """Along x, y and z [length]."""
 
     @property
     def solid(self) -> Solid:

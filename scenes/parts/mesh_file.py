@@ -14,17 +14,19 @@ from scenes.units import Unit, in_unit
 
 
 class Mesh(Model):
-    """A polyhedron from a mesh file (STL, PLY or OBJ).
+    """A part from a mesh file (STL, PLY or OBJ).
 
-    ``file`` is relative to the scene's file, ``units`` the unit of its numbers (the scene's where not given).
-    Vertices, edges and circles get the names that `scenes.mesh.solid` gives; ``names`` may give vertices (by their
-    position, in the scene's unit) other ones.
+    Vertices, edges and circles get the names that `scenes.parts.mesh.solid` gives; ``ice show`` lists them.
     """
 
     kind: Literal["mesh"]
+    """A mesh."""
     file: Path
+    """Relative to the scene's file."""
     units: Unit | None = None
+    """Of the file's numbers; the scene's where not given."""
     names: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
+    """Names of its own for vertices, by their position [length]."""
 
     _made: _Made | None = PrivateAttr(None)  # what the file held when it was read
 
