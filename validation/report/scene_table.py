@@ -49,7 +49,8 @@ def report(scene: Scene) -> Group:
     view = " x ".join(f"{x:.4g}" for x in camera.field_of_view)
     parts = [
         Text(
-            f"{scene.title or scene.name}\nObject {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
+            f"{scene.title or scene.name}\n"
+            f"Object {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
         )
     ]
     corners = _table(f"\nVertices, {unit}", "name", "x", "y", "z")
