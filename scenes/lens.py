@@ -19,7 +19,10 @@ def _row(value: Any) -> Any:
 
 
 Coefficient = Annotated[float, Field(ge=-10, le=10)]
-Distortion = Annotated[tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient], BeforeValidator(_row)]
+Distortion = Annotated[
+    tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient],
+    BeforeValidator(_row, json_schema_input_type=float | list[float]),
+]
 
 
 class Lens(Model):

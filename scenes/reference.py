@@ -102,8 +102,6 @@ def _kind(facts: dict[str, Any], whole: dict[str, Any]) -> str:
     """Type of a value in words, models by their name."""
     if "$ref" in facts:
         name = facts["$ref"].rsplit("/", 1)[-1]
-        if name in ("Pose",):
-            return "pair"
         return f"[{name}](#{name.lower()})"
     for several in ("anyOf", "oneOf"):
         if several in facts:
