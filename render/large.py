@@ -20,6 +20,7 @@ from render.adaptive import MISSED, crossed
 from scenes import Picture
 
 LARGE = 1 << 20  # pixels of an image whose fine pixels are not all rendered
+LARGE_RANDOM = 1 << 17  # the same where a single ray is random, and each fine pixel needs many
 _BESIDE = 16  # rays of a fine pixel that an edge crosses which nothing is measured by
 
 
@@ -44,13 +45,14 @@ class Renders:
     random: bool
 
 
-def is_large(crop: tuple[slice, slice], supersample: int) -> bool:
+def is_large(crop: tuple[slice, slice], supersample: int, random: bool = False) -> bool:
     """Whether an image is so large that its fine pixels are rendered only near edges.
 
     >>> is_large((slice(0, 2048), slice(0, 2448)), 1), is_large((slice(0, 1024), slice(0, 1024)), 4)
     (True, False)
     """
-    return math.prod((part.stop - part.start) // supersample for part in crop) > LARGE
+    pixels = math.prod((part.stop - part.start) // supersample for part in crop)
+    return pixels > (LARGE_RANDOM if random else LARGE)
 
 
 def fine_pixels(

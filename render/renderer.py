@@ -149,7 +149,7 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
 
     few = quality.random_samples or 16
     bounces = SURFACES - 1 if "interreflection" in active else 0
-    large = is_large(crop, k)
+    large = is_large(crop, k, sharp != active)
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, *((LARGE_AT_ONCE,) if large else ()))
 
     def load(active, samples, textures=None, divided=1):

@@ -46,7 +46,7 @@ class Setting(Model):
     """One pair of sensor and light, with what the paper printed for it."""
 
     sensor: PoseField
-    """Polar angle and azimuth [degrees]."""
+    """Polar angle (0 to 180) and azimuth [degrees]."""
     light: PoseField
     """The same of the light [degrees]."""
     paper_ice: Positive | None = None
