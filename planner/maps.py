@@ -40,7 +40,7 @@ def variance_map(
     Returns
     -------
     ndarray, shape (len(space),)
-        cm^2 or px^2 (degrees^2 for an angle); infinite where it cannot be measured.
+        The scene's unit squared, or px^2 (degrees^2 for an angle); infinite where it cannot be measured.
 
     Raises
     ------

@@ -35,8 +35,8 @@ class Plan:
         Continuous if refined, else on the grid.
     objective, over, model : str
     variance : float
-        What was minimised: cm^2 or px^2 (degrees^2 for an angle); of several measurands the squared ratio of standard
-        deviations to tolerances, the largest or their weighted sum.
+        What was minimised: the scene's unit squared or px^2 (degrees^2 for an angle); of several measurands the squared
+        ratio of standard deviations to tolerances, the largest or their weighted sum.
     limiting : str
         Name of the measurand that limits the plan: with the largest such ratio.
     grid_sensor, grid_light, grid_variance
@@ -119,7 +119,7 @@ def plan(
         Grid step. By default 1 where a bound makes the exhaustive search fast (convex, diffuse, straight edges), else
         10 degrees with refinement from the three best settings.
     constraints : Constraints, optional
-        By default the upper hemisphere.
+        By default the upper hemisphere, where the bodies of camera and light are clear of each other.
     sensor, light : Pose or pair, optional
         Hold one fixed.
     start : Pose or pair
@@ -144,6 +144,7 @@ def plan(
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
     constraints = constraints or Constraints()
+    sensor, light = _fixed(scene, constraints, sensor, light)
     tasks = required_edges(scene) if edges == "best" else ()
     worlds = [with_task(scene, task) for task in tasks] or [scene]
     options = [_Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
@@ -163,6 +164,20 @@ def _keep(role: str, poses: np.ndarray, allowed: np.ndarray) -> None:
     """See that a pose that is held fixed is one that the constraints allow."""
     if not allowed.all():
         raise InvalidInput(f"{role} must keep the constraints, got {Pose(*map(float, poses[0]))}")
+
+
+def _fixed(scene: Scene, constraints: Constraints, sensor: Any, light: Any) -> tuple[Any, Any]:
+    """The poses that are held fixed, once they keep the constraints on pairs; on one mount the one says the other."""
+    if constraints.same_mount:
+        sensor, light = (light if sensor is None else sensor), (sensor if light is None else light)
+    if sensor is not None and light is not None:
+        poses = [scene.check_pose(*pair) for pair in (("sensor", sensor), ("light", light))]
+        if not constraints.pairs(scene, *(np.array(list(pose)) for pose in poses)):
+            raise InvalidInput(
+                f"sensor and light must keep the constraints on both (mount, separation, bodies, view), got {poses[0]}"
+                f" and {poses[1]}"
+            )
+    return sensor, light
 
 
 def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
@@ -212,10 +227,11 @@ class _Option:
 
     def search(self, aim: Aim, search: str, start: Any, report: Report | None) -> _Result:
         partial = found = None
-        plain = self.free and not self.constraints.on_pairs
+        plain = self.free and not self.constraints.coupled
         if plain:
             spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
-            partial = alternate(self.scene, *spaces, np.array(list(Pose.of(start))), self.model, aim)
+            begin, limits = np.array(list(Pose.of(start))), self.constraints
+            partial = alternate(self.scene, *spaces, begin, self.model, aim, constraints=limits)
         if search == "exhaustive" or not plain:
             found = exhaustive(self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report)
         best = found or partial

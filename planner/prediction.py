@@ -18,7 +18,8 @@ from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
-from scenes import Centre, Corner, InvalidInput, Picture, Scene
+from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit
+from scenes.units import in_unit
 
 __all__ = ["DEFAULT_OBJECTIVE", "EdgePrediction", "Objective", "Prediction", "minimised", "predict", "variances"]
 
@@ -57,9 +58,9 @@ class Prediction:
     kind : str
         ``distance``, ``width``, ``offset``, ``angle``, ``diameter`` or ``position``.
     value_image, value_object : float
-        The measurand itself, as the model projects it and in the object: px and cm, or degrees.
+        The measurand itself, as the model projects it and in the object: px and the scene's unit, or degrees.
     variance_image, variance_object : float
-        Variance (not sigma): px^2 and cm^2, or degrees^2; infinite, with the reason in `status`, where it
+        Variance (not sigma): px^2 and unit^2, or degrees^2; infinite, with the reason in `status`, where it
         cannot be measured. The ``paper`` model is right only up to one factor common to all settings, and infinite
         only where an edge is hidden or without any contrast.
     bias_image : float
@@ -81,6 +82,8 @@ class Prediction:
     covariance, covariance_object : ndarray, shape (M, M)
         Joint covariance of all quantities in the image and in the object; infinite on the diagonal, NaN beside it,
         where a quantity cannot be measured.
+    units : str
+        The scene's unit of length.
     """
 
     model: str
@@ -97,6 +100,7 @@ class Prediction:
     measurands: tuple[Forecast, ...]
     covariance: np.ndarray
     covariance_object: np.ndarray
+    units: Unit = "cm"
 
     @property
     def value_px(self) -> float:
@@ -110,8 +114,8 @@ class Prediction:
 
     @property
     def variance_cm2(self) -> float:
-        """Variance of the physical length, cm^2."""
-        return self._of_a_distance("variance_cm2", self.variance_object)
+        """Variance of the physical length, cm^2 whatever the scene's unit."""
+        return self._of_a_distance("variance_cm2", self.variance_object) * in_unit(1.0, self.units, "cm") ** 2
 
     @property
     def bias_px(self) -> float:
@@ -151,8 +155,8 @@ def variances(
         Poses (polar, azimuth) in degrees, broadcast against each other.
     model : {"calibrated", "paper", "bound"}
     objective : {"object", "image"}
-        On the plane of the features in the object (cm^2) or in the image (px^2); degrees^2 for an angle. Of several
-        measurands the largest squared ratio of a standard deviation to its tolerance.
+        On the plane of the features in the object (the scene's unit squared) or in the image (px^2); degrees^2 for an
+        angle. Of several measurands the largest squared ratio of a standard deviation to its tolerance.
 
     Returns
     -------
@@ -241,6 +245,7 @@ def predict(
         measurands=told,
         covariance=covariance,
         covariance_object=covariance_object,
+        units=scene.units,
     )
 
 

@@ -14,6 +14,7 @@ from planner.imaging.projection import project
 from render.rays import Rays
 from scenes import Picture
 
+MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed the tip of a corner from a refined one
 STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 
 

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from render.adaptive import crossed
+from render.adaptive import MISSED, crossed
 
 _SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels
 _SENSOR = {"perspective": 20, "thinlens": 200}  # rays that take as long as making a sensor
-_MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed the tip of a corner from a refined one
 _AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
 
 
@@ -48,13 +47,22 @@ def refine_tiles(
     seed : int
         The same gives the same image, bit by bit, whatever the number of processor cores.
     """
-    first = _mosaic(mitsuba, scene, view, start, fine, marked, samples, (seed, 0))
-    missed = crossed(first, step=_MISSED) & ~marked
-    return _mosaic(mitsuba, scene, view, start, first, missed, samples, (seed, 1))
+    first = mosaic(mitsuba, scene, view, start, fine, marked, samples, (seed, 0))
+    missed = crossed(first, step=MISSED) & ~marked
+    return mosaic(mitsuba, scene, view, start, first, missed, samples, (seed, 1))
 
 
-def _mosaic(mitsuba, scene, view, start, fine, marked, samples, seed: tuple[int, int]) -> np.ndarray:
-    """The image with the tiles that hold a marked fine pixel rendered again."""
+def mosaic(
+    mitsuba: Any,
+    scene: Any,
+    view: dict,
+    start: tuple[int, int],
+    fine: np.ndarray,
+    marked: np.ndarray,
+    samples: int,
+    seed: tuple[int, int],
+) -> np.ndarray:
+    """The image with the tiles that hold a marked fine pixel rendered again; parameters as of `refine_tiles`."""
     lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
     side = _side(marked, samples, _SENSOR[view["type"]], frame.min() if lens else max(_SIDES))
     corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import qmc
 
 _AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
+LARGE_AT_ONCE = 1 << 22  # the same beside a large image
 SURFACES = 8  # that light may meet; the ninth would add less than reflectance^8 of the first
 _DIMENSIONS = 4  # of a reflection: where on the light, which way to the next surface
 
@@ -36,6 +37,8 @@ class Rays:
     bounces : int
         Surfaces that light may meet before the one that is seen, less than `SURFACES`.
     seed : int
+    at_once : int
+        Rays in one call, which bounds the memory.
     """
 
     mitsuba: Any
@@ -43,6 +46,7 @@ class Rays:
     most: int
     bounces: int
     seed: int
+    at_once: int = _AT_ONCE
 
     def radiance(
         self, scene: Any, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int], samples: int
@@ -63,7 +67,7 @@ class Rays:
         -------
         ndarray, shape (n,)
         """
-        share = max(_AT_ONCE // samples, 1)
+        share = max(self.at_once // samples, 1)
         parts = [slice(first, first + share) for first in range(0, rows.size, share)]
         found = [self._part(scene, rows[part], columns[part], shape, samples, part.start) for part in parts]
         return np.concatenate(found) if found else np.zeros(0)

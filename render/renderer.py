@@ -14,11 +14,12 @@ from planner.imaging.projection import depth, project_ideal
 from render import variant as variants
 from render.adaptive import crossed, near_edges, refine
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
-from render.mosaic import refine_tiles
+from render.large import Renders, fine_pixels, is_large
+from render.mosaic import mosaic, refine_tiles
 from render.optics import blur_and_bin
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
-from render.rays import SURFACES, Rays
+from render.rays import LARGE_AT_ONCE, SURFACES, Rays
 from scenes import InvalidInput, Picture, Scene
 
 
@@ -144,25 +145,47 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
     textures = textured(picture, sharp) if scalar and active & CUSTOM else None
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
     many = quality.edge_samples or (16 if interpreted else 64 if scalar and textures is None else 256)
+    samples = quality.samples or (1 if scalar else 4)
 
-    def load(active, samples, textures=None):
-        parts = description(mitsuba, picture, active, size, crop, samples, textures)
+    few = quality.random_samples or 16
+    bounces = SURFACES - 1 if "interreflection" in active else 0
+    large = is_large(crop, k, sharp != active)
+    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, *((LARGE_AT_ONCE,) if large else ()))
+
+    def load(active, samples, textures=None, divided=1):
+        film = tuple(n // divided for n in size), tuple(slice(p.start // divided, p.stop // divided) for p in crop)
+        parts = description(mitsuba, picture, active, *film, samples, textures)
         return mitsuba.load_dict(parts, parallel=False)
 
     def rendered(loaded) -> np.ndarray:
         return np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]
 
-    loaded = load(sharp, quality.samples or (1 if scalar else 4), textures)
+    def again(loaded, active, fine, marked, rays_each, tiles=refine_tiles, seed=quality.seed) -> np.ndarray:
+        if not scalar:
+            return refine(loaded, rays, fine, marked, rays_each)
+        seen, start = view(mitsuba, picture, active, size, crop, rays_each), (crop[0].start, crop[1].start)
+        return tiles(mitsuba, loaded, seen, start, fine, marked, rays_each, seed)
+
+    def whole(active, count, textures) -> np.ndarray:
+        loaded = load(active, count, textures, k)
+        if scalar:
+            return rendered(loaded)
+        pixels = np.zeros(tuple((part.stop - part.start) // k for part in crop))
+        return refine(loaded, rays, pixels, np.ones(pixels.shape, bool), count)
+
+    if large:
+        scenes_ = {False: (load(sharp, samples, textures), sharp), True: (load(active, few), active)}
+        renders = Renders(
+            lambda random, count: whole(scenes_[random][1], count, None if random else textures),
+            lambda random, *what: again(*scenes_[random], *what, mosaic, (quality.seed, 0)),
+            k, sharp != active,
+        )  # fmt: skip
+        return fine_pixels(picture, crop, renders, math.ceil(k * _defocus(picture)), (samples, few, many))
+    loaded = load(sharp, samples, textures)
     fine = rendered(loaded)
     marked = crossed(fine, math.ceil(k * _defocus(picture)))
-    few = quality.random_samples or 16
-    bounces = SURFACES - 1 if "interreflection" in active else 0
-    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed)
     if sharp != active:
         loaded = load(active, few)
         marked |= near_edges(picture, crop, k)
         fine = rendered(loaded) if scalar else refine(loaded, rays, fine, np.ones_like(marked), few)
-    if scalar:
-        seen, start = view(mitsuba, picture, active, size, crop, many), (crop[0].start, crop[1].start)
-        return refine_tiles(mitsuba, loaded, seen, start, fine, marked, many, quality.seed)
-    return refine(loaded, rays, fine, marked, many)
+    return again(loaded, active, fine, marked, many)

@@ -4,7 +4,7 @@ from scenes.camera import Camera
 from scenes.errors import InvalidInput
 from scenes.lens import Lens
 from scenes.lights import Light
-from scenes.load import load, names
+from scenes.load import find, load, names
 from scenes.materials import Material
 from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
 from scenes.noise import Noise
@@ -15,9 +15,10 @@ from scenes.picture import Picture
 from scenes.pose import Pose
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.units import UNITS, Unit
 
 __all__ = [
-    "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens", "Light",
-    "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene", "Setting",
-    "Side", "Solid", "Task", "Tolerance", "block", "load", "names",
+    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens",
+    "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene",
+    "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
 ]  # fmt: skip

@@ -8,33 +8,48 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenes.lens import Lens
 from scenes.model import Model
-from scenes.ranges import Coordinate, Curve, Length, Level, rising
+from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
 
 MOST_PIXELS = 40_000_000  # 320 MB as float64
 
 
 class Camera(Model):
-    """A pinhole camera on a sphere around ``look_at`` (cm; the origin as in the paper), which it looks at, z axis up.
+    """A pinhole camera on a sphere around ``look_at``, which it looks at, z axis up.
 
-    ``focal_px`` is the focal length in pixels, ``blur_px`` the standard deviation of the lens' Gaussian
-    blur and ``exposure`` the grey level above darkness that the light gives a white diffuse surface at the reference
-    point ``look_at`` that faces it. ``analyser_deg`` is the direction that an ideal linear polariser in front of the
-    lens lets through, from the image's x towards its y.
-    ``transmission`` (of the lens) and ``responsivity`` (of the sensor) are C and S of eq. 1 by wavelength, rows
-    [nm, relative value], constant where not given.
+    Instead of ``width`` and ``height``, ``distance`` and ``focal_px`` a scene may say ``sensor_size_mm``,
+    ``working_distance_mm``, and ``focal_length_mm`` with ``pixel_pitch_um`` (`scenes.data_sheet.completed`).
     """
 
     width: Annotated[int, Field(ge=1, le=16384)]
+    """Width of the image [px]."""
     height: Annotated[int, Field(ge=1, le=16384)]
+    """Height of the image [px]."""
     focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
+    """Focal length: distance of the image from the lens over the pixel pitch [px]."""
     distance: Length
+    """From ``look_at`` [length]."""
     blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
+    """Standard deviation of the lens' Gaussian blur [px]."""
     exposure: Level = 200.0
+    """What the light adds to darkness on a white diffuse surface at ``look_at`` that faces it [grey levels]."""
     look_at: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
+    """The point that it looks at, centre of the spheres of poses; the origin as in the paper [length]."""
     lens: Lens = Lens()
+    """What makes the lens more than a pinhole."""
     analyser_deg: float | None = None
+    """Direction that an ideal polariser before the lens lets through, from the image's x to its y [degrees]."""
     transmission: Curve = ()
+    """Of the lens by wavelength, C of eq. 1: rows [nm, relative value]; constant where not given."""
     responsivity: Curve = ()
+    """Of the sensor by wavelength, S of eq. 1: rows [nm, relative value]; constant where not given."""
+    pixel_pitch_um: Positive | None = None
+    """From one pixel to the next, as on the data sheet [um]."""
+    focal_length_mm: Positive | None = None
+    """The lens' focal length, as engraved; it is focused at ``distance`` [mm]."""
+    sensor_size_mm: tuple[Positive, Positive] | None = None
+    """Width and height of the sensor; says ``width`` and ``height`` with the pitch [mm]."""
+    working_distance_mm: Positive | None = None
+    """The same as ``distance`` [mm]."""
 
     @model_validator(mode="after")
     def _not_too_large(self) -> Camera:
@@ -43,6 +58,11 @@ class Camera(Model):
                 f"camera.width x height must be at most {MOST_PIXELS} pixels, got {self.width * self.height}"
             )
         return self
+
+    @property
+    def field_of_view(self) -> tuple[float, float]:
+        """Width and height of what it sees at its distance, in the scene's unit."""
+        return tuple(self.distance / self.focal_px * pixels for pixels in (self.width, self.height))
 
     @field_validator("transmission", "responsivity")
     @classmethod

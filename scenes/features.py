@@ -104,8 +104,8 @@ def _along(solid: Solid, side: Side) -> np.ndarray:
 
 
 def _check_corner(solid: Solid, key: str, corner: Corner) -> None:
-    if corner.vertex not in solid.vertex_names:
-        raise ValueError(f"{key}.vertex must be one of {', '.join(solid.vertex_names)}, got {corner.vertex!r}")
+    if corner.vertex not in solid.corner_names:
+        raise ValueError(f"{key}.vertex must be one of {', '.join(solid.corner_names)}, got {corner.vertex!r}")
     there = [edge.name for edge in solid.edges_at(corner.vertex)]
     for name in corner.edges:
         if name not in there:
@@ -121,6 +121,6 @@ def _check_centre(solid: Solid, key: str, centre: Centre) -> None:
 
 
 def _check_side(solid: Solid, key: str, side: Side) -> None:
-    known = [edge.name for edge in solid.edges]
+    known = [edge.name for edge in solid.sharp]
     if side.edge not in known:
         raise ValueError(f"{key}.edge must be one of {', '.join(known)}, got {side.edge!r}")

@@ -19,16 +19,17 @@ def _row(value: Any) -> Any:
 
 
 Coefficient = Annotated[float, Field(ge=-10, le=10)]
-Distortion = Annotated[tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient], BeforeValidator(_row)]
+Distortion = Annotated[
+    tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient],
+    BeforeValidator(_row, json_schema_input_type=float | list[float]),
+]
 
 
 class Lens(Model):
     """What makes the lens more than a pinhole.
 
-    ``aperture_radius`` (cm) of a thin lens focused at the distance ``focus`` (cm; the reference point's when not
-    given), and ``distortion``, OpenCV's k1, k2, p1, p2, k3 (or k1 alone): a point seen by a pinhole camera at (x, y)
-    focal lengths from the image's centre is recorded at (x, y) (1 + k1 r^2 + k2 r^4 + k3 r^6) and tangentially
-    displaced by (2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y).
+    A point that a pinhole camera sees at (x, y) focal lengths from the image's centre is recorded at (x, y) (1 + k1 r^2
+    + k2 r^4 + k3 r^6), and tangentially displaced by (2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y).
 
     Examples
     --------
@@ -37,8 +38,11 @@ class Lens(Model):
     """
 
     aperture_radius: NotNegative = 0.0
+    """Of a thin lens; 0 for a pinhole [length]."""
     focus: Positive | None = None
+    """Distance at which it is focused; that of ``look_at`` when not given [length]."""
     distortion: Distortion = (0.0,) * COEFFICIENTS
+    """OpenCV's k1, k2, p1, p2, k3, or k1 alone."""
 
     @property
     def coefficients(self) -> tuple[float, ...]:

@@ -11,17 +11,16 @@ from scenes.ranges import Curve, Length, rising
 
 
 class Light(Model):
-    """A light on a sphere around the reference point (`Camera.look_at`); ``distance`` in cm.
-
-    ``radius`` (cm) is 0 for a point. ``polarisation_deg`` is the direction of polarisation, seen along the
-    beam: from the direction away from the pole (0) towards that of growing azimuth (90); None for unpolarised light.
-    ``spectrum`` is Q of eq. 1, rows [nm, relative value].
-    """
+    """A light on a sphere around the reference point (`Camera.look_at`)."""
 
     distance: Length
+    """From ``look_at`` [length]."""
     radius: Annotated[float, Field(ge=0)] = 0.0
+    """0 for a point [length]."""
     polarisation_deg: float | None = None
+    """Seen along the beam, from away from the pole (0) to growing azimuth (90); left out: none [degrees]."""
     spectrum: Curve = ()
+    """Q of eq. 1: rows [nm, relative value]; constant where not given."""
 
     @field_validator("spectrum")
     @classmethod

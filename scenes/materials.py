@@ -13,18 +13,21 @@ from scenes.ranges import Fraction, Positive, rising
 class Material(Model):
     """Reflectance of the surface: the paper's Torrance-Sparrow model (its section 2).
 
-    ``specular_fraction`` is s, ``diffuse_reflectance`` R_d, ``refractive_index`` n, ``extinction`` k
-    and ``roughness`` the Beckmann m. With n = 1 and k = 0 the Fresnel term vanishes and the surface is
-    purely diffuse, reflecting (1 - s) R_d. ``index_table`` gives n and k by wavelength, rows
-    [wavelength in nm, n, k] with rising wavelengths, and then replaces ``refractive_index`` and ``extinction``.
+    With n = 1 and k = 0 the Fresnel term vanishes and the surface is purely diffuse, reflecting (1 - s) R_d.
     """
 
     specular_fraction: Fraction = 0.0
+    """s: the part of light that is reflected by facets."""
     diffuse_reflectance: Fraction = 1.0
+    """R_d."""
     refractive_index: Annotated[float, Field(gt=0, le=1e6)] = 1.0  # its square and its square's square must be numbers
+    """n."""
     extinction: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """k."""
     roughness: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.2
+    """m of Beckmann's distribution: rms slope of the facets."""
     index_table: tuple[tuple[Positive, Positive, Annotated[float, Field(ge=0, le=1e6)]], ...] = ()
+    """n and k by wavelength, instead of the two: rows [nm, n, k] of rising wavelengths."""
 
     @field_validator("index_table")
     @classmethod

@@ -11,22 +11,22 @@ from scenes.ranges import Darkness, NotNegative, Trace
 
 
 class Noise(Model):
-    """The sensor's noise, in the terms of EMVA 1288, then ``bits`` of digits.
-
-    ``dark_level`` is the grey level of darkness, which keeps noise from being cut off at 0. ``sigma`` (grey levels) is
-    the temporal dark noise, read noise included. ``gain`` (grey levels an electron) makes shot noise of variance
-    gain x (level - dark_level). ``prnu`` (part of the signal) and ``dsnu`` (grey levels) are the
-    standard deviations of the fixed pattern, the same in every picture of the camera that ``pattern_seed`` names.
-    Without ``bits`` grey levels stay real numbers; with it they are rounded and clipped to 0 .. 2^bits - 1.
-    """
+    """The sensor's noise, in the terms of EMVA 1288, then ``bits`` of digits."""
 
     sigma: Trace
+    """Temporal dark noise, read noise included [grey levels]."""
     bits: Annotated[int, Field(ge=1, le=16)] | None = None
+    """Levels are rounded and clipped to 0 .. 2^bits - 1; left out: real numbers."""
     gain: NotNegative = 0.0
+    """Makes shot noise of variance gain x (level - dark_level) [grey levels an electron]."""
     dark_level: Darkness = 0.0
+    """Level of darkness, which keeps noise from being cut off at 0 [grey levels]."""
     prnu: NotNegative = 0.0
+    """Standard deviation of the fixed pattern, part of the signal."""
     dsnu: NotNegative = 0.0
+    """Standard deviation of the fixed pattern in darkness [grey levels]."""
     pattern_seed: Annotated[int, Field(ge=0)] = 0
+    """Which camera: the fixed pattern is the same in all its pictures."""
 
     @property
     def variance(self) -> float:

@@ -63,4 +63,4 @@ class Pose:
         return f"({self.polar_deg:g}, {self.azimuth_deg:g})"
 
 
-PoseField = Annotated[Pose, BeforeValidator(Pose.of), PlainSerializer(list)]
+PoseField = Annotated[Pose, BeforeValidator(Pose.of, json_schema_input_type=tuple[float, float]), PlainSerializer(list)]

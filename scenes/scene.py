@@ -1,6 +1,7 @@
 """Everything that a prediction, a render or a measurement has to know, in one checked description.
 
-Lengths in space are cm, lengths in the image px, brightness is in grey levels.
+Lengths in space are in the scene's unit (cm as in the paper, if it says none), lengths in the image px,
+brightness is in grey levels.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 from pydantic import Discriminator, Tag, model_validator
 
 from scenes.camera import Camera
+from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
 from scenes.lights import Light
@@ -25,6 +27,8 @@ from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.units import UNITS, Unit
+from scenes.view import check_view
 
 
 def _tag_of_object(value: Any) -> str:
@@ -40,12 +44,16 @@ def _bodies(measured: Solid, obstacles: tuple[Obstacle, ...]) -> Solid:
 
 
 class Setting(Model):
-    """One pair of sensor and light, with what the paper printed for it (variances, px^2)."""
+    """One pair of sensor and light, with what the paper printed for it."""
 
     sensor: PoseField
+    """Polar angle (0 to 180) and azimuth [degrees]."""
     light: PoseField
+    """The same of the light [degrees]."""
     paper_ice: Positive | None = None
+    """The paper's predicted variance [px^2]."""
     paper_real: tuple[Positive, Positive] | None = None
+    """The paper's measured variances, for both thresholds [px^2]."""
 
 
 class Scene(Model):
@@ -60,20 +68,37 @@ class Scene(Model):
     """
 
     name: FileName
+    """The file's name where not given."""
+    units: Unit = "cm"
+    """Unit of all lengths in space."""
     title: Title = ""
+    """What it is about, for tables."""
     object: Object
+    """What is measured."""
     material: Material
+    """Of the object and the obstacles."""
     camera: Camera
+    """The camera."""
     light: Light
+    """The light."""
     noise: Noise
+    """The sensor's noise."""
     task: Task | None = None
+    """What is measured, in short: one distance or angle."""
     measurands: tuple[Measurand, ...] = ()
+    """What is measured: all requirements of a drawing."""
     locator: Locator = Locator()
+    """How edge points are found."""
     settings: tuple[Setting, ...] = ()
+    """Poses to predict, render and measure."""
     same_scale: tuple[str, ...] = ()
+    """Scenes whose settings share the paper's free scale with this one's."""
     floor: Floor | None = None
+    """What the object stands on; left out: darkness."""
     obstacles: tuple[Obstacle, ...] = ()
+    """What stands beside it."""
     jitter: Jitter = Jitter()
+    """How exactly poses are set."""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -83,7 +108,7 @@ class Scene(Model):
     @property
     def solid(self) -> Solid:
         """Vertices, faces and edges of the object."""
-        return self.object.solid
+        return self.object.solid_in(self.units)
 
     @property
     def bodies(self) -> Solid:
@@ -96,7 +121,7 @@ class Scene(Model):
         return (self.light,)
 
     def position(self, role: Literal["sensor", "light"], pose: Pose) -> np.ndarray:
-        """Where the sensor or the light stands, cm, shape (3,): on a sphere around the reference point."""
+        """Where the sensor or the light stands, shape (3,): on a sphere around the reference point."""
         polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
         direction = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
         radius = (self.camera if role == "sensor" else self.light).distance
@@ -116,7 +141,7 @@ class Scene(Model):
             raise InvalidInput(f"{key or role}: {error}") from None
         if self.solid.height_above(self.position(role, pose)) <= 1e-6 * self.solid.extent:
             radius = (self.camera if role == "sensor" else self.light).distance
-            raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} cm")
+            raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} {self.units}")
         if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
             raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
@@ -134,8 +159,20 @@ class Scene(Model):
         rest = {key: value for key, value in camera.items() if key != "black_level"}
         return {**data, "camera": rest, "noise": {**noise, "dark_level": level}}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _as_on_a_data_sheet(cls, data: Any) -> Any:
+        """What a camera's data sheets say of its focal length in px, its width, height and distance."""
+        camera = data.get("camera") if isinstance(data, dict) else None
+        unit = data.get("units", "cm") if isinstance(data, dict) else None
+        if not isinstance(camera, dict) or unit not in UNITS:
+            return data
+        return {**data, "camera": completed(camera, unit)}
+
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
+        mesh = self.object if isinstance(self.object, Mesh) else None
+        check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
         self._check_measurands()
         self._check_surroundings()
         for i, setting in enumerate(self.settings):
@@ -164,7 +201,7 @@ class Scene(Model):
         for end, feature in zip(("start", "end"), task.corners, strict=False):
             check_feature(self.solid, f"task.{end}", feature)
         if task.kind == "angle":
-            known = [edge.name for edge in self.solid.edges]
+            known = [edge.name for edge in self.solid.sharp]
             for name in task.lines:
                 if name not in known:
                     raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")

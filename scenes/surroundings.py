@@ -12,18 +12,23 @@ from scenes.ranges import Fraction, NotNegative, Positive
 
 
 class Floor(Model):
-    """A diffuse square plane at ``height`` below the object, reflecting ``reflectance``, ``half_side`` cm each way."""
+    """A diffuse square plane below the object."""
 
     reflectance: Fraction
+    """Part of the light that it sends back."""
     height: float = 0.0
+    """Not above the object's lowest point [length]."""
     half_side: Positive = 1000.0
+    """How far it reaches each way [length]."""
 
 
 class Obstacle(Model):
-    """A block beside the measured object, of the same material; ``corner`` is its corner of least x, y and z."""
+    """A block beside the measured object, of the same material."""
 
     corner: tuple[float, float, float]
+    """Its corner of least x, y and z [length]."""
     size: tuple[Positive, Positive, Positive]
+    """Along x, y and z [length]."""
 
     @property
     def solid(self) -> Solid:
@@ -38,7 +43,9 @@ def _standing(corner: tuple[float, float, float], size: tuple[float, float, floa
 
 
 class Jitter(Model):
-    """Standard deviations with which poses are set, degrees along each of the sphere's two directions."""
+    """Standard deviations with which poses are set, along each of the sphere's two directions."""
 
     sensor_deg: NotNegative = 0.0
+    """Of the sensor [degrees]."""
     light_deg: NotNegative = 0.0
+    """Of the light [degrees]."""

@@ -29,8 +29,8 @@ class CheckedSetting:
     edges : tuple of str
         Required edges.
     calibrated, propagated : float
-        What the plan minimises, without and with the picture: the variance (not sigma) in cm^2 or px^2, or what several
-        make together; infinite where it cannot be measured.
+        What the plan minimises, without and with the picture: the variance (not sigma) in the scene's unit squared or
+        px^2, or what several make together; infinite where it cannot be measured.
     status : str
         The worst of the measurands in the noise-free picture.
     without_formula : tuple of str

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 
 from scenes import Solid
 
-_CHUNK = 400_000  # ray-triangle pairs at a time
+_CHUNK = 50_000  # ray-triangle pairs at a time
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 
 
@@ -27,15 +30,18 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
     t : ndarray, shape (...)
         Infinite where nothing is met.
     """
-    keep = ~np.isin(solid.triangle_faces, own)
-    triangles, faces = solid.triangles[keep], solid.triangle_faces[keep]
+    plates = _plates(solid)
+    if own:
+        plates = plates.some(~np.isin(plates.faces, own))
     shape = origins.shape[:-1]
     origins, vectors = origins.reshape(-1, 3), vectors.reshape(-1, 3)
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
-    size = max(1, _CHUNK // max(len(triangles), 1))
+    size = max(1, _CHUNK // max(len(plates.faces), 1))
     for at in range(0, len(origins), size):
         part = slice(at, at + size)
-        ts = _meet(triangles, solid.normals[faces], origins[part], vectors[part])
+        faces, ts = _meet(plates, origins[part], vectors[part])
+        if not len(faces):
+            continue
         which = ts.argmin(1)
         t[part] = ts[np.arange(len(ts)), which]
         face[part] = np.where(np.isfinite(t[part]), faces[which], -1)
@@ -46,23 +52,52 @@ def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.nd
     """Whether points (..., 3) on the given faces (...) see a position (broadcast): bool, shape (...)."""
     points, position = np.broadcast_arrays(points, position)
     normals = solid.normals[faces]
-    towards = np.einsum("...i,...i->...", normals, position) > solid.offsets[faces]
-    start = points + 1e-7 * solid.extent * normals
-    blocker, t = first_face(solid, position, start - position, ())
-    return towards & ((blocker < 0) | (t >= 1))
+    found = np.einsum("...i,...i->...", normals, position) > solid.offsets[faces]
+    doubtful = found & ~solid.outer[faces]  # nothing stands over an outer face
+    start = (points + 1e-7 * solid.extent * normals)[doubtful]
+    blocker, t = first_face(solid, position[doubtful], start - position[doubtful], ())
+    found[doubtful] = (blocker < 0) | (t >= 1)
+    return found
 
 
-def _meet(triangles: np.ndarray, normals: np.ndarray, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Parameter t of each ray at each triangle seen from outside, infinite where it misses; shape (rays, T)."""
+@dataclass(frozen=True, eq=False)
+class _Plates:
+    """T triangles: their face, its plane, and (x - corner) . dual, the coordinates of a place x along two sides."""
+
+    faces: np.ndarray
+    normals: np.ndarray
+    heights: np.ndarray
+    duals: np.ndarray
+    shifts: np.ndarray
+
+    def some(self, which: np.ndarray) -> _Plates:
+        """Those of them."""
+        shifts = self.shifts[:, which]
+        return _Plates(self.faces[which], self.normals[which], self.heights[which], self.duals[:, which], shifts)
+
+
+@lru_cache(maxsize=16)
+def _plates(solid: Solid) -> _Plates:
+    triangles, normals = solid.triangles, solid.normals[solid.triangle_faces]
     corner, one, two = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     gram = np.einsum("ti,ti->t", one, one), np.einsum("ti,ti->t", one, two), np.einsum("ti,ti->t", two, two)
     size = gram[0] * gram[2] - gram[1] ** 2
-    dual1 = (gram[2][:, None] * one - gram[1][:, None] * two) / size[:, None]
-    dual2 = (gram[0][:, None] * two - gram[1][:, None] * one) / size[:, None]
-    fall = vectors @ normals.T
+    duals = np.stack([gram[2][:, None] * one - gram[1][:, None] * two, gram[0][:, None] * two - gram[1][:, None] * one])
+    duals = duals / size[:, None]
+    shifts = np.einsum("kti,ti->kt", duals, corner)
+    return _Plates(solid.triangle_faces, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
+
+
+def _meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Faces (T,) of triangles whose outside a ray may meet, and each ray's t, infinite where it misses, (rays, T)."""
+    fall, over = vectors @ plates.normals.T, origins @ plates.normals.T - plates.heights
+    some = ((fall < 0) & (over > 0)).any(0)
+    plates, fall, over = plates.some(some), fall[:, some], over[:, some]
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = (np.einsum("ti,ti->t", normals, corner) - origins @ normals.T) / fall
-        u = origins @ dual1.T - np.einsum("ti,ti->t", dual1, corner) + t * (vectors @ dual1.T)
-        v = origins @ dual2.T - np.einsum("ti,ti->t", dual2, corner) + t * (vectors @ dual2.T)
+        t = -over / fall
+        u, v = (
+            origins @ dual.T - shift + t * (vectors @ dual.T)
+            for dual, shift in zip(plates.duals, plates.shifts, strict=True)
+        )
         hit = (fall < 0) & (t > _STEP) & (u >= 0) & (v >= 0) & (u + v <= 1)
-    return np.where(hit, t, np.inf)
+    return plates.faces, np.where(hit, t, np.inf)

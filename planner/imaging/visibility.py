@@ -7,41 +7,89 @@ where 0 < a + b < 1. So the interval is exact, and no ray has to be cast.
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 
 from planner.imaging.projection import above
 from scenes import Edge, Solid
 
-_BEFORE = 1e-9  # a triangle that touches the edge does not hide it
+_BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
 
 
 def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
-    """Fractions (from, to) of an edge that each triangle hides from a position.
+    """Fractions (from, to) of an edge that are hidden from positions.
 
     Parameters
     ----------
     solid : Solid
     edge : Edge
     positions : ndarray, shape (..., 3)
-        Where the sensor or the light stands, cm.
+        Where the sensor or the light stands, outside the solid.
 
     Returns
     -------
-    ndarray, shape (..., T, 2)
-        Fractions of the edge's length in space; from > to where nothing is hidden. T counts the triangles that could
-        hide the edge: none for a convex solid.
+    ndarray, shape (..., K, 2)
+        Fractions of the edge's length in space, rising and apart from each other; (1, 0) where a position has less than
+        K hidden pieces. K is 0 for a convex solid.
     """
-    others = np.flatnonzero(~np.isin(solid.triangle_faces, edge.faces)) if not solid.is_convex else []
-    triangles = solid.triangles[others]
+    if solid.is_convex:
+        return np.empty((*positions.shape[:-1], 0, 2))
+    return _hidden(solid, edge, np.ascontiguousarray(positions).tobytes(), positions.shape)
+
+
+@lru_cache(maxsize=128)  # asked for several times of each set of pictures
+def _hidden(solid: Solid, edge: Edge, positions: bytes, shape: tuple[int, ...]) -> np.ndarray:
+    spans = _united(_by_triangle(solid, edge, np.frombuffer(positions).reshape(shape)))
+    spans.flags.writeable = False
+    return spans
+
+
+def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+    """The interval that each of those triangles hides which may hide any; from > to for none; shape (..., T, 2).
+
+    What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
+    """
+    towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
+    towards[list(edge.faces)] = False
+    triangles = solid.triangles[towards[solid.triangle_faces]]
     start, stop = (solid.vertices[end] - positions for end in edge.ends)
     normal = np.cross(start, stop)
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
-    axes = np.stack([np.cross(stop, normal), np.cross(normal, start), normal], -2)
-    away = triangles.reshape(-1, 3)
-    a, b, above = np.moveaxis(axes @ away.T - np.einsum("...ij,...j->...i", axes, positions)[..., None], -2, 0)
-    shape = (*a.shape[:-1], len(others), 3)
-    return _merge(*_crossings(a.reshape(shape), b.reshape(shape), above.reshape(shape)))
+    sides = _coordinates(triangles, positions, normal)
+    some = (sides.max(-1) >= 0) & (sides.min(-1) < 0)  # the others do not reach the plane of position and edge
+    some = some.any(tuple(range(some.ndim - 1)))
+    a, b = (
+        _coordinates(triangles[some], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start))
+    )
+    return _merge(*_crossings(a, b, sides[..., some, :]))
+
+
+def _coordinates(triangles: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Coordinates of the triangles' corners along an axis (..., 3) from the positions, shape (..., T, 3)."""
+    along = axis @ triangles.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
+    return along.reshape(*along.shape[:-1], len(triangles), 3)
+
+
+def _united(spans: np.ndarray) -> np.ndarray:
+    """Intervals (..., T, 2) as the fewest that cover the same, (..., K, 2)."""
+    shape, rows = spans.shape[:-2], spans.reshape(math.prod(spans.shape[:-2]), *spans.shape[-2:])
+    filled = rows[..., 0] < rows[..., 1]
+    rows, filled = rows[:, filled.any(0)], filled[:, filled.any(0)]
+    order = np.argsort(np.where(filled, rows[..., 0], np.inf), -1)
+    starts, stops, filled = (np.take_along_axis(v, order, -1) for v in (rows[..., 0], rows[..., 1], filled))
+    covered = np.maximum.accumulate(np.where(filled, stops, -np.inf), -1)
+    begins = filled.copy()
+    begins[:, 1:] &= starts[:, 1:] > covered[:, :-1] + _BEFORE
+    piece = np.cumsum(begins, -1) - 1
+    found = np.empty((len(rows), int(piece.max(initial=-1)) + 1, 2))
+    found[:] = 1.0, 0.0
+    row = np.broadcast_to(np.arange(len(rows))[:, None], filled.shape)
+    found[row[begins], piece[begins], 0] = starts[begins]
+    np.maximum.at(found[..., 1], (row[filled], piece[filled]), stops[filled])
+    return found.reshape(*shape, *found.shape[1:])
 
 
 def _crossings(a: np.ndarray, b: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -99,12 +147,8 @@ def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray)
     """
     shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
     clear = np.ones(shape, bool)
-    if solid.is_convex:
-        return clear
-    spans = hidden_spans(solid, edge, positions)
-    active = np.flatnonzero((spans[..., 0] < spans[..., 1]).reshape(-1, spans.shape[-2]).any(0))
-    for i in active:
-        clear &= (fractions <= spans[..., i, :1]) | (fractions >= spans[..., i, 1:])
+    for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
+        clear &= (fractions <= start[..., None]) | (fractions >= stop[..., None])
     return clear
 
 
@@ -121,10 +165,10 @@ def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[
         return []
     spans = hidden_spans(solid, edge, position)
     free, at = [], 0.0
-    for start, stop in sorted(map(tuple, spans[spans[:, 0] < spans[:, 1]].tolist())):
+    for start, stop in spans[spans[:, 0] < spans[:, 1]].tolist():
         if start > at:
             free.append((at, start))
-        at = max(at, stop)
+        at = stop
     return free + [(at, 1.0)] if at < 1 else free
 
 
@@ -140,7 +184,6 @@ def longest_span(solid: Solid, edge: Edge, positions: np.ndarray, *more: np.ndar
         return whole
     spans = [hidden_spans(solid, edge, p) for p in (positions, *more)]
     spans = np.concatenate([np.broadcast_to(s, (*shape, *s.shape[-2:])) for s in spans], -2)
-    spans = spans[..., (spans[..., 0] < spans[..., 1]).reshape(-1, spans.shape[-2]).any(0), :]
     order = np.argsort(spans[..., 0], -1)[..., None]
     spans = np.take_along_axis(spans, order, -2)
     covered = np.maximum.accumulate(np.clip(spans[..., 1], 0, 1), -1) if spans.shape[-2] else spans[..., 1]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
 from planner.search.viewing import ViewingSpace
 from scenes import Pose, Scene
@@ -36,7 +37,7 @@ class Partial:
 
 def alternate(
     scene: Scene, sensors: ViewingSpace, lights: ViewingSpace, start: np.ndarray, model: str, objective: str,
-    first_light: np.ndarray | None = None,
+    first_light: np.ndarray | None = None, constraints: Constraints | None = None,
 ) -> Partial:  # fmt: skip
     """The paper's procedure FindSensorLight for one set of required edges.
 
@@ -48,6 +49,8 @@ def alternate(
     first_light : ndarray, shape (2,), optional
         Where the search for the first light begins. Where nothing can be measured from there (or nothing is given),
         it begins at the best of a coarse sample of the directions, for a plateau of infinities has no way down.
+    constraints : Constraints, optional
+        On pairs: others count as not measurable.
     """
     at = {"sensor": sensors.nearest(start), "light": 0 if first_light is None else lights.nearest(first_light)}
     spaces = {"sensor": sensors, "light": lights}
@@ -58,7 +61,10 @@ def alternate(
 
         def value(indices: np.ndarray, moving=moving, fixed=fixed) -> np.ndarray:
             poses = {moving: spaces[moving].poses[indices], fixed: spaces[fixed].poses[[at[fixed]] * len(indices)]}
-            return evaluate_pairs(scene, poses["sensor"], poses["light"], model, objective)
+            values = evaluate_pairs(scene, poses["sensor"], poses["light"], model, objective)
+            if constraints is not None and constraints.on_pairs:
+                values = np.where(constraints.pairs(scene, poses["sensor"], poses["light"]), values, np.inf)
+            return values
 
         before = at[moving]
         at[moving], variance = _descend(spaces[moving], before, value)

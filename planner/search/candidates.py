@@ -26,7 +26,7 @@ class Candidate:
     edges : tuple of str
         Required edges.
     variance_object, variance_image : float
-        Of the measurand that limits it: cm^2 and px^2, or degrees^2.
+        Of the measurand that limits it: the scene's unit squared and px^2, or degrees^2.
     variance : float
         What the plan minimises.
     limiting : str

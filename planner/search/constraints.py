@@ -11,17 +11,23 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction, light_position, project
 from scenes import InvalidInput, Scene
 
+_BODY = 0.05  # of the distance: radius of a body of which nothing is said
 Region = tuple[float, float, float]  # polar, azimuth, radius, degrees
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """Limits on a plan; the default is the upper hemisphere.
+    """Limits on a plan; the default is the upper hemisphere, camera and lamp clear of each other.
 
     Attributes
     ----------
     sensor_polar_deg, light_polar_deg : pair of float
         Least and greatest polar angle.
+    sensor_azimuth_deg, light_azimuth_deg : pair of float, optional
+        From one azimuth to another, growing: (350, 20) are 30 degrees. All where not given.
+    camera_body, light_body : float, optional
+        Radius of the sphere about each that holds its body, in the scene's unit; a twentieth of its distance where not
+        given, 0 for a point. The two bodies must not touch.
     forbidden_sensor, forbidden_light : tuple of (polar, azimuth, radius)
         Regions, degrees, in which it may not stand.
     min_edge_px : float
@@ -33,11 +39,15 @@ class Constraints:
     min_separation_deg : float
         Least angle between sensor and light, seen from the object.
     same_mount : bool
-        Whether the light is mounted at the sensor: both in the same direction.
+        Whether the light is mounted at the sensor: both in the same direction. Their bodies are then one.
     """
 
     sensor_polar_deg: tuple[float, float] = (0.0, 90.0)
     light_polar_deg: tuple[float, float] = (0.0, 90.0)
+    sensor_azimuth_deg: tuple[float, float] | None = None
+    light_azimuth_deg: tuple[float, float] | None = None
+    camera_body: float | None = None
+    light_body: float | None = None
     forbidden_sensor: tuple[Region, ...] = ()
     forbidden_light: tuple[Region, ...] = ()
     min_edge_px: float = 0.0
@@ -51,6 +61,16 @@ class Constraints:
             low, high = getattr(self, name)
             if not 0 <= low <= high <= 180:
                 raise InvalidInput(f"{name} must be two rising angles between 0 and 180, got {(low, high)}")
+        for name in ("sensor_azimuth_deg", "light_azimuth_deg"):
+            limits = getattr(self, name)
+            if limits is not None and not (np.isfinite(limits).all() and abs(limits[1] - limits[0]) <= 360):
+                raise InvalidInput(f"{name} must be two azimuths at most 360 degrees apart, got {limits}")
+        for name in ("camera_body", "light_body"):
+            radius = getattr(self, name)
+            if radius is not None and not 0 <= radius <= 1e12:
+                raise InvalidInput(f"{name} must be a radius of at least 0, got {radius}")
+        if self.same_mount and self.min_separation_deg > 0:
+            raise InvalidInput(f"min_separation_deg must be 0 with same_mount, got {self.min_separation_deg}")
         for name, most in (("min_edge_px", 1e9), ("min_clearance_px", 1e9), ("min_separation_deg", 180)):
             value = getattr(self, name)
             if not 0 <= value <= most:
@@ -64,11 +84,17 @@ class Constraints:
     @property
     def on_pairs(self) -> bool:
         """Whether anything is asked of sensor and light together."""
+        return self.coupled or self.camera_body != 0 or self.light_body != 0
+
+    @property
+    def coupled(self) -> bool:
+        """Whether more is asked than that their bodies are clear of each other."""
         return self.light_out_of_view or self.min_separation_deg > 0 or self.same_mount
 
     def sensors(self, scene: Scene, poses: np.ndarray) -> np.ndarray:
         """Which sensor poses (n, 2) are allowed; bool, shape (n,)."""
         allowed = _polar(poses, self.sensor_polar_deg) & _outside(poses, self.forbidden_sensor)
+        allowed &= _around(poses, self.sensor_azimuth_deg)
         if self.min_edge_px > 0 or self.min_clearance_px > 0:
             view = projected_edges(Pictures.of(scene, poses))
             allowed &= (view.usable >= self.min_edge_px).all(-1) & view.visible.all(-1)
@@ -78,23 +104,52 @@ class Constraints:
 
     def lights(self, poses: np.ndarray) -> np.ndarray:
         """Which light poses (n, 2) are allowed; bool, shape (n,)."""
-        return _polar(poses, self.light_polar_deg) & _outside(poses, self.forbidden_light)
+        allowed = _polar(poses, self.light_polar_deg) & _outside(poses, self.forbidden_light)
+        return allowed & _around(poses, self.light_azimuth_deg)
 
     def pairs(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
         """Which pairs of poses (..., 2), broadcast, are allowed; bool, shape (...)."""
-        cosine = np.einsum("...i,...i->...", *np.broadcast_arrays(direction(sensors), direction(lights)))
-        allowed = cosine <= np.cos(np.radians(self.min_separation_deg)) + (self.min_separation_deg == 0)
+        cosine = _cosines(direction(sensors), direction(lights))
+        allowed = cosine <= self._most(scene)
         if self.same_mount:
             allowed = allowed & (cosine > 1 - 1e-12)
         if self.light_out_of_view:
             allowed = allowed & ~_in_view(scene, sensors, lights)
         return allowed
 
+    def _most(self, scene: Scene) -> float:
+        """Largest cosine of the angle between sensor and light; above 1 where any is allowed."""
+        apart = np.cos(np.radians(self.min_separation_deg)) if self.min_separation_deg > 0 else np.inf
+        if self.same_mount:
+            return float(apart)
+        camera, light = scene.camera.distance, scene.light.distance
+        bodies = _BODY * camera if self.camera_body is None else self.camera_body
+        bodies += _BODY * light if self.light_body is None else self.light_body
+        if bodies <= abs(camera - light):
+            return float(apart)
+        return float(min(apart, (camera**2 + light**2 - bodies**2) / (2 * camera * light)))
+
     def allows(self, scene: Scene, sensor: np.ndarray, light: np.ndarray) -> bool:
         """Whether one setting is allowed."""
         return bool(
             self.sensors(scene, sensor[None])[0] and self.lights(light[None])[0] and self.pairs(scene, sensor, light)
         )
+
+
+def _cosines(sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+    """Cosines of the angles between directions (..., 3), broadcast."""
+    if sensors.ndim == lights.ndim == 3 and sensors.shape[1] == lights.shape[0] == 1:
+        return sensors[:, 0] @ lights[0].T  # a table of all pairs
+    return np.einsum("...i,...i->...", *np.broadcast_arrays(sensors, lights))
+
+
+def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray:
+    """Whether azimuths lie from one to another, growing; at the pole any does."""
+    if limits is None:
+        return np.ones(len(poses), bool)
+    low, high = limits
+    width = high - low if abs(high - low) == 360 else (high - low) % 360
+    return ((poses[:, 1] - low + 1e-9) % 360 <= abs(width) + 2e-9) | (poses[:, 0] < 1e-9)
 
 
 def _polar(poses: np.ndarray, limits: tuple[float, float]) -> np.ndarray:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections import Counter
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +17,22 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files import Unreadable, read_bytes
+from scenes.parts.facets import Chain, Facets, facets
+from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
 
 FORMATS = (".stl", ".ply", ".obj")
 MOST_BYTES = 32 << 20
-MOST_TRIANGLES = 20_000
+MOST_TRIANGLES = 100_000
 MOST_FACES = 2_000  # plane ones: what is computed grows with the square of their edges
-_FARTHEST = 1e9  # cm; beyond, its faces cannot be told to be flat
+_FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
 _PLAIN = {"obj": {"skip_materials": True}}
 _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
-_MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
-_ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
+_SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a height
 
 
-def read(path: Path) -> Solid:
-    """Solid from an STL, PLY or OBJ file, lengths in cm.
+def read(path: Path, scale: float = 1.0) -> Solid:
+    """Solid from an STL, PLY or OBJ file, its lengths multiplied by ``scale``.
 
     Raises
     ------
@@ -55,6 +58,8 @@ def read(path: Path) -> Solid:
         raise InvalidInput(f"object.file must be a readable mesh, got {path} ({reason})") from None
     if isinstance(mesh, trimesh.Trimesh):
         _check_mesh(path, mesh)
+        if scale != 1:
+            mesh.vertices *= scale
     with np.errstate(all="ignore"):
         return solid(mesh)
 
@@ -77,14 +82,16 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
             f"object.file must be of at most {MOST_TRIANGLES} triangles, got {path} with {len(mesh.faces)}"
         )
     if len(mesh.vertices) and not (np.isfinite(mesh.vertices).all() and np.abs(mesh.vertices).max() <= _FARTHEST):
-        raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g} cm, got others in {path}")
+        raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g}, got others in {path}")
 
 
 def solid(mesh: trimesh.Trimesh) -> Solid:
     """Solid from a closed mesh.
 
-    Vertices are named v1, v2, ... in the order of their (x, y, z), edges e1, e2, ... in the order of their ends,
-    circles c1, c2, ... in the order of their centres. Collinear pieces of an edge become one edge.
+    Coplanar triangles become faces, collinear pieces one edge. Vertices where sharp edges meet are named v1, v2, ... in
+    the order of their (x, y, z), sharp edges e1, e2, ... in the order of their ends, circles c1, c2, ... in that of
+    their centres. The rest is there to hide, shade and be seen, but to measure nothing by: pieces of a circle c1.1,
+    c1.2, ..., of other curved edges r1, ..., edges inside curved surfaces s1, ..., their vertices p1, ...
 
     Raises
     ------
@@ -94,8 +101,11 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     Examples
     --------
     >>> box = solid(trimesh.creation.box((2, 2, 2)))
-    >>> len(box.vertices), len(box.faces), len(box.edges), box.is_convex
+    >>> len(box.vertices), len(box.faces), len(box.sharp), box.is_convex
     (8, 6, 12, True)
+    >>> rod = solid(trimesh.creation.cylinder(1, 4, sections=96))
+    >>> len(rod.sharp), [circle.name for circle in rod.circles], round(rod.circle("c1").radius, 9)
+    (0, ['c1', 'c2'], 1.0)
     """
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise InvalidInput("object.file must hold triangles, got none")
@@ -105,28 +115,71 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     group = _planes(mesh)
     if group.max() >= MOST_FACES:
         raise InvalidInput(f"object.file must have at most {MOST_FACES} plane faces, got {group.max() + 1}")
-    pieces = _pieces(mesh, group)
-    chains = _straight_chains(mesh.vertices, pieces)
+    chains = _straight_chains(mesh.vertices, _pieces(mesh, group))
+    normals, areas = _normals(mesh, group)
+    loops = _loops(mesh, group, chains, normals)
+    circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
+    return _assembled(mesh, group, chains, loops, circular, facets(mesh.vertices, chains, normals, areas, circular))
+
+
+def _assembled(mesh, group: np.ndarray, chains: list[Chain], loops, circular: list[Rim], known: Facets) -> Solid:
+    """The solid, its parts numbered and named."""
     used = np.unique([end for chain in chains for end in chain[0]])
-    used = used[np.lexsort(np.round(mesh.vertices[used], 9).T[::-1])]
-    number = {int(old): new for new, old in enumerate(used)}
-    raw = sorted((tuple(sorted((number[a], number[b]))), faces, convex) for (a, b), faces, convex in chains)
-    edges = tuple(Edge(f"e{i}", *facts) for i, facts in enumerate(raw, 1))
-    vertices = np.array(mesh.vertices[used])
-    loops = [_loops(mesh.faces[group == f], number, vertices) for f in range(group.max() + 1)]
+    used = used[np.lexsort(np.round(mesh.vertices[used] / mesh.extents.max(), 7).T[::-1])]
+    number = np.full(len(mesh.vertices), -1)
+    number[used] = np.arange(len(used))
+    edges = _edges(chains, number, circular, known)
+    corners = {v for v, many in Counter(end for e in edges if e.kind == "sharp" for end in e.ends).items() if many > 1}
+    names = {"v": count(1), "p": count(1)}
     bare = Solid(
-        vertex_names=tuple(f"v{i}" for i in range(1, len(used) + 1)),
-        vertices=vertices,
-        faces=tuple(face[0] for face in loops),
+        vertex_names=tuple(
+            f"{kind}{next(names[kind])}" for kind in ("v" if v in corners else "p" for v in range(len(used)))
+        ),
+        vertices=np.array(mesh.vertices[used]),
+        faces=tuple(tuple(number[list(face[0])].tolist()) for face in loops),
+        holes=tuple(tuple(tuple(number[list(hole)].tolist()) for hole in face[1:]) for face in loops),
         edges=edges,
         triangles=np.array(mesh.triangles),
         triangle_faces=group,
     )
-    return replace(bare, circles=_circles(bare, loops))
+    return replace(bare, circles=_circles(bare, number, circular))
+
+
+def _edges(chains: list[Chain], number: np.ndarray, circular: list[Rim], known: Facets) -> tuple[Edge, ...]:
+    """The edges in the order of their ends, the sharp ones first."""
+    piece = {frozenset(ends): (i, j) for i, rim in enumerate(circular, 1) for j, ends in enumerate(rim.pieces, 1)}
+    kinds = np.where(known.smooth, "smooth", np.where(known.rim, "rim", "sharp"))
+    found: dict[str, list] = {"sharp": [], "rim": [], "smooth": []}
+    for (ends, faces, convex), kind in zip(chains, kinds, strict=True):
+        here = tuple(sorted(number[list(ends)].tolist()))
+        found[str(kind)].append((here, faces, convex, piece.get(frozenset(ends))))
+    edges = []
+    for kind, letter in (("sharp", "e"), ("rim", "r"), ("smooth", "s")):
+        numbers = count(1)
+        for ends, faces, convex, at in sorted(found[kind], key=lambda facts: facts[:3]):
+            name = f"c{at[0]}.{at[1]}" if at and kind == "rim" else f"{letter}{next(numbers)}"
+            edges.append(Edge(name, ends, faces, convex, kind))
+    return tuple(edges)
+
+
+def _circles(bare: Solid, number: np.ndarray, circular: list[Rim]) -> tuple[Circle, ...]:
+    found, owners = [], {frozenset(edge.ends): edge for edge in bare.edges}
+    for i, rim in enumerate(circular, 1):
+        pieces = [owners[frozenset(number[list(ends)].tolist())] for ends in rim.pieces]
+        wall = next(f for f in pieces[0].faces if f != rim.face)
+        hole = bool((rim.centre - bare.vertices[pieces[0].ends[0]]) @ bare.normals[wall] > 0)
+        names = tuple(edge.name for edge in pieces)
+        found.append(Circle(f"c{i}", rim.centre, bare.normals[rim.face], rim.radius, rim.face, names, hole))
+    return tuple(found)
+
+
+def _place(point: np.ndarray, size: float) -> tuple[float, ...]:
+    """A position to sort by, the same for coaxial circles of a file in single precision."""
+    return tuple(np.round(point / size, 6).tolist())
 
 
 def renamed(plain: Solid, names: dict[str, tuple[float, float, float]]) -> Solid:
-    """The same solid with the vertices nearest to the given positions (cm) named as wished."""
+    """The same solid with the vertices nearest to the given positions named as wished."""
     vertex_names = list(plain.vertex_names)
     for name, position in names.items():
         away = np.linalg.norm(plain.vertices - np.array(position), axis=1)
@@ -140,10 +193,24 @@ def renamed(plain: Solid, names: dict[str, tuple[float, float, float]]) -> Solid
 
 def _planes(mesh: trimesh.Trimesh) -> np.ndarray:
     """Number of the plane face of each triangle."""
-    flat = mesh.face_adjacency[mesh.face_adjacency_angles < _FLAT]
-    count = len(mesh.faces)
-    graph = coo_array((np.ones(len(flat)), flat.T), shape=(count, count))
+    pairs, apart = mesh.face_adjacency, mesh.face_adjacency_unshared
+    heights = [
+        np.einsum(
+            "ti,ti->t", mesh.face_normals[pairs[:, k]], mesh.vertices[apart[:, 1 - k]] - mesh.vertices[apart[:, k]]
+        )
+        for k in (0, 1)
+    ]  # of slivers the normal is uncertain in single precision, the height over the other triangle is not
+    flat = (mesh.face_adjacency_angles < _FLAT) | (np.abs(heights).min(0) < _SINGLE * np.abs(mesh.vertices).max())
+    graph = coo_array((np.ones(flat.sum()), pairs[flat].T), shape=(len(mesh.faces),) * 2)
     return connected_components(graph, directed=False)[1]
+
+
+def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normal and area of each plane face, shape (F, 3) and (F,)."""
+    sums = np.zeros((group.max() + 1, 3))
+    np.add.at(sums, group, mesh.face_normals * mesh.area_faces[:, None])
+    areas = np.linalg.norm(sums, axis=1)
+    return sums / areas[:, None], areas
 
 
 def _pieces(mesh: trimesh.Trimesh, group: np.ndarray) -> dict[tuple[int, int], tuple[tuple[int, int], bool]]:
@@ -177,52 +244,10 @@ def _straight_chains(vertices: np.ndarray, pieces: dict) -> list[tuple[tuple[int
     return [chain for chain in chains if chain is not None]
 
 
-def _loops(triangles: np.ndarray, number: dict[int, int], vertices: np.ndarray) -> list[tuple[int, ...]]:
-    """Boundaries of a face, the outer (longest) one first, as numbers of the solid's vertices."""
-    halves = {(int(a), int(b)) for t in triangles for a, b in zip(t, np.roll(t, -1), strict=True)}
-    after: dict[int, list[int]] = {}
-    for a, b in halves:
-        if (b, a) not in halves:
-            after.setdefault(a, []).append(b)
-    loops = []
-    while after:
-        start = here = next(iter(after))
-        loop = []
-        while here in after:
-            loop.append(here)
-            onward = after[here].pop()
-            if not after[here]:
-                del after[here]
-            here = onward
-            if here == start:
-                break
-        loops.append(tuple(number[v] for v in loop if v in number))
-    return sorted(loops, key=lambda loop: -_length(vertices[list(loop)]))
-
-
-def _length(points: np.ndarray) -> float:
-    return float(np.linalg.norm(points - np.roll(points, 1, 0), axis=1).sum())
-
-
-def _circles(bare: Solid, loops: list[list[tuple[int, ...]]]) -> tuple[Circle, ...]:
-    """Loops of a face whose vertices lie on a circle."""
-    names = {frozenset(edge.ends): edge for edge in bare.edges}
-    found = []
-    for face, boundaries in enumerate(loops):
-        for loop in boundaries:
-            if len(loop) < _MIN_SEGMENTS:
-                continue
-            points = bare.vertices[list(loop)]
-            centre = points.mean(0)
-            away = np.linalg.norm(points - centre, axis=1)
-            if np.ptp(away) > _ROUND * away.mean():
-                continue
-            edges = [names[frozenset(pair)] for pair in zip(loop, loop[1:] + loop[:1], strict=True)]
-            wall = next(f for f in edges[0].faces if f != face)
-            towards = (centre - bare.vertices[edges[0].ends[0]]) @ bare.normals[wall] > 0
-            found.append((tuple(np.round(centre, 9)), centre, away.mean(), face, edges, bool(towards)))
-    found.sort(key=lambda facts: facts[0])
-    return tuple(
-        Circle(f"c{i}", centre, bare.normals[face], float(radius), face, tuple(e.name for e in edges), hole)
-        for i, (_, centre, radius, face, edges, hole) in enumerate(found, 1)
-    )
+def _loops(mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], normals: np.ndarray) -> list[list[tuple]]:
+    """Boundaries of each face."""
+    kept = np.zeros(len(mesh.vertices), bool)
+    kept[[end for chain in chains for end in chain[0]]] = True
+    order = np.argsort(group, kind="stable")
+    parts = np.split(mesh.faces[order], np.cumsum(np.bincount(group))[:-1])
+    return [boundaries(part, kept, mesh.vertices, normal) for part, normal in zip(parts, normals, strict=True)]

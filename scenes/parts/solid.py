@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,13 +20,15 @@ _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of 
 class Edge:
     """A straight edge: its two end vertices and the two faces that meet in it (indices).
 
-    ``convex`` is False for an inner edge, where the two faces look at each other.
+    ``convex`` is False for an inner edge, where the two faces look at each other. Only a ``sharp`` edge is one of the
+    part; a ``rim`` stands for a piece of a curved edge, a ``smooth`` one lies inside a curved surface.
     """
 
     name: str
     ends: tuple[int, int]
     faces: tuple[int, int]
     convex: bool = True
+    kind: Literal["sharp", "rim", "smooth"] = "sharp"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +39,9 @@ class Circle:
     ----------
     name : str
     centre, axis : ndarray, shape (3,)
-        Centre, cm, and unit normal of the plane face that it bounds, outwards.
+        Centre, and unit normal of the plane face that it bounds, outwards.
     radius : float
-        cm.
+        Its length.
     face : int
         The plane face.
     edges : tuple of str
@@ -58,14 +61,14 @@ class Circle:
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A polyhedron, in object coordinates (cm); it may be hollow, not convex, or in several pieces.
+    """A polyhedron, in object coordinates; it may be hollow, not convex, or in several pieces.
 
     Attributes
     ----------
     vertex_names : tuple of str
         One name a vertex.
     vertices : ndarray, shape (V, 3)
-        Positions, cm.
+        Positions.
     faces : tuple of tuple of int
         Vertex indices of each face's outer boundary, counter-clockwise seen from outside.
     edges : tuple of Edge
@@ -74,6 +77,8 @@ class Solid:
     triangle_faces : ndarray of int, shape (T,), optional
         The face of each triangle.
     circles : tuple of Circle
+    holes : tuple of tuple of tuple of int
+        Vertex indices of each face's inner boundaries, clockwise seen from outside; empty where no face has any.
     """
 
     vertex_names: tuple[str, ...]
@@ -83,6 +88,7 @@ class Solid:
     triangles: np.ndarray | None = None
     triangle_faces: np.ndarray | None = None
     circles: tuple[Circle, ...] = ()
+    holes: tuple[tuple[tuple[int, ...], ...], ...] = ()
 
     def __post_init__(self) -> None:
         if self.triangles is None:
@@ -101,13 +107,13 @@ class Solid:
 
     @cached_property
     def offsets(self) -> np.ndarray:
-        """Distance of each face's plane from the origin along its normal, cm, shape (F,)."""
+        """Distance of each face's plane from the origin along its normal, shape (F,)."""
         anchors = self.vertices[[face[0] for face in self.faces]]
         return np.einsum("fi,fi->f", self.normals, anchors)
 
     @cached_property
     def extent(self) -> float:
-        """Largest extent along an axis, cm, wherever it stands."""
+        """Largest extent along an axis, wherever it stands."""
         return float(np.ptp(self.vertices, axis=0).max())
 
     @cached_property
@@ -137,7 +143,7 @@ class Solid:
         return float(np.max(normals @ point - offsets))
 
     def vertex(self, name: str) -> np.ndarray:
-        """Position of the named vertex, cm, shape (3,)."""
+        """Position of the named vertex, shape (3,)."""
         return self.vertices[self.vertex_names.index(name)]
 
     @cached_property
@@ -148,10 +154,21 @@ class Solid:
         """The named edge."""
         return self._edge_of_name[name]
 
+    @cached_property
+    def sharp(self) -> tuple[Edge, ...]:
+        """The sharp edges: those of the part itself, by which it can be measured."""
+        return tuple(edge for edge in self.edges if edge.kind == "sharp")
+
     def edges_at(self, vertex: str) -> tuple[Edge, ...]:
-        """All edges that end in the named vertex."""
+        """All sharp edges that end in the named vertex."""
         index = self.vertex_names.index(vertex)
-        return tuple(edge for edge in self.edges if index in edge.ends)
+        return tuple(edge for edge in self.sharp if index in edge.ends)
+
+    @cached_property
+    def corner_names(self) -> tuple[str, ...]:
+        """Names of the vertices in which sharp edges meet."""
+        there = Counter(end for edge in self.sharp for end in edge.ends)
+        return tuple(name for i, name in enumerate(self.vertex_names) if there[i] > 1)
 
     def circle(self, name: str) -> Circle:
         """The named circular edge."""
@@ -190,7 +207,7 @@ def block(size: tuple[float, float, float]) -> Solid:
     Parameters
     ----------
     size : tuple of float
-        Lengths along x, y and z, cm.
+        Lengths along x, y and z.
 
     Examples
     --------
@@ -233,6 +250,7 @@ def assembled(first: Solid, *others: Solid) -> Solid:
                 (e.ends[0] + corner, e.ends[1] + corner),
                 tuple(f + face for f in e.faces),
                 e.convex,
+                e.kind,
             )
             for e in other.edges
         ]

@@ -14,17 +14,17 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project, project_ideal
 
 SENSOR = np.array([35.0, 70.0])
-CORNER, FAR = {"vertex": "corner", "edges": ["e8", "e203"]}, {"vertex": "far", "edges": ["e4", "e5"]}
-EDGES = {"e4": "left", "e5": "front", "e8": "back", "e203": "right"}
+CORNER, FAR = {"vertex": "corner", "edges": ["e8", "e11"]}, {"vertex": "far", "edges": ["e4", "e5"]}
+EDGES = {"e4": "left", "e5": "front", "e8": "back", "e11": "right"}
 LIST = [
     {"name": "diagonal", "kind": "distance", "features": [CORNER, FAR]},
     {"name": "to hole", "kind": "distance", "features": [{"circle": "c2"}, CORNER]},
     {"name": "through", "kind": "distance", "features": [{"circle": "c1"}, CORNER]},
-    {"name": "length", "kind": "width", "features": [{"edge": "e4"}, {"edge": "e203"}]},
+    {"name": "length", "kind": "width", "features": [{"edge": "e4"}, {"edge": "e11"}]},
     {"name": "from edge", "kind": "offset", "features": [{"circle": "c2"}, {"edge": "e5"}]},
-    {"name": "square", "kind": "angle", "features": [{"edge": "e8"}, {"edge": "e203"}]},
+    {"name": "square", "kind": "angle", "features": [{"edge": "e8"}, {"edge": "e11"}]},
     {"name": "bore", "kind": "diameter", "features": [{"circle": "c2"}]},
-    {"name": "place", "kind": "position", "features": [{"circle": "c2"}, {"edge": "e203"}, {"edge": "e8"}]},
+    {"name": "place", "kind": "position", "features": [{"circle": "c2"}, {"edge": "e11"}, {"edge": "e8"}]},
 ]  # fmt: skip
 VALUES = {
     "diagonal": np.hypot(12, 8), "to hole": np.hypot(7, 4), "through": np.sqrt(7**2 + 4**2 + 1), "length": 12.0,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 commands = commands()
 _MOST_CHECKED = 1000
 
-Objective = Annotated[str, typer.Option(help="object (cm^2) or image (px^2)")]
+Objective = Annotated[str, typer.Option(help="object (the scene's unit, squared) or image (px^2)")]
 Over = Annotated[str, typer.Option(help="Of several measurands: minimax (worst sigma / tolerance) or sum (weighted).")]
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
 Model = Annotated[str, typer.Option(help="calibrated or paper")]
@@ -34,6 +34,11 @@ Start = Annotated[str, typer.Option(metavar="P,A", help="First sensor of the alt
 Range = Annotated[str | None, typer.Option(metavar="LOW,HIGH", help="Polar angles allowed, degrees; default 0,90.")]
 MinEdge = Annotated[float, typer.Option(help="Least usable length of a required edge, px.")]
 MinClearance = Annotated[float, typer.Option(help="Least distance between required edges, px.")]
+Azimuths = Annotated[str | None, typer.Option(metavar="FROM,TO", help="Azimuths allowed, degrees; 350,20 are 30.")]
+Body = Annotated[
+    float | None,
+    typer.Option(metavar="RADIUS", help="Sphere that holds its body, scene's unit; default distance / 20, 0: none."),
+]
 Separation = Annotated[float, typer.Option(help="Least angle between sensor and light, degrees.")]
 OutOfView = Annotated[bool, typer.Option("--light-out-of-view", help="Keep it out of the image.")]
 SameMount = Annotated[bool, typer.Option("--same-mount", help="The light is mounted at the sensor.")]
@@ -61,6 +66,10 @@ def plan_command(
     start: Start = "40,41",
     sensor_polar: Range = None,
     light_polar: Range = None,
+    sensor_azimuth: Azimuths = None,
+    light_azimuth: Azimuths = None,
+    camera_body: Body = None,
+    light_body: Body = None,
     min_edge: MinEdge = 0.0,
     min_clearance: MinClearance = 0.0,
     separation: Separation = 0.0,
@@ -75,6 +84,11 @@ def plan_command(
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
     check_number("--check", check, 1, _MOST_CHECKED)
+    check_number("--separation", separation, 0, 180)
+    check_number("--camera-body", camera_body, 0, 1e12)
+    check_number("--light-body", light_body, 0, 1e12)
+    if same_mount and separation > 0:
+        raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {separation:g}")
     check_file("--map", map_file, ".png")
     check_directory("--out", out)
     poses = _poses(sensor=sensor, light=light, start=start)
@@ -83,6 +97,8 @@ def plan_command(
 
     limits = planner.Constraints(
         sensor_polar_deg=_range("--sensor-polar", sensor_polar), light_polar_deg=_range("--light-polar", light_polar),
+        sensor_azimuth_deg=_azimuths("--sensor-azimuth", sensor_azimuth),
+        light_azimuth_deg=_azimuths("--light-azimuth", light_azimuth), camera_body=camera_body, light_body=light_body,
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
@@ -117,8 +133,14 @@ def _check(found: planner.Plan, count: int) -> PlanCheck:
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:
-    if text is None:
-        return 0.0, 90.0
+    return (0.0, 90.0) if text is None else _two(option, text)
+
+
+def _azimuths(option: str, text: str | None) -> tuple[float, float] | None:
+    return None if text is None else _two(option, text)
+
+
+def _two(option: str, text: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError:

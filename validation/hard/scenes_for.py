@@ -9,6 +9,7 @@ import numpy as np
 import scenes
 from scenes import Mesh, Scene
 from scenes.parts.solid import Solid, block
+from scenes.units import Unit
 
 
 def task1(**changes: dict[str, Any]) -> Scene:
@@ -34,8 +35,7 @@ class _Made(Mesh):
 
     made: Any
 
-    @property
-    def solid(self) -> Solid:
+    def solid_in(self, unit: Unit | None) -> Solid:
         return self.made
 
     def __hash__(self) -> int:

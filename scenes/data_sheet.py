@@ -1,0 +1,95 @@
+"""A camera as its data sheets say it: what the image model needs follows from pitch, focal length and distances."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from scenes.units import Unit, in_unit
+
+_AGREE = 1e-6  # of a value that is said twice
+_SHEET = 0.02  # of a sensor's size: data sheets round it, and count rows that no picture shows
+
+
+def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
+    """A camera's table with ``width``, ``height``, ``distance`` and ``focal_px`` as its data sheets say.
+
+    The lens is taken to be focused at the distance d: its image then lies f d / (d - f) behind it, not f, and
+    ``focal_px`` is that over the pixel pitch.
+
+    Parameters
+    ----------
+    camera : dict
+        As in a scene's file. Values of the wrong kind are left to the model's own checks.
+    unit : str
+        Of ``distance``.
+
+    Raises
+    ------
+    ValueError
+        If what it says does not fit together, or is not enough.
+
+    Examples
+    --------
+    >>> sheet = {"pixel_pitch_um": 3.45, "focal_length_mm": 25.0, "sensor_size_mm": [8.45, 7.07]}
+    >>> camera = completed(sheet | {"working_distance_mm": 300.0}, "mm")
+    >>> camera["width"], camera["height"], camera["distance"], round(camera["focal_px"], 1)
+    (2449, 2049, 300.0, 7905.1)
+    """
+    pitch = _pitch(camera)
+    camera = _with_size(camera, pitch)
+    if _number(camera.get("working_distance_mm")):
+        camera = _said(camera, "distance", in_unit(camera["working_distance_mm"], "mm", unit), "working_distance_mm")
+    focal, distance = camera.get("focal_length_mm"), camera.get("distance")
+    if not (_number(focal) and _number(distance)):
+        return camera
+    if pitch is None:
+        raise ValueError("camera.pixel_pitch_um must be given with focal_length_mm, got nothing")
+    away = in_unit(distance, unit, "mm")
+    if not focal < away:
+        raise ValueError(f"camera.focal_length_mm must be less than the distance, {away:g} mm, got {focal:g}")
+    return _said(camera, "focal_px", focal * away / (away - focal) / pitch * 1000, "focal_length_mm")
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
+
+
+def _size(camera: dict[str, Any]) -> tuple[float, float] | None:
+    size = camera.get("sensor_size_mm")
+    return tuple(size) if isinstance(size, list | tuple) and len(size) == 2 and all(map(_number, size)) else None
+
+
+def _pitch(camera: dict[str, Any]) -> float | None:
+    """The pixel pitch, um; from the sensor's size where only that is given."""
+    pitch, size, width = camera.get("pixel_pitch_um"), _size(camera), camera.get("width")
+    if _number(pitch):
+        return pitch
+    return 1000 * size[0] / width if pitch is None and size and _number(width) else None
+
+
+def _with_size(camera: dict[str, Any], pitch: float | None) -> dict[str, Any]:
+    size = _size(camera)
+    if size is None:
+        return camera
+    if pitch is None:
+        raise ValueError("camera.pixel_pitch_um must be given with sensor_size_mm, or width and height, got nothing")
+    for key, length in zip(("width", "height"), size, strict=True):
+        pixels = 1000 * length / pitch
+        if camera.get(key) is None:
+            camera = {**camera, key: round(pixels) if pixels < 1e9 else pixels}
+        elif _number(camera[key]) and abs(camera[key] - pixels) > _SHEET * pixels:
+            raise ValueError(
+                f"camera.{key} must be about {pixels:.0f}, as sensor_size_mm and pixel_pitch_um say, got {camera[key]}"
+            )
+    return camera
+
+
+def _said(camera: dict[str, Any], key: str, value: float, source: str) -> dict[str, Any]:
+    """With a value that another key says; what is said twice has to be the same."""
+    given = camera.get(key)
+    if given is None:
+        return {**camera, key: value}
+    if _number(given) and abs(given - value) > _AGREE * value:
+        raise ValueError(f"camera.{key} must be {value:.9g}, as {source} says, got {given:g}")
+    return camera

@@ -1,0 +1,109 @@
+"""Boundaries of plane faces, and which of them are circles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
+_ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """A closed boundary of a plane face whose vertices lie on a circle."""
+
+    face: int
+    loop: tuple[int, ...]
+    centre: np.ndarray
+    radius: float
+
+    @property
+    def pieces(self) -> list[tuple[int, int]]:
+        """Ends of its straight pieces."""
+        return list(zip(self.loop, self.loop[1:] + self.loop[:1], strict=True))
+
+
+def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, normal: np.ndarray) -> list[tuple]:
+    """Boundaries of a plane face, the outer one first.
+
+    Parameters
+    ----------
+    triangles : ndarray of int, shape (n, 3)
+        Those that make up the face.
+    kept : ndarray of bool, shape (V,)
+        Vertices that an edge ends in; others lie on straight edges and are left out.
+    vertices : ndarray, shape (V, 3)
+    normal : ndarray, shape (3,)
+
+    Returns
+    -------
+    list of tuple of int
+        Vertices of each, counter-clockwise around the face.
+    """
+    halves = np.concatenate([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    there = {(a, b) for a, b in halves.tolist()}
+    after: dict[int, list[int]] = {}
+    for a, b in halves.tolist():
+        if (b, a) not in there:
+            after.setdefault(a, []).append(b)
+    loops = []
+    while after:
+        loop, here = [], next(iter(after))
+        while here in after:
+            loop.append(here)
+            onward = after[here].pop()
+            if not after[here]:
+                del after[here]
+            here = onward
+            if here == loop[0]:
+                break
+        loops.append(tuple(v for v in loop if kept[v]))
+    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+
+
+def _area(points: np.ndarray, normal: np.ndarray) -> float:
+    """Area inside a closed line of points, positive if it runs counter-clockwise around the normal."""
+    if len(points) < 3:
+        return 0.0
+    away = points - points[0]
+    return float(np.cross(away[1:-1], away[2:]).sum(0) @ normal) / 2
+
+
+def rims(loops: list[list[tuple[int, ...]]], vertices: np.ndarray, normals: np.ndarray) -> list[Rim]:
+    """The circles among the boundaries of faces."""
+    found = []
+    for face, boundaries_ in enumerate(loops):
+        for loop in boundaries_:
+            if len(loop) >= MIN_SEGMENTS:
+                centre, radius, off = circle_through(vertices[list(loop)], normals[face])
+                if off <= _ROUND * radius:
+                    found.append(Rim(face, loop, centre, radius))
+    return found
+
+
+def circle_through(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """The circle nearest to points of a plane, shape (n, 3): centre (3,), radius, and how far a point is off it.
+
+    Least squares of |p - c|^2 - r^2, which is linear in the centre; exact for points of a circle, whatever their steps.
+
+    Examples
+    --------
+    >>> angles = np.array([0, 0.1, 0.7, 2.0, 4.0])
+    >>> points = np.stack([3 + 2 * np.cos(angles), 2 * np.sin(angles), 0 * angles], 1)
+    >>> centre, radius, off = circle_through(points, np.array([0.0, 0, 1]))
+    >>> centre.round(9).tolist(), round(radius, 9), off < 1e-12
+    ([3.0, 0.0, 0.0], 2.0, True)
+    """
+    points = np.asarray(points)  # a mesh tracks its arrays
+    middle = points.mean(0)
+    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    one /= np.linalg.norm(one)
+    plane = np.stack([one, np.cross(normal, one)])
+    flat = (points - middle) @ plane.T
+    design = np.column_stack([2 * flat, np.ones(len(flat))])
+    x, y, _ = np.linalg.lstsq(design, (flat**2).sum(1))[0]
+    centre = middle + np.array([x, y]) @ plane
+    away = np.linalg.norm(points - centre, axis=1)
+    return centre, float(away.mean()), float(np.ptp(away))

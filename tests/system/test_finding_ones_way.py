@@ -1,0 +1,84 @@
+"""``ice new``, ``ice show`` and ``ice scenes``: from a part's file to a scene that runs."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import planner
+import scenes
+from tests.parts import bracket
+from validation.cli.main import app
+
+ICE = CliRunner()
+
+
+def ice(*arguments):
+    return ICE.invoke(app, list(map(str, arguments)))
+
+
+@pytest.fixture
+def part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bracket(24).export(tmp_path / "part.stl")
+    return tmp_path / "part.stl"
+
+
+def test_a_new_scene_runs(part):
+    """Its task is seen, lit, sharp and in the picture; its field of view holds the part."""
+    assert ice("new", part).exit_code == 0
+    scene = scenes.load("part.toml")
+    assert scene.units == "mm"
+    assert max(np.ptp(scene.solid.vertices, axis=0)) == pytest.approx(60)
+    assert 60 < min(scene.camera.field_of_view) < 180
+    (setting,) = scene.settings
+    found = planner.predict(scene, setting.sensor, setting.light)
+    assert found.status in ("ok", "clutter")
+    assert np.sqrt(found.variance_object) < 0.05
+    assert (np.abs(found.corners - [639.5, 511.5]) < [640, 512]).all()
+    text = (part.parent / "part.toml").read_text()
+    assert text.count("#") > 10
+
+
+@pytest.mark.parametrize("units", ["inch", "m"])
+def test_a_new_scene_in_other_units(part, units):
+    assert ice("new", part, "--units", units, "-o", "other.toml").exit_code == 0
+    scene = scenes.load("other.toml")
+    assert scene.units == units
+    assert 60 < min(scene.camera.field_of_view) < 180
+
+
+def test_what_new_refuses(part):
+    ice("new", part)
+    for arguments, line in [
+        (("new", part), "--output must be a new file, got part.toml, which exists"),
+        (("new", part, "--units", "ft", "-o", "x.toml"), "--units must be one of mm, cm, m, inch, got 'ft'"),
+        (("new", "none.stl", "-o", "x.toml"), "object.file must be a readable mesh"),
+    ]:
+        result = ice(*arguments)
+        assert isinstance(result.exception, scenes.InvalidInput)
+        assert str(result.exception).startswith(line)
+
+
+def test_show_lists_and_draws(part):
+    """Names, places and lengths are those that the part was made with."""
+    ice("new", part)
+    result = ice("show", "part.toml", "--sensor", "40,210", "-o", "part.png", "--json")
+    facts = json.loads(result.stdout)
+    assert {edge["name"]: edge["length"] for edge in facts["edges"]}["e3"] == pytest.approx(60, abs=1e-5)
+    assert {v["name"]: v["at"] for v in facts["vertices"]}["v8"] == pytest.approx([35, 0, 12], abs=1e-5)
+    assert [round(circle["diameter"], 4) for circle in facts["circles"]] == [8, 8, 10, 10]
+    assert [edge["name"] for edge in facts["edges"] if not edge["convex"]] == ["e13"]
+    assert (part.parent / "part.png").stat().st_size > 20_000
+    text = ice("show", "part.toml").stdout
+    assert "Edges, mm" in text
+    assert "v13" in text
+
+
+def test_show_of_a_bundled_scene_and_the_list_of_them():
+    facts = json.loads(ice("show", "task1", "--json").stdout)
+    assert (len(facts["vertices"]), len(facts["edges"]), facts["circles"]) == (8, 12, [])
+    listed = json.loads(ice("scenes", "--json").stdout)["scenes"]
+    assert tuple(row["name"] for row in listed) == scenes.names()
+    assert {row["name"]: row["units"] for row in listed}["bracket_mm"] == "mm"

@@ -1,0 +1,33 @@
+"""Large images: many rays only where something is measured from, and there the image is the same."""
+
+import numpy as np
+import pytest
+
+import measure
+import render
+import scenes
+from render import large
+
+pytestmark = pytest.mark.render
+SETTINGS = {"task1": ((30, 135), (15, 315)), "plate": ((35, 200), (20, 40)), "bracket": ((45, 135), (15, 0))}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_only_what_nothing_is_measured_by_gets_fewer_rays(name, monkeypatch):
+    """Beside required edges pixels differ by less than the rays' own noise, and so does what is measured there."""
+    scene, poses = scenes.load(name), SETTINGS[name]
+    picture = scenes.Picture.of(scene, *poses)
+    whole = render.image(scene, *poses)
+    monkeypatch.setattr(large, "LARGE", 0)
+    monkeypatch.setattr(large, "LARGE_RANDOM", 0)
+    sparse = render.image(scene, *poses)
+    assert not np.array_equal(whole, sparse)
+    off = np.abs(whole - sparse)
+    near = large.near_required(picture, (slice(0, 240), slice(0, 256)), 1)
+    assert 0.005 < near.mean() < 0.5
+    contrast = np.ptp(whole)
+    assert np.sqrt((off[near] ** 2).mean()) < 0.005 * contrast
+    assert off.max() < 0.12 * contrast
+    if name != "plate":
+        found = [measure.distance(image, scene, *poses, "gradient") for image in (whole, sparse)]
+        assert abs(found[0].value_px - found[1].value_px) < 0.5 * np.sqrt(found[0].variance_px2)

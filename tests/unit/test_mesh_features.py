@@ -1,0 +1,144 @@
+"""Faces, edges and circles of meshes against the dimensions that the parts were made with."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from scenes import InvalidInput
+from scenes.parts import mesh
+from tests.parts import Hole, bracket, evenly, prism, unevenly
+
+
+def through_a_file(made, folder, suffix="stl"):
+    """As it comes from a file, in single precision."""
+    path = folder / f"part.{suffix}"
+    made.export(path)
+    return mesh.read(path)
+
+
+def planes(solid):
+    """Directions and offsets of its plane faces that are no facets of a hole's wall."""
+    walls = {face for edge in solid.edges if edge.kind == "smooth" for face in edge.faces}
+    faces = [f for f in range(len(solid.faces)) if f not in walls]
+    return np.column_stack([solid.normals[faces], solid.offsets[faces]])
+
+
+@pytest.mark.parametrize("case", range(30))
+def test_random_plates_and_brackets_with_holes(case, tmp_path):
+    """Counts, places and sizes from the dimensions; rims of 12 to 120 unequal steps; to 1e-6 of the size."""
+    rng = np.random.default_rng(case)
+    length, width, height = size = rng.uniform([40, 25, 6], [120, 80, 20])
+    step, low = (0.6 * length, 0.5 * height) if case % 2 else (length, height)
+    profile = [(0, 0), (length, 0), (length, low), *([(step, low), (step, height)] if case % 2 else []), (0, height)]
+    holes = []
+    for left, right, top in ((0, step, height), (step, length, low)):
+        if right > left:
+            at = (left + right) / 2, width * rng.uniform(0.4, 0.6)
+            radius = 0.25 * min(right - left, width) * rng.uniform(0.4, 1)
+            holes.append(Hole(*at, radius, unevenly(rng, int(rng.integers(12, 121))), 0.0, top))
+    made = prism(profile, width, holes, seed=case)
+    solid = through_a_file(made, tmp_path, ("stl", "ply", "obj")[case % 3])
+    exact = 1e-6 * max(size)
+    assert (len(solid.sharp), len(solid.corner_names)) == (3 * len(profile), 2 * len(profile))
+    assert len(planes(solid)) == len(profile) + 2
+    corners = solid.vertices[[solid.vertex_names.index(name) for name in solid.corner_names]]
+    expected = np.array([(x, y, z) for x, z in profile for y in (0, width)])
+    assert np.abs(corners[:, None] - expected[None]).max(-1).min(1).max() < exact
+    assert len(solid.circles) == 2 * len(holes)
+    for hole in holes:
+        for level in (hole.bottom, hole.top):
+            away = [np.linalg.norm(circle.centre - [hole.x, hole.y, level]) for circle in solid.circles]
+            circle = solid.circles[int(np.argmin(away))]
+            assert min(away) < exact
+            assert abs(circle.radius - hole.radius) < exact
+            assert circle.hole
+            assert np.abs(circle.axis - [0, 0, -1 if level == 0 else 1]).max() < 1e-6
+            assert len(circle.edges) == len(hole.angles)
+    kinds = [edge.kind for edge in solid.edges]
+    assert kinds.count("rim") == 2 * kinds.count("smooth") == 2 * sum(len(hole.angles) for hole in holes)
+
+
+def test_the_bracket_of_several_hundred_mesh_edges(tmp_path):
+    made = bracket(96, seed=1)
+    solid = through_a_file(made, tmp_path)
+    assert len(made.edges_unique) > 1000
+    assert [edge.name for edge in solid.sharp] == [f"e{i}" for i in range(1, 22)]
+    assert [edge.name for edge in solid.sharp if not edge.convex] == ["e13"]  # at the foot of the step
+    assert [round(circle.radius, 5) for circle in solid.circles] == [4, 4, 5, 5]
+    assert sorted(map(len, solid.holes), reverse=True)[:4] == [2, 1, 1, 0]  # bottom, and both upper faces
+    assert solid.edge("c1.1").kind == "rim"
+
+
+def rounded(steps, radius=4.0):
+    """A block of 60 x 40 x 12 with one long edge rounded by a quarter of a cylinder."""
+    turn = np.linspace(0, np.pi / 2, steps + 1)
+    arc = [(60 - radius + radius * np.cos(a), 12 - radius + radius * np.sin(a)) for a in turn]
+    return prism([(0, 0), (60, 0), *arc, (0, 12)], 40.0)
+
+
+@pytest.mark.parametrize("steps", [3, 8, 40])
+def test_a_fillet_has_no_sharp_edges_of_its_own(steps):
+    """Its facets, and where it runs into the planes beside it, are smooth; its ends are curved: 11 are left."""
+    solid = mesh.solid(rounded(steps))
+    assert len(solid.sharp) == 11
+    kinds = [edge.kind for edge in solid.edges]
+    assert (kinds.count("smooth"), kinds.count("rim")) == (steps + 1, 2 * steps)
+
+
+def test_chamfers_and_shallow_roofs_stay_sharp():
+    """A chamfer of 45 degrees, two of 30, a ridge of 10: plane faces, whatever their angles."""
+    roof = mesh.solid(prism([(0, 0), (60, 0), (60, 10), (30, 15), (0, 10)], 40.0))
+    both = mesh.solid(prism([(0, 0), (60, 0), (60, 10), (56, 12.3), (4, 12.3), (0, 10)], 40.0))
+    assert len(roof.sharp) == len(roof.edges) == 15
+    assert len(both.sharp) == len(both.edges) == 18
+
+
+@pytest.mark.parametrize(
+    ("shape", "sharp", "circles"),
+    [
+        (trimesh.creation.icosphere(3), 0, 0),
+        (trimesh.creation.cylinder(3, 10, sections=96), 0, 2),
+        (trimesh.creation.cone(5, 8, sections=64), 0, 1),
+        (trimesh.creation.cylinder(3, 10, sections=8), 24, 0),
+        (trimesh.creation.annulus(2, 5, 4, sections=48), 0, 4),
+        (trimesh.creation.torus(5, 1.5), 0, 0),
+    ],
+    ids=["sphere", "cylinder", "cone", "octagon", "ring", "torus"],
+)
+def test_other_curved_surfaces(shape, sharp, circles):
+    solid = mesh.solid(shape)
+    assert (len(solid.sharp), len(solid.circles)) == (sharp, circles)
+
+
+def test_slivers_of_single_precision_are_flat():
+    """Thin triangles of a tilted face, whose own normals mean nothing."""
+    made = prism([(0, 0), (60, 0), (60, 12), (0, 12)], 40.0, [Hole(30, 20, 8, evenly(200), 0, 12)], seed=3)
+    made.apply_transform(trimesh.transformations.rotation_matrix(0.4, [1, 2, 3], [5, 5, 5]))
+    made.vertices = made.vertices.astype(np.float32).astype(float)
+    solid = mesh.solid(made)
+    assert len(planes(solid)) == 6
+    assert [round(circle.radius, 5) for circle in solid.circles] == [8, 8]
+
+
+def test_what_is_too_large_is_refused_with_the_limit(tmp_path):
+    path = tmp_path / "fine.stl"
+    trimesh.creation.icosphere(4).export(path)
+    with pytest.raises(InvalidInput, match="must have at most 2000 plane faces, got 5120"):
+        mesh.read(path)
+    path.write_bytes(b"\0" * 80 + (10**6).to_bytes(4, "little"))
+    with pytest.raises(InvalidInput, match=r"must be of at most 100000 triangles, got .* with 1000000"):
+        mesh.read(path)
+
+
+def test_a_mesh_of_many_triangles_has_few_faces(tmp_path):
+    """49,152 triangles: each of the box's faces is one, its edges are whole."""
+    made = trimesh.creation.box((60, 40, 12))
+    for _ in range(6):
+        made = made.subdivide()
+    assert len(made.faces) == 49152
+    path = Path(tmp_path / "fine.stl")
+    made.export(path)
+    solid = mesh.read(path)
+    assert (len(solid.faces), len(solid.sharp)) == (6, 12)

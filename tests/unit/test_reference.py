@@ -1,0 +1,51 @@
+"""The reference page and the schema of the scene format are those of the models."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import scenes
+from scenes import reference
+from scenes.load import BUNDLED
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_page_and_schema_are_up_to_date():
+    """`python -m scenes.reference docs` writes them anew."""
+    assert (DOCS / "scene-format.md").read_text() == reference.page()
+    assert json.loads((DOCS / "scene.schema.json").read_text()) == reference.schema()
+
+
+def test_every_key_has_a_meaning():
+    """Said of itself, or in the text above its table."""
+    whole = reference.schema()
+    for name, model in {"": whole, **whole["$defs"]}.items():
+        text = model.get("description", "")
+        for key, facts in model.get("properties", {}).items():
+            known = "description" in facts or f"``{key}``" in text or name in ("Corner", "Centre", "Task", "Locator")
+            assert known, (name, key)
+
+
+def unknown(document, schema, whole, path=""):
+    """Keys of a document that the schema does not know, and required ones that the document lacks."""
+    if "$ref" in schema:
+        schema = whole["$defs"][schema["$ref"].rsplit("/", 1)[-1]]
+    if isinstance(document, dict) and "properties" in schema:
+        yield from (f"{path}.{key}" for key in set(document) - set(schema["properties"]))
+        yield from (f"{path}.{key} (missing)" for key in set(schema.get("required", ())) - set(document))
+        for key in set(document) & set(schema["properties"]):
+            yield from unknown(document[key], schema["properties"][key], whole, f"{path}.{key}")
+    if isinstance(document, list) and isinstance(schema.get("items"), dict):
+        for i, item in enumerate(document):
+            yield from unknown(item, schema["items"], whole, f"{path}[{i}]")
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_bundled_scenes_keep_the_schema(name):
+    whole = reference.schema()
+    document = tomllib.loads((BUNDLED / f"{name}.toml").read_text())
+    assert list(unknown(document, whole, whole)) == []
+    assert list(unknown({**document, "camera": {"zoom": 2}}, whole, whole))

@@ -1,0 +1,81 @@
+"""``ice new``, ``ice show`` and ``ice scenes``: scenes to begin with, and what is in them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import scenes
+from validation.cli.common import Json, SceneName, commands, parse_pose, say
+from validation.cli.outputs import check_file
+from validation.report.terminal import console
+
+commands = commands()
+
+Part = Annotated[Path, typer.Argument(metavar="PART", help="STL, PLY or OBJ file.")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Default: PART.toml here.")]
+Units = Annotated[str, typer.Option(help=f"Unit of the file's numbers: {', '.join(scenes.UNITS)}.")]
+Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.png", help="Draw them with their names.")]
+Sensor = Annotated[str | None, typer.Option(metavar="P,A", help="Seen from there; else the first setting's sensor.")]
+
+
+@commands.command("new")
+def new_command(part: Part, output: Output = None, units: Units = "mm", as_json: Json = False) -> None:
+    """Write a commented scene of a part: a camera that sees all of it, a task, a setting. It runs as it is."""
+    from validation.new_scene import written
+
+    path = output or Path(f"{part.stem}.toml")
+    check_file("--output", path, ".toml")
+    if path.exists():
+        raise scenes.InvalidInput(f"--output must be a new file, got {path}, which exists")
+    made = written(part, path, units)
+    facts = {"file": str(path), "edges": len(made.solid.sharp), "circles": len(made.solid.circles)}
+    text = (
+        f"{path}: {facts['edges']} edges, {facts['circles']} circles; ice show {path} lists them, ice plan {path} plans"
+    )
+    say(facts, as_json, text)
+
+
+@commands.command("show")
+def show_command(scene: SceneName, sensor: Sensor = None, output: Picture = None, as_json: Json = False) -> None:
+    """List the vertices, edges and circles that a task can name, and draw them."""
+    check_file("--output", output, ".png")
+    pose = sensor and parse_pose("--sensor", sensor)
+    loaded = scenes.load(scene)
+    from validation.report import scene_table
+
+    pose = loaded.check_pose(
+        "sensor", pose or (loaded.settings[0].sensor if loaded.settings else (35, 300)), "--sensor"
+    )
+    if output is not None:
+        from validation.report.scene_figure import draw  # matplotlib takes half a second to load
+
+        draw(loaded, pose, output)
+    facts = {**scene_table.facts(loaded), "sensor": list(pose), "picture": output and str(output)}
+    if as_json:
+        print(json.dumps(facts, indent=1))
+        return
+    console().print(scene_table.report(loaded), highlight=False)
+    if output is not None:
+        print(f"picture: {output}, from {pose}")
+
+
+@commands.command("scenes")
+def scenes_command(as_json: Json = False) -> None:
+    """List the bundled scenes."""
+    loaded = [scenes.load(name) for name in scenes.names()]
+    facts = [
+        {
+            "name": s.name,
+            "title": s.title,
+            "units": s.units,
+            "settings": len(s.settings),
+            "file": str(scenes.find(s.name)),
+        }
+        for s in loaded
+    ]
+    lines = (f"{f['name']:<14} {f['settings']:>3} settings, {f['units']:<4} {f['title']}" for f in facts)
+    say({"scenes": facts}, as_json, "\n".join(lines))

@@ -1,0 +1,111 @@
+"""A scene's object with the names of its vertices, edges and circles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from planner import Pictures
+from planner.imaging.projection import facing, project
+from planner.imaging.visibility import visible_spans
+from scenes import Circle, Edge, Pose, Scene
+
+_PIECES = 9  # of an edge that a lens may bend
+_LABEL = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.75}
+
+
+def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
+    """Draw what the sensor sees of the object, its parts in colours by kind, with their names; a PNG file."""
+    view = _View(scene, sensor)
+    figure, axis = plt.subplots(figsize=(11, 9), layout="constrained")
+    _faces(axis, view)
+    for edge in scene.solid.sharp:
+        _edge(axis, view, edge)
+    for circle in scene.solid.circles:
+        _circle(axis, view, circle)
+    for name in scene.solid.corner_names:
+        _vertex(axis, view, name)
+    camera, (low, high) = scene.camera, (f(view.image(scene.solid.vertices), axis=0) for f in (np.nanmin, np.nanmax))
+    margin = 0.06 * (high - low).max()
+    axis.add_patch(plt.Rectangle((-0.5, -0.5), camera.width, camera.height, fill=False, ec="0.5", ls="--", lw=0.8))
+    axis.set(xlim=(low[0] - margin, high[0] + margin), ylim=(high[1] + margin, low[1] - margin), aspect="equal")
+    axis.set(xlabel="x, px", ylabel="y, px")
+    axis.set_title(f"{scene.name} seen from {sensor}: vertices (black), edges (blue), circles (red)", fontsize=11)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return path
+
+
+class _View:
+    """A scene as one sensor sees it."""
+
+    def __init__(self, scene: Scene, sensor: Pose) -> None:
+        pictures = Pictures.of(scene, list(sensor))
+        self.scene, self.pose, self.position = scene, pictures.sensors, pictures.sensor_at
+
+    def image(self, points: np.ndarray) -> np.ndarray:
+        """Places of points (n, 3), px, shape (n, 2)."""
+        return project(points, self.pose, self.scene.camera)
+
+    def spans(self, edge: Edge) -> list[tuple[float, float]]:
+        """The visible parts of an edge."""
+        return visible_spans(self.scene.bodies, edge, self.position)
+
+
+def _faces(axis, view: _View) -> None:
+    """Faces that are turned to the sensor, the farthest first, brighter where they face it."""
+    solid = view.scene.solid
+    shown, middles = facing(solid, view.position), solid.triangles.mean(1)
+    corners = view.image(solid.triangles.reshape(-1, 3)).reshape(-1, 3, 2)
+    away = np.linalg.norm(middles - view.position, axis=1)
+    for k in np.argsort(-away):
+        normal = solid.normals[solid.triangle_faces[k]]
+        if shown[solid.triangle_faces[k]]:
+            cosine = abs(normal @ (view.position - middles[k])) / away[k]
+            grey = str(0.55 + 0.37 * cosine)
+            axis.fill(*corners[k].T, color=grey, lw=0.5, ec=grey)
+
+
+def _edge(axis, view: _View, edge: Edge) -> None:
+    spans, solid = view.spans(edge), view.scene.solid
+    start, stop = solid.vertices[list(edge.ends)]
+    for span in spans:
+        points = view.image(start + np.linspace(*span, _PIECES)[:, None] * (stop - start))
+        axis.plot(*points.T, color="C0", lw=1.6, ls="-" if edge.convex else ":", solid_capstyle="round")
+    if spans:
+        middle = np.mean(max(spans, key=lambda span: span[1] - span[0]))
+        _name(axis, view.image((start + middle * (stop - start))[None])[0], edge.name, "C0")
+
+
+def _circle(axis, view: _View, circle: Circle) -> None:
+    seen = [edge for edge in map(view.scene.solid.edge, circle.edges) if view.spans(edge)]
+    if not seen:
+        return
+    ends = view.scene.solid.vertices[[edge.ends for edge in seen]]
+    for piece in ends:
+        axis.plot(*view.image(piece).T, color="C3", lw=1.6, solid_capstyle="round")
+    places = view.image(ends.mean(1))
+    _name(axis, places[places[:, 1].argmin()], circle.name, "C3")
+    centre = view.image(circle.centre[None])[0]
+    axis.plot(*centre, "+", color="C3", ms=7)
+
+
+def _vertex(axis, view: _View, name: str) -> None:
+    solid = view.scene.solid
+    index = solid.vertex_names.index(name)
+    for edge in solid.edges_at(name):
+        ends = {0.0: edge.ends[0], 1.0: edge.ends[1]}
+        if any(ends.get(at) == index for span in view.spans(edge) for at in span):
+            place = view.image(solid.vertex(name)[None])[0]
+            axis.plot(*place, "o", color="k", ms=4)
+            axis.annotate(name, place, xytext=(5, 6), textcoords="offset points", fontsize=9, fontweight="bold")
+            return
+
+
+def _name(axis, place: np.ndarray, text: str, colour: str) -> None:
+    axis.text(*place, text, color=colour, fontsize=9, ha="center", va="center", bbox=_LABEL, clip_on=True)

@@ -1,0 +1,87 @@
+"""What a scene's object has to name: vertices, edges and circles, with places and lengths."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from scenes import Scene
+
+
+def facts(scene: Scene) -> dict[str, Any]:
+    """For JSON; lengths in the scene's unit."""
+    solid = scene.solid
+    here = {name: solid.vertex(name).tolist() for name in solid.corner_names}
+    return {
+        "scene": scene.name,
+        "units": scene.units,
+        "vertices": [{"name": name, "at": at} for name, at in here.items()],
+        "edges": [
+            {
+                "name": edge.name,
+                "ends": [solid.vertex_names[end] for end in edge.ends],
+                "length": float(np.linalg.norm(np.subtract(*solid.vertices[list(edge.ends)]))),
+                "convex": edge.convex,
+            }
+            for edge in solid.sharp
+        ],
+        "circles": [
+            {
+                "name": circle.name,
+                "centre": circle.centre.tolist(),
+                "axis": circle.axis.tolist(),
+                "diameter": 2 * circle.radius,
+                "hole": circle.hole,
+            }
+            for circle in solid.circles
+        ],
+    }
+
+
+def report(scene: Scene) -> Group:
+    """The same as tables."""
+    known, unit, camera = facts(scene), scene.units, scene.camera
+    size = " x ".join(f"{x:.4g}" for x in np.ptp(scene.solid.vertices, axis=0))
+    view = " x ".join(f"{x:.4g}" for x in camera.field_of_view)
+    parts = [
+        Text(
+            f"{scene.title or scene.name}\n"
+            f"Object {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
+        )
+    ]
+    corners = _table(f"\nVertices, {unit}", "name", "x", "y", "z")
+    for vertex in known["vertices"]:
+        corners.add_row(vertex["name"], *map(_number, vertex["at"]))
+    edges = _table(f"\nEdges, {unit}", "name", "from", "to", "length", "")
+    for edge in known["edges"]:
+        edges.add_row(edge["name"], *edge["ends"], _number(edge["length"]), "" if edge["convex"] else "inner")
+    circles = _table(f"\nCircles, {unit}", "name", "x", "y", "z", "diameter", "")
+    for circle in known["circles"]:
+        row = circle["name"], *map(_number, circle["centre"]), _number(circle["diameter"])
+        circles.add_row(*row, "hole" if circle["hole"] else "outer")
+    tables = (t for t in (corners, edges, circles) if t.row_count)
+    return Group(*parts, *tables, Text(_smooth(scene)))
+
+
+def _smooth(scene: Scene) -> str:
+    left = len(scene.solid.edges) - len(scene.solid.sharp)
+    return (
+        f"\n{left} more edges stand for curved surfaces and their rims: nothing can be measured by them."
+        if left
+        else ""
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.6g}" if abs(value) > 1e-9 else "0"
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
+    for name in columns:
+        table.add_column(name, justify="left" if name in ("name", "") else "right", no_wrap=True)
+    return table
