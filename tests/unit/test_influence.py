@@ -87,9 +87,10 @@ def test_interreflection_needs_another_surface(task1, height):
     assert effect.absent(Pictures.of(hollow, SENSORS, LIGHTS)) is None
 
 
-def test_depth_of_field_widens_the_blur(task1):
+@pytest.mark.parametrize("focus", [85.0, 97.0, 120.0])
+def test_depth_of_field_widens_the_blur(focus, task1):
     """Marginal rays through 9 points of each required edge: a disc of radius r adds r^2 / 4 to the blur's square."""
-    lens = Lens(aperture_radius=0.4, focus=97.0)
+    lens = Lens(aperture_radius=0.4, focus=focus)
     scene = task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})})
     names = dict.fromkeys(name for corner in (scene.task.start, scene.task.end) for name in corner.edges)
     own = scene.locator.scale_px**2 + scene.camera.blur_px**2 + 1 / 12
