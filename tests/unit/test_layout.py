@@ -102,7 +102,7 @@ def test_slivers_become_background(task1):
     assert layout.without_slivers(1e-9) is layout
 
 
-@pytest.mark.parametrize("pose", [(40, 100), (65, 20), (80, 200), (30, 315)])
+@pytest.mark.parametrize("pose", [(40, 100), (65, 20), (80, 200), (30, 315), (88.56, 100), (88.56, 280)])
 def test_faces_beside_an_edge_are_told_by_their_middle(pose, task1):
     """Each required edge's seen faces, on the side where the middle of the face's picture is; slivers too."""
     layout = layout_of(scenes.Picture.of(task1, pose))
