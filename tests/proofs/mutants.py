@@ -51,6 +51,7 @@ OPERATORS = tuple(
 )
 _FILES = 3  # unit test files that a mutant meets, and as many others
 _LIMIT_S = 30  # processor seconds of them together
+_IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 
 
@@ -86,20 +87,40 @@ def sources(root: Path = ROOT) -> list[str]:
 
 
 def nearest(file: str, root: Path = ROOT) -> list[str]:
-    """The test files that use most of a module's names: of the quick unit tests first, then of the others.
+    """The test files that use most of a module: of the quick unit tests first, then of the others.
 
-    Each name weighs less the more files use it.
+    Importing the module counts most; of its names each weighs less the more files use it. For a module that no test
+    uses, those of the modules that import it.
     """
-    files = [path for name in TESTS for path in sorted((root / name).glob("test_*.py"))]
-    texts = {path: set(re.findall(r"\w+", path.read_text(encoding="utf-8"))) for path in files}
-    tree = ast.parse((root / file).read_text(encoding="utf-8"))
-    names = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)} | {Path(file).stem}
-    names = {name for name in names if not name.startswith("_") and len(name) >= _COMMON}
-    uses = {name: sum(name in words for words in texts.values()) for name in names}
-    score = {path: sum(1 / uses[name] for name in names if name in words) for path, words in texts.items()}
-    best = sorted((path for path in texts if score[path]), key=lambda path: (-score[path], str(path)))
+    tests = {
+        path: path.read_text(encoding="utf-8") for name in TESTS for path in sorted((root / name).glob("test_*.py"))
+    }
+    score = _score(file, root, tests)
+    if not any(score.values()):
+        uses = [other for other in sources(root) if _module(file) in (root / other).read_text(encoding="utf-8")]
+        every = [_score(other, root, tests) for other in uses]
+        score = {path: sum(each[path] for each in every) for path in tests}
+    best = sorted((path for path in tests if score[path]), key=lambda path: (-score[path], str(path)))
     unit = [path for path in best if path.parent.name == "unit"][:_FILES]
     return [str(path.relative_to(root)) for path in (*unit, *[path for path in best if path not in unit][:_FILES])]
+
+
+def _module(file: str) -> str:
+    return file.removesuffix(".py").replace("/", ".")
+
+
+def _score(file: str, root: Path, tests: dict[Path, str]) -> dict[Path, float]:
+    """How much of a module each test file uses."""
+    words = {path: set(re.findall(r"\w+", text)) for path, text in tests.items()}
+    tree = ast.parse((root / file).read_text(encoding="utf-8"))
+    names = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)} | {Path(file).stem}
+    names = {name for name in names if len(name) >= _COMMON and not name.startswith("__")}
+    uses = {name: sum(name in some for some in words.values()) for name in names}
+    imported = re.compile(rf"\b{re.escape(_module(file))}\b")
+    return {
+        path: _IMPORTED * bool(imported.search(text)) + sum(1 / uses[name] for name in names if name in words[path])
+        for path, text in tests.items()
+    }
 
 
 def changed(mutant: Mutant, root: Path) -> tuple[str, str]:

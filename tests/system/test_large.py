@@ -21,7 +21,7 @@ WRITING = 900_000  # bytes, however many settings there are; most is garbage of 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     directories = [tmp_path_factory.mktemp("large") for _ in range(2)]
-    return [(directory, fabricate(size, directory)) for directory, size in zip(directories, (81, 625), strict=True)]
+    return [(directory, fabricate(size, directory)) for directory, size in zip(directories, (81, 1296), strict=True)]
 
 
 def memory(directory, use):

@@ -7,8 +7,8 @@ import measure
 import render
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from render.renderer import window
-from scenes import InvalidInput, Picture
+from render.renderer import Quality, window
+from scenes import Floor, InvalidInput, Lens, Picture
 from tests.oracle import axes, block_image, pinhole, polygon_image
 
 pytestmark = pytest.mark.render
@@ -97,6 +97,25 @@ def test_only_what_the_object_covers_is_rendered(task1):
     assert columns.start < corners[:, 0].min() - 4 * 0.6
     assert rows.stop > corners[:, 1].max() + 4 * 0.6
     assert (rows.stop - rows.start) * (columns.stop - columns.start) < 0.4 * 256 * 240
+
+
+def test_a_bent_picture_does_not_depend_on_how_much_of_it_is_rendered(task1):
+    """A black floor calls for the whole frame; without it only the object's window, off the middle, is rendered."""
+    lens = Lens(distortion=(-1.5, 0.0, 0.01, -0.02))
+    camera = task1.camera.model_copy(update={
+        "width": 80, "height": 60, "focal_px": 200.0, "lens": lens, "look_at": (3.0, 12.0, 0.0),
+    })  # fmt: skip
+    scene = task1.model_copy(update={"camera": camera, "settings": ()})
+    effects, quality = {"attached_shadow", "fall_off", "lens_blur", "lens_distortion"}, Quality(4, 4, 16)
+    floored = scene.model_copy(update={"floor": Floor(reflectance=1e-9, height=-40.0)})
+    part = render.image(scene, (30, 135), (15, 315), quality, effects=effects)
+    whole = render.image(floored, (30, 135), (15, 315), quality, effects={*effects, "floor"})
+    rows, columns = window(Picture.of(scene, (30, 135), (15, 315)))
+    assert rows.start != columns.start
+    assert (rows, columns) != window(Picture.of(floored, (30, 135), (15, 315)))
+    assert np.abs(part - whole).max() < 0.05 * np.ptp(whole)  # other rays at the edges
+    flat = render.image(scene, (30, 135), (15, 315), quality, effects=effects - {"lens_distortion"})
+    assert np.abs(part - flat).max() > 0.3 * np.ptp(whole)  # negative control
 
 
 def test_object_outside_the_image_is_darkness(task1):

@@ -76,7 +76,7 @@ def test_lengths_in_the_image(task1):
     names = list(dict.fromkeys(name for corner in (task1.task.start, task1.task.end) for name in corner.edges))
     pairs = [(a, b) for a in names for b in names if a < b and not set(solid.edge(a).ends) & set(solid.edge(b).ends)]
     assert pairs
-    fractions = np.linspace(0, 1, 401)[:, None]
+    fractions = np.linspace(0, 1, 201)[:, None]
     least = []
     for pose in poses:
         lines = {}

@@ -9,7 +9,7 @@ from planner.imaging.pictures import Pictures
 from render.phenomena.base import SAFETY
 from render.phenomena.register import REGISTER
 from scenes import Floor, Jitter, Lens
-from tests.oracle import pinhole
+from tests.oracle import axes, pinhole
 
 SENSORS = np.array([[30.0, 135.0], [50.0, 60.0]])
 LIGHTS = np.array([[15.0, 315.0], [30.0, 200.0]])
@@ -85,3 +85,35 @@ def test_interreflection_needs_another_surface(task1, height):
     assert effect.absent(Pictures.of(task1, SENSORS, LIGHTS)) is not None
     hollow = scenes.load("bracket")
     assert effect.absent(Pictures.of(hollow, SENSORS, LIGHTS)) is None
+
+
+@pytest.mark.parametrize("focus", [85.0, 97.0, 120.0])
+def test_depth_of_field_widens_the_blur(focus, task1):
+    """Marginal rays through 9 points of each required edge: a disc of radius r adds r^2 / 4 to the blur's square."""
+    lens = Lens(aperture_radius=0.4, focus=focus)
+    scene = task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})})
+    names = dict.fromkeys(name for corner in (scene.task.start, scene.task.end) for name in corner.edges)
+    own = scene.locator.scale_px**2 + scene.camera.blur_px**2 + 1 / 12
+    most = 0.0
+    for pose in SENSORS:
+        out = axes(pose)[0]
+        for name in names:
+            start, stop = scene.solid.vertices[list(scene.solid.edge(name).ends)]
+            points = start + np.linspace(0, 1, 9)[:, None] * (stop - start)
+            depth = scene.camera.distance - points @ out
+            radius = np.abs(lens.aperture_radius * (1 - lens.focus / depth)) / lens.focus * scene.camera.focal_px
+            most = max(most, (radius**2 / 4).max())
+    effect = REGISTER["depth_of_field"]
+    found = effect.influence(Pictures.of(scene, SENSORS, LIGHTS))
+    assert found.variance == pytest.approx(SAFETY * ((1 + most / own) ** 3 - 1), rel=1e-9)
+    assert found.bias_px > 0
+    inside = task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens, "distance": 8.0})})
+    assert effect.influence(Pictures.of(inside, np.array([[60.0, 30.0]]), LIGHTS[:1])).variance == np.inf
+    assert effect.absent(Pictures.of(task1, SENSORS, LIGHTS)) == "the aperture is a pinhole"
+
+
+def test_blur_of_the_lens(task1):
+    """A point's variance is as (s^2 + s_e^2)^3."""
+    found = REGISTER["lens_blur"].influence(Pictures.of(task1, SENSORS, LIGHTS))
+    own, blur = task1.locator.scale_px**2, task1.camera.blur_px**2 + 1 / 12
+    assert found.variance == pytest.approx(SAFETY * ((1 + blur / own) ** 3 - 1), rel=1e-12)

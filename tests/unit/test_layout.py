@@ -6,6 +6,7 @@ import pytest
 import scenes
 from measure.features.layout import BACKGROUND, layout_of, polygon_layout
 from measure.features.optics import Optics
+from tests.oracle import axes
 
 OPTICS = Optics((60, 80), 0.7, 4.0)
 CORNERS = np.array([[20.0, 12.0], [62.0, 18.0], [55.0, 47.0], [17.0, 40.0]])
@@ -99,3 +100,21 @@ def test_slivers_become_background(task1):
     assert set(found.sides.ravel().tolist()) == {BACKGROUND, kept[0]}
     assert len(found.others) < len(layout.others)
     assert layout.without_slivers(1e-9) is layout
+
+
+@pytest.mark.parametrize("pose", [(40, 100), (65, 20), (80, 200), (30, 315), (88.56, 100), (88.56, 280)])
+def test_faces_beside_an_edge_are_told_by_their_middle(pose, task1):
+    """Each required edge's seen faces, on the side where the middle of the face's picture is; slivers too."""
+    layout = layout_of(scenes.Picture.of(task1, pose))
+    for i, name in enumerate(layout.names):
+        shown = [f for f in layout.sides[i] if f != BACKGROUND]
+        assert len(shown) == len(set(shown)) == sum(_seen(task1, face, pose) for face in task1.solid.edge(name).faces)
+        for side, face in enumerate(layout.sides[i]):
+            if face != BACKGROUND:
+                away = (layout.faces[face].mean(0) - layout.ends[i, 0]) @ layout.normals[i]
+                assert (away > 0) == (side == 0)
+
+
+def _seen(scene, face, pose):
+    corner = scene.solid.vertices[scene.solid.faces[face][0]]
+    return (scene.camera.distance * axes(pose)[0] - corner) @ scene.solid.normals[face] > 0
