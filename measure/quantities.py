@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -44,8 +45,6 @@ class Found:
     errors : ndarray, shape (n, q, q)
         Joint covariance of lines and circles; those of different circles, and of circles and lines, count as
         independent, for they are found from different pixels.
-    image, plane : Values
-        In the image (px, degrees) and on the planes of the features (the scene's unit, degrees).
     status : ndarray of str, shape (n, M)
     """
 
@@ -54,9 +53,17 @@ class Found:
     circles: tuple[Circles, ...]
     seen: Seen
     errors: np.ndarray
-    image: Values
-    plane: Values
     status: np.ndarray
+
+    @cached_property
+    def image(self) -> Values:
+        """In the image: px, degrees."""
+        return values(self.seen, self.known.quantities, in_image, self.errors)
+
+    @cached_property
+    def plane(self) -> Values:
+        """On the planes of the features: the scene's unit, degrees."""
+        return values(self.seen, self.known.quantities, on_plane, self.errors)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,8 +102,6 @@ def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float 
         circles=circles,
         seen=seen,
         errors=errors,
-        image=values(seen, known.quantities, in_image, errors),
-        plane=values(seen, known.quantities, on_plane, errors),
         status=_states(known, layout, shape, circles),
     )
 

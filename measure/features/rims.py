@@ -256,7 +256,7 @@ def _weights(
     if pictures.lights:
         squared, noise = contrast_along(pictures, circle, angle)
         strong = seen & (squared >= MIN_CONTRAST**2 * noise)
-        weight, clear = arc * squared / noise, clear & steady(squared, arc, far)
+        weight, clear = arc * squared / noise, clear & steady(squared, shading_shift(pictures, circle, angle), arc, far)
         if strong.mean() < LEAST_SEEN:
             return np.zeros(seen.size), status.LOW_CONTRAST
     part = (strong & clear).mean()

@@ -18,6 +18,7 @@ from planner.features.rim_sides import (
     equal_angles,
     outward_normals,
     radials,
+    shading_shift,
     steady,
 )
 from planner.features.seen import plane_axes
@@ -77,7 +78,8 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     arc, far = speed * 2 * np.pi / RIM_POINTS, reach(scene.locator.scale_px, scene.camera.blur_px)
-    clear = (clearance(pictures, circle, angle) >= far) & steady(squared, arc, far)
+    shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
+    clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
     return Rim(design, arc, squared, noise, clear)
 
 

@@ -14,6 +14,7 @@ from scenes import Circle, Solid
 
 RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
+_MOST_SHIFT = 0.15  # px by shading
 _MOST_AWAY = 16  # places beyond which no jump is looked for
 _STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
 _AT_ONCE = 1 << 17  # numbers
@@ -87,14 +88,17 @@ def _step_on(slope: np.ndarray, first: np.ndarray, second: np.ndarray, moved: np
     return np.where(np.isfinite(steps) & (np.abs(steps) < 1e9), steps, 0.0)
 
 
-def steady(squared: np.ndarray, arc: np.ndarray, far: float) -> np.ndarray:
-    """Whether a rim's squared contrast (..., n) does not jump within ``far`` px along it, bool, shape (..., n).
+def steady(squared: np.ndarray, shift: np.ndarray, arc: np.ndarray, far: float) -> np.ndarray:
+    """Whether a rim's squared contrast (..., n) is even within ``far`` px along it, bool, shape (..., n).
 
-    Where a shadow or another edge meets the rim it does. ``arc`` (..., n) is the length that each place stands for, px.
+    It jumps where a shadow or another edge meets the rim; where the wall turns away from the sensor, shading shifts the
+    edge (..., n) by more than a first order tells. ``arc`` (..., n) is the length that each place stands for, px.
     """
     contrast = np.sqrt(squared)
     onward = np.roll(contrast, -1, -1)
     jump = np.abs(onward - contrast) > _JUMP * np.maximum(onward, contrast)  # between a place and the next
+    bent = np.abs(shift) > _MOST_SHIFT
+    jump = jump | bent | np.roll(bent, -1, -1)
     arc = np.broadcast_to(arc, jump.shape)
     good, ahead, behind = ~(jump | np.roll(jump, 1, -1)), np.zeros(jump.shape), np.zeros(jump.shape)
     for k in range(1, _MOST_AWAY):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures, pose_spread
+from planner import Pictures, pose_scatter
 from planner.jitter import LEAST_SINE
 from planner.models import DEFAULT_MODEL, variance_model
 from render.phenomena.base import SAFETY, Effect, Influence, changed
@@ -23,12 +23,12 @@ class PoseJitter(Effect):
         return "poses are exact" if scene.jitter.sensor_deg == 0 and scene.jitter.light_deg == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        """By how much the projected distance changes with the sensor's pose; the light only changes contrasts."""
+        """By how much the projected values change with the sensor's pose; the light only changes contrasts."""
         scene = pictures.scene
-        spread = pose_spread(scene, pictures.sensors)
-        own = variance_model(DEFAULT_MODEL)(pictures).variance
+        spread = pose_scatter(scene, pictures.sensors)
+        own = variance_model(DEFAULT_MODEL)(pictures).variances
         contrast = 6 * np.radians(scene.jitter.light_deg) ** 2  # the mean of 1 / cos^2 over small tilts
-        share = float(np.max(spread.variance / own) + contrast)
+        share = float(np.max(np.einsum("smm->sm", spread.covariance) / own) + contrast)
         return Influence(SAFETY * float(spread.bias.max()), SAFETY * share)
 
     def without(self, scene: Scene) -> Scene:
