@@ -26,7 +26,8 @@ from validation.batch import measurands
 from validation.batch.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
-_BATCH = 50  # images held in memory at a time
+_BATCH = 50  # images held in memory at a time, and fewer of more than ...
+_MOST_PIXELS = 1 << 25  # ... pixels, 256 MiB
 Shots = Callable[[np.random.Generator, int], np.ndarray]  # stacks of pictures
 _RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
 
@@ -232,9 +233,10 @@ def measure_chunk(
     where = measure.region_of_interest(picture)
     clock.lap("prepare")
     parts: dict[str, list[measure.Measurements]] = {method.name: [] for method in methods(scene)}
-    for batch, first in enumerate(range(0, count, _BATCH)):
+    size = max(1, min(_BATCH, _MOST_PIXELS // image.size))
+    for batch, first in enumerate(range(0, count, size)):
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
-        many = min(_BATCH, count - first)
+        many = min(size, count - first)
         pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
         clock.lap("expose")
         for method in methods(scene):

@@ -84,7 +84,9 @@ def plan_command(
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
     check_number("--check", check, 1, _MOST_CHECKED)
-    check_number("--separation", separation, 0, 180)
+    if not 0 <= separation <= 180:
+        limit = "least 0" if separation < 0 else "most 180"
+        raise scenes.InvalidInput(f"--separation: min_separation_deg must be at {limit}, got {separation:g}")
     check_number("--camera-body", camera_body, 0, 1e12)
     check_number("--light-body", light_body, 0, 1e12)
     if same_mount and separation > 0:

@@ -146,7 +146,7 @@ def _seen(plan: Plan, path: Path) -> Path:
         if shown[face]:
             grey = str(0.08 + 0.85 * levels[k] / brightest)
             axis.fill(*corners[k].T, color=grey, lw=0.4, ec=grey)
-    for edge in solid.edges:
+    for edge in (edge for edge in solid.edges if edge.kind != "smooth"):
         for span in visible_spans(scene.bodies, edge, position):
             _segment(axis, scene, pose, edge, span, color="0.5", lw=0.7)
     view = projected_edges(pictures)
