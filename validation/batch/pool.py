@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def local(workers: int) -> Iterator[Crew]:
             finally:
                 executor.shutdown(cancel_futures=True)
         return
-    context = _Spawn()
+    context, others = _Spawn(), set(multiprocessing.active_children())
     ours, theirs = context.Pipe()
     executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs,))
     try:
@@ -53,11 +55,20 @@ def local(workers: int) -> Iterator[Crew]:
     except BaseException:
         ours.close()
         theirs.close()
+        _end(set(multiprocessing.active_children()) - others)
         raise
     finally:
         executor.shutdown(cancel_futures=True)
         ours.close()
         theirs.close()
+
+
+def _end(processes: set[BaseProcess]) -> None:
+    """At once: one that is just starting would miss what this process takes with it, and say so."""
+    for process in processes:
+        process.kill()
+    for process in processes:
+        process.join()
 
 
 @contextmanager
