@@ -20,7 +20,7 @@ bench-measure: $(VENV)/.test-installed
 fuzz: $(VENV)/.test-installed
 	OMP_NUM_THREADS=1 $(BIN)/python -m tests.hard.fuzzing --count 20000 --workers 2
 
-# 200 slips planted one at a time: which of them does no test notice? (an hour)
+# 200 slips planted one at a time: which of them does no test notice? (more than an hour; known outcomes are kept)
 mutants: $(VENV)/.test-installed
 	$(BIN)/python -m tests.proofs.mutants --count 200 --workers 2
 
