@@ -135,7 +135,8 @@ def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndar
 def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
 
-    Boundaries are the wall's other rim, where the wall beside the place is seen, and straight edges of the face.
+    Boundaries are the wall's other rim, where the wall at it is turned to the sensor - beside the place, or seen through
+    the hole -, and straight edges of the face.
     """
     solid, radial = pictures.scene.solid, radials(circle, angle)
     points = circle.centre + circle.radius * radial
@@ -143,16 +144,17 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
     nearest = np.full(there.shape[:-1], np.inf)
     for other in solid.circles:
         if _coaxial(circle, other):
-            wall = -radial if circle.hole else radial
-            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - points) > 0
-            away = _to_curve(there, _image(pictures, other.centre + other.radius * radials(other, equal_angles())))
-            nearest = np.where(turned, np.minimum(nearest, away), nearest)
+            spokes = radials(other, equal_angles())
+            far = other.centre + other.radius * spokes
+            wall = -spokes if other.hole else spokes
+            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
+            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, far), turned))
     own = {name for rim in solid.circles for name in rim.edges}
     for edge in solid.edges:
         if circle.face in edge.faces and edge.name not in own:
             start, stop = solid.vertices[list(edge.ends)]
             places = start + np.linspace(0, 1, _STRAIGHT)[:, None] * (stop - start)
-            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, places), closed=False))
+            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, places)))
     return nearest
 
 
@@ -174,8 +176,12 @@ def _coaxial(circle: Circle, other: Circle) -> bool:
     )
 
 
-def _to_curve(points: np.ndarray, curve: np.ndarray, *, closed: bool = True) -> np.ndarray:
-    """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n)."""
+def _to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
+    """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n).
+
+    Of a closed one where ``shown`` (..., k) says which of its pieces count, each from its first point.
+    """
+    closed = shown is not None
     start, stop = (curve, np.roll(curve, -1, -2)) if closed else (curve[..., :-1, :], curve[..., 1:, :])
     nearest = np.full(points.shape[:-1], np.inf)
     pieces = start.shape[-2]
@@ -185,7 +191,10 @@ def _to_curve(points: np.ndarray, curve: np.ndarray, *, closed: bool = True) -> 
         along, away = b - a, points[..., None, :] - a
         size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
         share = np.clip((away * along).sum(-1) / size, 0, 1)
-        nearest = np.minimum(nearest, np.linalg.norm(away - share[..., None] * along, axis=-1).min(-1))
+        apart = np.linalg.norm(away - share[..., None] * along, axis=-1)
+        if closed:
+            apart = np.where(shown[..., None, k : k + many], apart, np.inf)
+        nearest = np.minimum(nearest, apart.min(-1))
     return nearest
 
 
