@@ -19,6 +19,7 @@ _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
 _FOCAL_MM = (4, 6, 8, 12, 16, 25, 35, 50, 75, 100)
 _FILLS = 0.7  # of the field of view's height, by the part's diagonal
 _NEAR, _FAR = 8.0, 20.0  # focal lengths between lens and part
+_TRIED = 24  # settings of least variance, of which the first that is not cluttered is taken
 _SENSORS = list(itertools.product((20, 35, 50), range(0, 360, 30)))
 _LIGHTS = list(itertools.product((25, 45, 60), range(0, 360, 60)))
 
@@ -101,20 +102,28 @@ def written(part: Path, path: Path, units: str) -> Scene:
     tasks = _tasks(solid)
     if not tasks:
         raise InvalidInput(f"PART must have two corners of sharp edges, got none in {part}")
-    text, best = "", np.inf
+    text, best = "", (True, np.inf)
     for start, end in tasks[:4]:
         made = _TEXT.format(**values, start=start, end=end, sensor="[30.0, 30.0]", light="[30.0, 90.0]")
         scene = _loaded(made, path)
-        variance = planner.variances(scene, np.array(_SENSORS)[:, None], np.array(_LIGHTS)[None], objective="image")
-        sensor, light = np.unravel_index(variance.argmin(), variance.shape)
-        if variance.min() < best:
-            best = variance.min()
-            poses = {"sensor": [float(x) for x in _SENSORS[sensor]], "light": [float(x) for x in _LIGHTS[light]]}
-            text = _TEXT.format(**values, start=start, end=end, **poses)
+        found, poses = _setting(scene)
+        if found < best:
+            best, text = found, _TEXT.format(**values, start=start, end=end, **poses)
     if not text:
         raise InvalidInput(f"PART must have two corners that can be seen at once, got none such in {part}")
     path.write_text(text, encoding="utf-8")
     return scenes.load(path)
+
+
+def _setting(scene: Scene) -> tuple[tuple[bool, float], dict[str, list[float]]]:
+    """How good the best setting of a coarse grid is (not ``ok``, variance), and its poses."""
+    variance = planner.variances(scene, np.array(_SENSORS)[:, None], np.array(_LIGHTS)[None], objective="image")
+    rows = []
+    for sensor, light in zip(*np.unravel_index(variance.ravel().argsort()[:_TRIED], variance.shape), strict=True):
+        poses = {"sensor": list(map(float, _SENSORS[sensor])), "light": list(map(float, _LIGHTS[light]))}
+        clear = np.isfinite(variance[sensor, light]) and planner.predict(scene, *poses.values()).status == "ok"
+        rows.append(((not clear, float(variance[sensor, light])), poses))
+    return min(rows, key=lambda row: row[0])
 
 
 def _loaded(text: str, path: Path) -> Scene:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import measure
 import planner
+import render
 import scenes
-from tests.parts import bracket
+from tests.parts import Hole, bracket, prism, unevenly
 from validation.cli.main import app
 
 ICE = CliRunner()
@@ -39,6 +41,28 @@ def test_a_new_scene_runs(part):
     assert (np.abs(found.corners - [639.5, 511.5]) < [640, 512]).all()
     text = (part.parent / "part.toml").read_text()
     assert text.count("#") > 10
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("case", range(2))
+def test_random_parts_from_a_file_to_a_measured_value(case, tmp_path):
+    """A plate and a bracket with a hole, their edges' lengths known: read, predicted, rendered, measured to 4 sigma."""
+    rng = np.random.default_rng(case)
+    length, width, height = rng.uniform([40, 25, 6], [120, 80, 20])
+    step, low = (0.6 * length, 0.5 * height) if case else (length, height)
+    profile = [(0, 0), (length, 0), (length, low), *([(step, low), (step, height)] if case else []), (0, height)]
+    hole = Hole(step / 2, width / 2, 0.2 * min(step, width), unevenly(rng, 40), 0.0, height)
+    prism(profile, width, [hole], seed=case).export(tmp_path / "part.stl")
+    assert ice("new", tmp_path / "part.stl", "-o", tmp_path / "part.toml").exit_code == 0
+    scene = scenes.load(tmp_path / "part.toml")
+    (setting,) = scene.settings
+    predicted = planner.predict(scene, setting.sensor, setting.light)
+    assert predicted.status == "ok"
+    assert min(abs(predicted.value_object - side) for side in (length, width, step, length - step)) < 1e-4
+    clean = render.image(scene, setting.sensor, setting.light)
+    image = render.expose(clean, scene.noise, rng, 1)[0]
+    found = measure.distance(image, scene, setting.sensor, setting.light, "gradient")
+    assert abs(found.value_px - predicted.value_px) < 4 * np.sqrt(found.variance_px2)
 
 
 @pytest.mark.parametrize("units", ["inch", "m"])
