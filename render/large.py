@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter
 
+from planner import edges_of
 from planner.imaging.projection import project
 from render.adaptive import MISSED, crossed
 from scenes import Picture
@@ -96,7 +97,7 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
     circles = {circle.name: circle.edges for circle in scene.solid.circles}
-    names = [piece for name in scene.task.edges for piece in circles.get(name, (name,))]
+    names = [piece for name in edges_of(scene) for piece in circles.get(name, (name,))]
     ends = scene.solid.vertices[[scene.solid.edge(name).ends for name in names]]
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
     x, y = np.nan_to_num(project(places, np.array(list(picture.sensor)), scene.camera), nan=-1e9).T
