@@ -138,7 +138,7 @@ def _ratios(found: Validation) -> Table:
 def _measurands(found: Validation) -> Table:
     """Every measurand of the rows that are shown, in the scene's unit."""
     rows, which = far(found)
-    headings, cells = names(found)
+    headings, cells = names(found, rows)
     table = _table(
         "\nAll measurands, in the scene's unit (1 sigma)",
         *headings, "measurand", "value", "unit", "calibrated", "propagated", "measured", "ratio", "bias", "status",
