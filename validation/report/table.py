@@ -19,7 +19,7 @@ _UNIT = 1e-4  # px^2; what the measured variances are printed in
 def report(found: Validation) -> Group:
     """Everything that ``ice validate`` prints."""
     parts = [Text(found.title, style="bold"), _variances(found), _ratios(found)]
-    if any(len(row.measurands) > 1 for row in found.rows):
+    if not found.rows.measured.are_single:
         parts.append(_measurands(found))
     if found.search:
         parts.append(_search(found))
@@ -79,7 +79,7 @@ def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list
 
 def _what(found: Validation) -> str:
     """What the tables in px are about."""
-    several = any(len(row.measurands) > 1 for row in found.rows)
+    several = not found.rows.measured.are_single
     return f"the first measurand, {found.rows[0].measurands[0].name}, in the image" if several else "the distance"
 
 
