@@ -135,8 +135,8 @@ def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndar
 def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
 
-    Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the sensor,
-    beside the place or seen through the hole.
+    Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the
+    sensor, beside the place or seen through the hole.
     """
     solid, radial = pictures.scene.solid, radials(circle, angle)
     points = circle.centre + circle.radius * radial
