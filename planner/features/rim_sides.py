@@ -14,7 +14,7 @@ from scenes import Circle, Solid
 
 RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
-_MOST_SHIFT = 0.15  # px by shading
+_MOST_SHIFT = 0.08  # px by shading: beyond, the wall is seen too flat for a first order
 _MOST_AWAY = 16  # places beyond which no jump is looked for
 _STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
 _AT_ONCE = 1 << 17  # numbers
@@ -135,8 +135,8 @@ def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndar
 def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
 
-    Boundaries are the wall's other rim, where the wall at it is turned to the sensor - beside the place, or seen
-    through the hole -, and straight edges of the face.
+    Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the
+    sensor, beside the place or seen through the hole.
     """
     solid, radial = pictures.scene.solid, radials(circle, angle)
     points = circle.centre + circle.radius * radial

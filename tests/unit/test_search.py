@@ -134,9 +134,9 @@ def test_plans_of_hollow_and_round_objects(name, step, rng):
     scene = scenes.load(name)
     found = planner.plan(scene, step_deg=step, refined=False)
     assert found.prediction.status in ("ok", "clutter")
-    told = found.prediction
-    value = told.variance_cm2 if len(told.measurands) == 1 else told.worst_ratio**2
-    assert value == pytest.approx(found.grid_variance, rel=1e-9)
+    p = found.prediction
+    alone = p.variance_object if len(p.measurands) == 1 else p.worst_ratio**2
+    assert alone == pytest.approx(found.grid_variance, rel=1e-9)
     poses = ViewingSpace(step, (0, 90)).poses
     pairs = poses[rng.integers(len(poses), size=(2, 60))]
     exact = evaluate_pairs(scene, *pairs, "calibrated", "object")
