@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from validation.plan_check import CheckedSetting, PlanCheck
 
 commands = commands()
-_MOST_CHECKED = 1000
+_CHECKED, _MOST_CHECKED = 10, 1000
+_QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 
 Objective = Annotated[str, typer.Option(help="object (the scene's unit, squared) or image (px^2)")]
 Over = Annotated[str, typer.Option(help="Of several measurands: minimax (worst sigma / tolerance) or sum (weighted).")]
@@ -46,7 +47,10 @@ ToleranceList = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Robust plan: roughness=0.2, noise=0.1, sensor_deg=2, ..."),
 ]
-Check = Annotated[int, typer.Option(metavar="N", help="Render the best N settings and propose the best of them.")]
+Check = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Render the best N settings and propose the best; 10, none of above a megapixel."),
+]
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Render nothing.")]
 Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Write the maps.")]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")]
@@ -76,14 +80,15 @@ def plan_command(
     light_out_of_view: OutOfView = False,
     same_mount: SameMount = False,
     tolerance: ToleranceList = None,
-    check: Check = 10,
+    check: Check = None,
     no_check: NoCheck = False,
     map_file: Map = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
-    check_number("--check", check, 1, _MOST_CHECKED)
+    if check is not None:
+        check_number("--check", check, 1, _MOST_CHECKED)
     if not 0 <= separation <= 180:
         limit = "least 0" if separation < 0 else "most 180"
         raise scenes.InvalidInput(f"--separation: min_separation_deg must be at {limit}, got {separation:g}")
@@ -108,8 +113,20 @@ def plan_command(
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
-    checked = None if no_check else _check(found, check)
+    count = 0 if no_check else _renders(loaded) if check is None else check
+    checked = _check(found, count) if count else None
     _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json)
+    if not (count or no_check or as_json):
+        print(f"Not checked by rendering, which takes long for {_pixels(loaded) / 1e6:.1f} megapixels: --check 1 does.")
+
+
+def _renders(scene: scenes.Scene) -> int:
+    """How many settings are rendered when nothing is said of it."""
+    return _CHECKED if _pixels(scene) <= _QUICK_PIXELS else 0
+
+
+def _pixels(scene: scenes.Scene) -> int:
+    return scene.camera.width * scene.camera.height
 
 
 def _poses(**texts: str | None) -> dict[str, scenes.Pose | None]:
