@@ -45,6 +45,7 @@ class Side(Model):
     """A straight edge."""
 
     edge: str
+    """Its name."""
 
     @property
     def edges(self) -> tuple[str, ...]:
@@ -70,7 +71,9 @@ class Tolerance(Model):
     """How far a value may lie above and below its nominal one, in the scene's unit or degrees."""
 
     plus: Annotated[float, Field(ge=0)]
+    """Above the nominal value, the scene's unit or degrees."""
     minus: Annotated[float, Field(ge=0)]
+    """Below it."""
 
     @model_validator(mode="after")
     def _not_empty(self) -> Tolerance:
@@ -135,11 +138,17 @@ class Measurand(Model):
     """
 
     name: Title
+    """What the drawing calls it; different for each."""
     kind: Kind
+    """What is measured of the features."""
     features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=3)]
+    """Corners, circles and edges, in the order that the kind asks for."""
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Length, Length] | None = None
+    """The value that is wanted, the scene's unit or degrees; two for a position; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
+    """How far the value may lie from it, the scene's unit or degrees: one number for both sides, or plus and minus."""
     weight: Positive = 1.0
+    """In the planner's weighted sum."""
 
     @model_validator(mode="after")
     def _complete(self) -> Measurand:
