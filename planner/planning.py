@@ -256,8 +256,10 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         if found is None or not has_bound(scene, option.model):
             others = [c for c in choice[1:3] if c.edges == edges_of(scene)]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
-        descents = [refine(scene, *at, option.model, aim, option.step_deg, option.constraints) for at in starts]
-        sensor, light, variance = min(descents, key=lambda descent: descent[2])
+        how = option.model, aim, option.step_deg, option.constraints
+        descents = [refine(scene, *at, *how, sizes=(0.7,)) for at in starts]
+        sensor, light, _ = min(descents, key=lambda descent: descent[2])
+        sensor, light, variance = refine(scene, sensor, light, *how, sizes=(0.1,))
     prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
     return Plan(
         scene=scene,

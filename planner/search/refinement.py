@@ -13,7 +13,7 @@ from scenes import InvalidInput, Scene
 
 def refine(
     scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, objective: str, step_deg: float,
-    constraints: Constraints | None = None, value=None,
+    constraints: Constraints | None = None, value=None, sizes: tuple[float, ...] = (0.7, 0.1),
 ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
     """Nelder-Mead from a pair of poses, in tangent planes of the sphere, so that the poles are places like others.
 
@@ -22,9 +22,11 @@ def refine(
     sensor, light : ndarray, shape (2,)
         Where to begin, degrees.
     step_deg : float
-        Size of the first simplex.
+        What the sizes are parts of.
     value : callable, optional
         (sensor, light) to what is minimised; the variance when not given.
+    sizes : tuple of float
+        Of the simplices, one after the other: a fresh one, for the one before may have collapsed at a border.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def refine(
     if not np.isfinite(unit):
         raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
     x, least = np.zeros(4), 1.0
-    for size in (0.7, 0.1):  # again from a fresh simplex, for the first may have collapsed at a border
+    for size in sizes:
         found = minimize(
             lambda x: min(cost(x) / unit, np.finfo(float).max), x, method="Nelder-Mead",
             options={"initial_simplex": x + size * np.vstack([np.zeros(4), np.eye(4)]), "xatol": 1e-3, "fatol": 1e-7,
