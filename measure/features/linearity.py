@@ -33,10 +33,13 @@ def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
     )
     if not np.isfinite(here).all() or (wherever > _KNOWN * here).any():
         return False
-    for linear, full in _drawn(tool, centre, index, rows):
+    if _is_linear_nearby(centre, index, rows):
+        return True
+    for count in _FULL:
+        linear, full = (errors[:, index] @ rows.T for errors in tool.drawn(centre, count))
         if _is_linear(linear, full, 0.0):
             return True
-        if not _is_linear(linear, full, 2 / np.sqrt(len(full))):
+        if not _is_linear(linear, full, 2 / np.sqrt(count)):
             return False
     return False
 
@@ -51,17 +54,12 @@ def _is_linear(linear: np.ndarray, full: np.ndarray, leeway: float) -> bool:
     return bool((unbiased & near & alike).all())
 
 
-def _drawn(tool, centre: Centre, index: np.ndarray, rows: np.ndarray):
-    """Errors in drawn images to first order and in full, (n, k): as many as seem enough, then more of them."""
+def _is_linear_nearby(centre: Centre, index: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether the expansion says so. Where it does not, it may have been left: full errors will tell."""
     drawn = centre.expansion.drawn(_CHEAP)
-    spread = (drawn.linear[:, index] @ rows.T).std(0)
-    beyond = drawn.left[:, index] @ np.abs(rows).T > _OFF * spread
-    if beyond.any(1).mean() <= _BEYOND:
-        yield drawn.linear[:, index] @ rows.T, drawn.steps[:, index] @ rows.T
-        return
-    for count in _FULL:
-        linear, full = tool.drawn(centre, count)
-        yield linear[:, index] @ rows.T, full[:, index] @ rows.T
+    linear, full = drawn.linear[:, index] @ rows.T, drawn.steps[:, index] @ rows.T
+    beyond = drawn.left[:, index] @ np.abs(rows).T > _OFF * linear.std(0)
+    return bool(beyond.any(1).mean() <= _BEYOND and _is_linear(linear, full, 0.0))
 
 
 def _directions(corners: np.ndarray) -> np.ndarray:

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from measure.features.arranged import _is_beyond, _rivals, _steps
+from measure.features.arranged import _is_beyond
+from measure.features.contrasts import _contrast
+from measure.features.locating import _rivals
 from scenes import Noise
 
 USED = np.s_[2:5, 3:6]
@@ -45,10 +47,17 @@ def test_two_maxima(apart, settled, worse, ambiguous):
 
 
 def test_contrast_along_a_piece(rng):
-    """A polynomial of the second degree in the levels, at its start, its middle and its end."""
+    """A polynomial of the second degree in the levels, at its start, its middle and its end; sigma by drawn levels."""
     contrast = rng.normal(size=(4, 3, 2 * 2 + 5 + 1))  # of two free vertices, five levels and the blur
+    root = rng.normal(size=(5, 5))
+    covariance = np.zeros((10, 10))
+    covariance[4:9, 4:9] = root @ root.T
     tool = SimpleNamespace(model=SimpleNamespace(free=np.arange(2)))
-    found = _steps(tool, SimpleNamespace(expansion=SimpleNamespace(pieces=SimpleNamespace(contrast=contrast))))
+    pieces = SimpleNamespace(contrast=contrast)
+    centre = SimpleNamespace(expansion=SimpleNamespace(pieces=pieces), covariance=covariance)
+    found, sigma = _contrast(tool, centre)
     for k, t in enumerate((0.0, 0.5, 1.0)):
-        expected = [[np.polyval(piece[::-1, level], t) for level in range(4, 9)] for piece in contrast]
-        assert found[:, k] == pytest.approx(np.array(expected))
+        expected = np.array([[np.polyval(piece[::-1, level], t) for level in range(4, 9)] for piece in contrast])
+        assert found[:, k] == pytest.approx(expected)
+        drawn = expected @ root @ rng.standard_normal((5, 40_000))
+        assert sigma[:, k] == pytest.approx(drawn.std(1), rel=0.02)

@@ -49,6 +49,10 @@ def test_limits_belong_to_the_limited(task1):
         assert constraints.lights(poses).tolist() == lights
 
 
+def _bodiless(**limits) -> Constraints:
+    return Constraints(camera_body=0, light_body=0, **limits)
+
+
 def test_pairs(task1, rng):
     """Angles by arc length between directions; the light's image by a pinhole of the oracle's own."""
     sensors, lights = (np.column_stack([rng.uniform(0, 180, 300), rng.uniform(0, 360, 300)]) for _ in range(2))
@@ -56,17 +60,18 @@ def test_pairs(task1, rng):
     lights[50:80] = sensors[50:80] + [1.5, 0]
     towards = [np.array([axes(pose)[0] for pose in some]) for some in (sensors, lights)]
     angle = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(towards[0] - towards[1], axis=1) / 2, 0, 1)))
-    assert (Constraints(min_separation_deg=30).pairs(task1, sensors, lights) == (angle >= 30)).all()
-    assert Constraints().pairs(task1, sensors, lights).all()
-    assert (Constraints(same_mount=True).pairs(task1, sensors, lights) == (angle < 1e-5)).all()
+    assert (_bodiless(min_separation_deg=30).pairs(task1, sensors, lights) == (angle >= 30)).all()
+    assert _bodiless().pairs(task1, sensors, lights).all()
+    assert (_bodiless(same_mount=True).pairs(task1, sensors, lights) == (angle < 1e-5)).all()
     near = task1.model_copy(update={"light": scenes.Light(distance=40.0), "settings": ()})
     size = np.array([near.camera.width, near.camera.height])
     seen = [pinhole(40 * at[None], pose, near.camera)[0] for at, pose in zip(towards[1], sensors, strict=True)]
     inside = np.array([((image > -0.5) & (image < size - 0.5)).all() for image in seen])
     assert 30 < inside.sum() < 200
-    assert (Constraints(light_out_of_view=True).pairs(near, sensors, lights) == ~inside).all()
+    assert (_bodiless(light_out_of_view=True).pairs(near, sensors, lights) == ~inside).all()
+    assert not Constraints().pairs(task1, sensors[:50], lights[:50]).any()  # bodies of some size in one place
     assert Constraints(min_separation_deg=1).on_pairs
-    assert not Constraints(min_edge_px=1).on_pairs
+    assert not _bodiless(min_edge_px=1).on_pairs
 
 
 def test_lengths_in_the_image(task1):

@@ -19,7 +19,7 @@ _UNIT = 1e-4  # px^2; what the measured variances are printed in
 def report(found: Validation) -> Group:
     """Everything that ``ice validate`` prints."""
     parts = [Text(found.title, style="bold"), _variances(found), _ratios(found)]
-    if not found.rows.measured.are_single:
+    if _several(found):
         parts.append(_measurands(found))
     if found.search:
         parts.append(_search(found))
@@ -77,10 +77,16 @@ def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list
     return [*(["scene"] if many else []), *keys, "sensor", "light"], cells
 
 
+def _several(found: Validation) -> bool:
+    """Whether a row that is shown has several measurands."""
+    return any(len(row.measurands) > 1 for row in far(found)[0])
+
+
 def _what(found: Validation) -> str:
     """What the tables in px are about."""
-    several = not found.rows.measured.are_single
-    return f"the first measurand, {found.rows[0].measurands[0].name}, in the image" if several else "the distance"
+    return (
+        f"the first measurand, {found.rows[0].measurands[0].name}, in the image" if _several(found) else "the distance"
+    )
 
 
 def _variances(found: Validation) -> Table:
