@@ -139,7 +139,8 @@ def _of_lines(
         if str(found.shape.status[0]) not in status.MEASURED:
             return np.full((2 * len(layout.names), clean.size), np.nan)
         return arranged.line_response(tool, layout, clean)
-    rows = tool.respond(clean)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
+        rows = tool.respond(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
     return np.where(np.repeat(measured, 2)[:, None], rows, np.nan)
 
