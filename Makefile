@@ -9,7 +9,7 @@ validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
 
 test: lint
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist worksteal
 
 # How near estimators and ellipses come to the Cramer-Rao bound, on our images and on GalSim's, and how fast (15 minutes).
 bench-measure: $(VENV)/.test-installed

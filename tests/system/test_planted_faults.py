@@ -89,15 +89,21 @@ def test_both_corners_errors_are_those_of_many_pictures(estimator, task1, clean)
     assert abs(ratio / 1.3 - 1) > 4 * np.sqrt(2 / (count - 1))
 
 
+@pytest.fixture(scope="module")
+def wedges():
+    """Where the wedge is looked at, and a thousand pictures."""
+    wedge = scenes.load("wedge")
+    picture = scenes.Picture.of(wedge, wedge.settings[0].sensor, wedge.settings[0].light)
+    where = measure.region_of_interest(picture)
+    return picture, render.expose(render.image(picture), wedge.noise, np.random.default_rng(5), 1000, where)
+
+
 @pytest.mark.render
 @pytest.mark.parametrize("estimator", ["strip", "polygon"])
-def test_the_corners_share_an_edge_and_so_an_error(estimator):
+def test_the_corners_share_an_edge_and_so_an_error(estimator, wedges):
     """The wedge's corners share the edge e5: their covariance is not 0, and many pictures have the same one."""
-    wedge = scenes.load("wedge")
-    setting = wedge.settings[0]
-    image = render.image(wedge, setting.sensor, setting.light)
-    pictures = render.expose(image, wedge.noise, np.random.default_rng(5), 1000)
-    found = measure.distance(pictures, wedge, setting.sensor, setting.light, estimator)
+    picture, pictures = wedges
+    found = measure.distance(pictures, picture, estimator=estimator)
     corners = found.corners[np.isfinite(found.value_px)].reshape(-1, 4)
     assert len(corners) > 980
     told, real = found.covariance.mean(0), np.cov(corners.T)
