@@ -1,4 +1,4 @@
-"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large`` and ``rate``."""
+"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``parts`` and ``rate``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
 from tests.proofs.kill import kill
 from tests.proofs.large import large
+from tests.proofs.parts import parts
 from tests.proofs.rate import rate
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -15,6 +16,7 @@ app.command()(conditions)
 app.command()(crowded)
 app.command()(kill)
 app.command()(large)
+app.command()(parts)
 app.command()(rate)
 
 if __name__ == "__main__":
