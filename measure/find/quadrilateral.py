@@ -13,7 +13,7 @@ from scenes import InvalidInput
 
 _LEVELS = 24
 _CUT = 2.5  # standard deviations beyond which a second difference is no noise
-_ENOUGH, _BAND = 1_000_000, 64  # pixels that tell the noise to 0.1 %, and the range of levels; rows taken together
+_ENOUGH, _BAND = 1_000_000, 64  # pixels that tell the noise to 0.1 %, and where a quadrilateral is; rows taken together
 _CUTS = 8  # times that the cut is made anew
 _SMALLEST = 0.004  # part of the image's area
 _REACH = 6.0  # px across a side
@@ -46,7 +46,7 @@ def noise_sigma(image: np.ndarray) -> float:
 
 
 def find_quadrilateral(image: np.ndarray) -> np.ndarray:
-    """Corners of the most prominent convex quadrilateral, to a pixel or two.
+    """Corners of the most prominent convex quadrilateral, to a pixel or two (of a megapixel, where there are more).
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def find_quadrilateral(image: np.ndarray) -> np.ndarray:
     InvalidInput
         If there is none.
     """
-    smooth = cv2.GaussianBlur(np.asarray(image, np.float32), (0, 0), 1.0)
+    coarse, factor = _coarse(image)
+    smooth = cv2.GaussianBlur(coarse, (0, 0), 1.0)
     gx, gy = cv2.Scharr(smooth, cv2.CV_32F, 1, 0) / 32, cv2.Scharr(smooth, cv2.CV_32F, 0, 1) / 32
     best, score = None, 0.0
     for corners in _candidates(smooth):
@@ -73,12 +74,20 @@ def find_quadrilateral(image: np.ndarray) -> np.ndarray:
     if best is None:
         raise InvalidInput("image must show a convex quadrilateral, got none that stands out")
     first = int(np.argmin(best.sum(1)))
-    return np.roll(best, -first, axis=0)
+    return np.roll(best, -first, axis=0) * factor + (factor - 1) / 2
+
+
+def _coarse(image: np.ndarray) -> tuple[np.ndarray, int]:
+    """The image, or means of squares of its pixels that make some megapixel, and the squares' side."""
+    factor = max(int(np.sqrt(image.size / _ENOUGH)), 1)
+    height, width = (size // factor for size in image.shape)
+    whole = np.asarray(image[: height * factor, : width * factor], np.float32)
+    return (whole if factor == 1 else cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)), factor
 
 
 def _candidates(smooth: np.ndarray):
     """Quadrilaterals among the outlines of the image cut at many grey levels, brighter and darker side."""
-    low, high = np.percentile(smooth[:: max(smooth.size // _ENOUGH, 1)], [0.5, 99.5])
+    low, high = np.percentile(smooth, [0.5, 99.5])
     for level in np.linspace(low, high, _LEVELS + 2)[1:-1]:
         cut = (smooth > level).astype(np.uint8)
         for part in (cut, 1 - cut):
