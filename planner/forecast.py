@@ -59,7 +59,7 @@ class Forecast:
 
 def unit_of(scene: Scene, quantity: Quantity) -> str:
     """Of a quantity in the object: the scene's unit of length, or degrees."""
-    return "degrees" if quantity.is_angle else getattr(scene, "units", "cm")
+    return "degrees" if quantity.is_angle else scene.units
 
 
 def forecasts(

@@ -33,6 +33,22 @@ class Found:
     failures: dict[str, int]
     clean: str
 
+    def scatter(self, true: float) -> dict[str, float]:
+        """Variance and mean error of what was measured (NaN of too little), number of images, of those that failed."""
+        good = self.distances[np.isfinite(self.distances)]
+        return {
+            "empirical": np.var(good, ddof=1) if good.size > 1 else np.nan,
+            "bias": good.mean() - true if good.size else np.nan,
+            "n": self.distances.size,
+            "failed": self.distances.size - good.size,
+        }
+
+
+def ratios(empirical: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+    """Empirical over predicted variances; NaN where nothing was measured, or nothing was predicted."""
+    usable = np.isfinite(empirical) & np.isfinite(predicted) & (predicted > 0)
+    return np.divide(empirical, predicted, out=np.full(usable.shape, np.nan), where=usable)
+
 
 def row_status(clean: str, others: dict[str, int], images: int) -> str:
     """Status of a setting: that of its noise-free image; if ``ok``, and too many of the noisy ones are not, theirs.

@@ -12,7 +12,7 @@ import numpy as np
 import planner
 from measure.propagation import PropagatedValues
 from validation import statistics
-from validation.batch.found import STATUSES, Found, row_status
+from validation.batch.found import STATUSES, Found, ratios, row_status
 
 FIELDS = ("paper", "calibrated", "bound")
 
@@ -96,15 +96,14 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
         self._grow(len(told))
         share = _independent([each.distances for each in found])
         for about, each in zip(told, found, strict=True):
-            record, good = self._records[self._size], each.distances[np.isfinite(each.distances)]
+            record = self._records[self._size]
             key = about["name"], about["kind"], about["unit"]
             record["about"] = self._about.setdefault(key, len(self._about))
             for name in ("value", *FIELDS, "predicted_bias"):
                 record[name] = about[name]
             record["predicted"], record["independent"] = each.propagated, share
-            record["empirical"] = np.var(good, ddof=1) if good.size > 1 else np.nan
-            record["bias"] = good.mean() - about["value"] if good.size else np.nan
-            record["n"], record["failed"] = each.distances.size, each.distances.size - good.size
+            for name, number in each.scatter(about["value"]).items():
+                record[name] = number
             record["status"] = STATUSES.index(row_status(each.clean, each.failures, each.distances.size))
             self._size += 1
         self._first.append(self._size)
@@ -116,9 +115,7 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
     def finish(self) -> None:
         """Once all are there: all ratios and intervals at a time."""
         found = self._records = self._records[: self._size]
-        usable = np.isfinite(found["empirical"]) & np.isfinite(found["predicted"]) & (found["predicted"] > 0)
-        found["ratio"] = np.nan
-        np.divide(found["empirical"], found["predicted"], out=found["ratio"], where=usable)
+        found["ratio"] = ratios(found["empirical"], found["predicted"])
         found["low"], found["high"] = statistics.ratio_intervals(found["ratio"], found["n"] - found["failed"])
 
     def __len__(self) -> int:

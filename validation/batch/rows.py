@@ -11,7 +11,7 @@ import numpy as np
 
 from validation import statistics
 from validation.batch.campaign import Campaign
-from validation.batch.found import STATUSES, Found, row_status
+from validation.batch.found import STATUSES, Found, ratios, row_status
 from validation.batch.measurands import JudgedMeasurand, Measured
 
 
@@ -113,11 +113,9 @@ class Rows(Sequence[Row]):
         for name in MODEL:
             record[name] = model[name]
         for place, one in zip(record["judged"], found.values(), strict=False):
-            good = one.distances[np.isfinite(one.distances)]
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
-            place["empirical"] = np.var(good, ddof=1) if good.size > 1 else np.nan
-            place["bias"] = good.mean() - model["value_px"] if good.size else np.nan
-            place["n"], place["failed"] = one.distances.size, one.distances.size - good.size
+            for name, number in one.scatter(model["value_px"]).items():
+                place[name] = number
             place["failures"] = [one.failures.get(status, 0) for status in STATUSES]
         self.measured.add(model["measurands"], each)
         self._size += 1
@@ -142,7 +140,7 @@ class Rows(Sequence[Row]):
         self._records = self._records[: self._size]
         self._records["paper"] *= scale or 1.0
         judged = self._records["judged"]
-        ratio = self._ratio(judged)
+        ratio = ratios(judged["empirical"], judged["propagated"])
         judged["low"], judged["high"] = statistics.ratio_intervals(ratio, judged["n"] - judged["failed"])
         self.measured.finish()
 
@@ -179,7 +177,8 @@ class Rows(Sequence[Row]):
         found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
         stray = numbers("failures").sum(-1) <= statistics.STRAY * found["n"]
         return {
-            **found, "ratio": self._ratio(found), "predicted_bias": self._records["predicted_bias"][chosen],
+            **found, "ratio": ratios(found["empirical"], found["propagated"]),
+            "predicted_bias": self._records["predicted_bias"][chosen],
             "ok": stray & (numbers("clean") == STATUSES.index("ok")), "independent": np.ones(chosen.size),
         }  # fmt: skip
 
@@ -187,13 +186,6 @@ class Rows(Sequence[Row]):
     def others(self) -> list[str]:
         """Names of all methods but the verdict's."""
         return list(dict.fromkeys(name for _, names in self._kinds for name in names[1:]))
-
-    @staticmethod
-    def _ratio(judged: np.ndarray | dict[str, np.ndarray]) -> np.ndarray:
-        """NaN where nothing was measured, or nothing was predicted."""
-        predicted = judged["propagated"]
-        usable = np.isfinite(judged["empirical"]) & np.isfinite(predicted) & (predicted > 0)
-        return np.divide(judged["empirical"], predicted, out=np.full(usable.shape, np.nan), where=usable)
 
     def _row(self, number: int) -> Row:
         record = self._records[number]
