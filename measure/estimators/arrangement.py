@@ -17,7 +17,7 @@ import numpy as np
 from measure.estimators.expansion import Expansion, Pieces
 from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
-from planner.imaging.sensor import Levels, recorded, squared_errors
+from planner.imaging.sensor import Levels, squared_errors
 from planner.models.bound import Known, known, response
 from scenes import Noise
 
@@ -192,15 +192,15 @@ class ArrangementEstimator:
     def expected(self, state: State, derivatives: bool = True):
         """Recorded level (P,), one over its noise's variance, its derivative by the signal, the signal's Jacobian."""
         image, jacobian = self.model.evaluate(state, derivatives)
-        gain, variance = response(self.noise, image)
-        return recorded(self.noise, image + self.noise.dark_level).level, 1 / variance, gain, jacobian
+        levels, gain = response(self.noise, image)
+        return levels.level, 1 / levels.noise_variance, gain, jacobian
 
     def start(self, used: np.ndarray, vertices: np.ndarray | None = None) -> State:
         """The expected place, or another, with the levels that fit one image (P,) best there."""
         state = self.model.start()
         state = state if vertices is None else state._replace(vertices=vertices)
         design, precision, mean = self.model.design(state).T, self.prior, self.before(used)
-        weight = 1 / response(self.noise, np.maximum(used - self.noise.dark_level, 0))[1]
+        weight = 1 / response(self.noise, np.maximum(used - self.noise.dark_level, 0))[0].noise_variance
         first, last = 2 * self.model.free.size, -1
         known = precision[first:last, first:last]
         matrix = design.T @ (design * weight[:, None]) + known

@@ -19,7 +19,7 @@ from planner.imaging.appearance import is_plain
 from planner.imaging.arrangement import arrangement_of, near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.pictures import Pictures
-from planner.imaging.sensor import recorded, sensitivity
+from planner.imaging.sensor import Levels, recorded, sensitivity
 from planner.models.edge_bound import edge_bound
 from planner.models.errors import Errors
 from scenes import Noise
@@ -144,18 +144,19 @@ def fisher(model: BlurredModel, noise: Noise, free_blur: bool, state: State | No
     What the change of the noise's variance tells of the levels is left out.
     """
     image, jacobian = model.evaluate(state or model.start())
-    gain, variance = response(noise, image)
-    weighted = jacobian * (gain / np.sqrt(variance))[:, None]
+    levels, gain = response(noise, image)
+    weighted = jacobian * (gain / np.sqrt(levels.noise_variance))[:, None]
     if not free_blur:
         weighted[:, -1] = 0
     return weighted.T @ weighted
 
 
-def response(noise: Noise, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Derivative of the recorded level by the signal, and variance of the noise, at signals above darkness."""
+def response(noise: Noise, image: np.ndarray) -> tuple[Levels, np.ndarray]:
+    """What is recorded at signals above darkness, with a least variance, and the level's derivative by the signal."""
     level = image + noise.dark_level
-    variance = np.broadcast_to(recorded(noise, level).noise_variance, level.shape)
-    return sensitivity(noise, level), np.maximum(variance, 1e-6 * noise.variance + 1e-300)
+    found = recorded(noise, level)
+    variance = np.maximum(np.broadcast_to(found.noise_variance, level.shape), 1e-6 * noise.variance + 1e-300)
+    return Levels(found.level, variance), sensitivity(noise, level)
 
 
 def bound(pictures: Pictures) -> Errors:
