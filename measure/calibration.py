@@ -160,7 +160,7 @@ def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float]
 
 def _lines(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] | None:
     """Variance of the side's middle, told as that of points one correlation length of `gradient` apart."""
-    shape = find_shape(noisy, layout, name)
+    shape = find_shape(noisy, layout, name, judged=False)
     if np.mean(np.isin(shape.status, status.MEASURED)) < 0.98:
         return None
     middle = layout.ends.mean(1)

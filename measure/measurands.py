@@ -10,7 +10,7 @@ import numpy as np
 
 from measure import status
 from measure.estimators.registry import best_estimator
-from measure.measurement import _check_method, checked_image
+from measure.measurement import Measurement, _check_method, checked_image, of_first
 from measure.quantities import Found, find
 from planner.forecast import unit_of
 from scenes import Picture, Quantity, Scene
@@ -39,6 +39,8 @@ class Measurements:
         As of `measure.distance`, from what each quantity needs.
     p_value : ndarray, shape (...)
         Goodness of fit, as of `measure.distance`.
+    first : Measurement, optional
+        The first quantity as `measure.distance` gives it, with its edges, if it is a distance.
     """
 
     quantities: tuple[Quantity, ...]
@@ -50,6 +52,7 @@ class Measurements:
     covariance: np.ndarray
     status: np.ndarray
     p_value: np.ndarray
+    first: Measurement | None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -122,6 +125,7 @@ def _gathered(found: Found, scene: Scene, lead: tuple[int, ...]) -> Measurements
         covariance=_known(found.plane.covariance, measured).reshape(*lead, count, count),
         status=found.status.reshape(*lead, count),
         p_value=found.shape.p_value.reshape(lead),
+        first=of_first(found, lead) if quantities[0].kind == "distance" else None,
     )
 
 

@@ -170,10 +170,14 @@ def _check_method(estimator: Any, threshold: Any) -> None:
 
 def _by_method(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    found = find(stack, picture, estimator, threshold)
-    whole = _first(found)
+    return of_first(find(stack, picture, estimator, threshold), lead)
+
+
+def of_first(found: Found, lead: tuple[int, ...]) -> Measurement:
+    """The first quantity, a distance, of what was found in images of leading shape ``lead``."""
     return Measurement(
-        edge_names=found.names, **{key: column.reshape((*lead, *column.shape[1:])) for key, column in whole.items()}
+        edge_names=found.names,
+        **{key: column.reshape((*lead, *column.shape[1:])) for key, column in _columns(found).items()},
     )
 
 
@@ -195,7 +199,7 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     return grey_levels(images)
 
 
-def _first(found: Found) -> dict[str, np.ndarray]:
+def _columns(found: Found) -> dict[str, np.ndarray]:
     """All columns of a Measurement, about the first quantity, for a stack (n, height, width)."""
     state, shape = found.status[:, 0], found.shape
     measured = np.isin(state, status.MEASURED)

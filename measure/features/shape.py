@@ -40,8 +40,8 @@ def _shifted(layout: Layout, offsets: tuple[float, ...]) -> Layout:
     return layout.shifted(np.reshape(offsets, (-1, 2)))
 
 
-def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float = 12.0) -> Shape:
-    """Find the lines and corners of a layout in images, shape (n, height, width).
+def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float = 12.0, *, judged: bool = True) -> Shape:
+    """Find the lines and corners of a layout in images, shape (n, height, width); how well they fit, where ``judged``.
 
     Each image is measured by itself: its result does not depend on the others of the stack. Where the edges are not
     within the estimator's capture of their expected place, the layout is moved there first.
@@ -53,7 +53,7 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
         return find_arranged(images, layout, tool)
     parts = [_find(images[i : i + _BATCH], layout, name, threshold, _PASSES) for i in range(0, len(images), _BATCH)]
     found = Shape(**{key: np.concatenate([vars(part)[key] for part in parts]) for key in vars(parts[0])})
-    return _judged(found, images, layout) if name == "strip" and layout.arrangement else found
+    return _judged(found, images, layout) if judged and name == "strip" and layout.arrangement else found
 
 
 def _judged(found: Shape, images: np.ndarray, layout: Layout) -> Shape:

@@ -106,9 +106,8 @@ def measure_command(
     found = measure.measure(picture, known, *poses, estimator, threshold)
     rows = measurands.facts(found)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}
-    distance = None
-    if known.task is not None and known.task.kind == "distance":
-        distance = measure.distance(picture, known, *poses, estimator or measure.best_estimator(known), threshold)
+    distance = found.first if known.task is not None else None
+    if distance is not None:
         told |= _distance_facts(distance)
     if as_json:
         say({"file": str(file), **told}, True, "")
