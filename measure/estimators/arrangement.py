@@ -15,15 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from measure.estimators.expansion import Expansion, Pieces
-from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
+from measure.estimators.reach import model_within, reach_of
+from planner.imaging.arrangement import Arrangement
 from planner.imaging.blurred import BlurredModel, State
 from planner.imaging.sensor import Levels, squared_errors
 from planner.models.bound import Known, known, response
 from scenes import Noise
 
-REACH = 16.0  # px from a required edge up to which pixels are used; beyond it they only add to known grey levels
-_NEAREST = 6.0  # px: the same where edges are so long that `_MANY` pixels are used
-_MANY = 72_000
 _STEPS = 50
 _SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
 _LEAST = 1e-6  # eigenvalue of a scaled second derivative below which there is no maximum
@@ -143,16 +141,12 @@ class ArrangementEstimator:
     @cached_property
     def model(self) -> BlurredModel:
         """The image at the pixels near the required edges."""
-        y, x = near_pixels(self.arrangement, self.shape, self._reach)
-        near = near_vertices(self.arrangement, self._reach + 6 * self.arrangement.blur_px)
-        return BlurredModel(self.arrangement, x, y, near)
+        return model_within(self.arrangement, self.shape, self.reach)
 
-    @property
-    def _reach(self) -> float:
-        """Distance from a required edge up to which pixels are used, px: less where the edges are long."""
-        ends = self.arrangement.vertices[self.arrangement.required]
-        length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-        return float(np.clip(_MANY / (2 * max(length, 1.0)), _NEAREST, REACH))
+    @cached_property
+    def reach(self) -> float:
+        """Distance from a required edge up to which pixels are used, px."""
+        return reach_of(self.arrangement, self.shape, self.noise)
 
     @cached_property
     def pixels(self) -> np.ndarray:

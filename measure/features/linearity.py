@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from measure.estimators.arrangement import ArrangementEstimator, Centre
+from measure.estimators.reach import asked_of
 
 _CHEAP, _FULL = 256, (24, 96)  # drawn images; of those measured in full more where the first leave it open
 _BEYOND = 0.05  # part of them that may leave the expansion's range
@@ -26,7 +27,7 @@ def is_reliable(tool: ArrangementEstimator, centre: Centre) -> bool:
     the other vertices are must not decide: without it the variance may be a quarter larger.
     """
     index = tool.index(tool.arrangement.corners)
-    rows = _directions(centre.state.vertices[tool.arrangement.corners])
+    rows = asked_of(centre.state.vertices[tool.arrangement.corners])
     here, wherever = (
         np.einsum("ki,ij,kj->k", rows, whole[np.ix_(index, index)], rows)
         for whole in (centre.covariance, tool.wherever(centre))
@@ -60,12 +61,3 @@ def _is_linear_nearby(centre: Centre, index: np.ndarray, rows: np.ndarray) -> bo
     linear, full = drawn.linear[:, index] @ rows.T, drawn.steps[:, index] @ rows.T
     beyond = drawn.left[:, index] @ np.abs(rows).T > _OFF * linear.std(0)
     return bool(beyond.any(1).mean() <= _BEYOND and _is_linear(linear, full, 0.0))
-
-
-def _directions(corners: np.ndarray) -> np.ndarray:
-    """What is asked of C corners: their distance if there are two, else all coordinates, (k, 2 C)."""
-    if len(corners) != 2:
-        return np.eye(2 * len(corners))
-    across = corners[1] - corners[0]
-    unit = across / max(float(np.linalg.norm(across)), 1e-12)
-    return np.concatenate([-unit, unit])[None]

@@ -8,12 +8,14 @@ import pytest
 import measure
 import planner
 from measure import status
+from measure.estimators.reach import NEAR, asked_of, model_within
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.optics import Optics
-from measure.features.shape import find_shape
+from measure.features.shape import find_shape, prepared
 from planner.imaging.pictures import Pictures
-from planner.models.bound import fisher, information
+from planner.models.bound import Information, fisher, information, known
 from scenes import Picture
+from scenes.parts.block import Block
 from tests.oracle import block_image, polygon_image
 from tests.proofs.conditions import CONDITIONS, outcome
 from tests.proofs.crowded import judge, row, study
@@ -38,6 +40,25 @@ def test_poses_where_the_first_version_was_wrong(task1, sensor, light):
     assert found.probability > 1e-3
     assert 0.99 < found.predicted / found.bound < 1.10
     assert all(replace(found, predicted=factor * found.predicted).probability < 1e-3 for factor in (1.5, 1 / 1.5))
+
+
+def test_other_edges_tell_of_the_required_ones(task1):
+    """More than 16 px away, where the light says so: at the bound, with half the variance of the pixels nearby."""
+    scene = task1.model_copy(update={"object": Block(kind="block", size=(5.6, 3.6, 8.0)), "settings": ()})
+    pose = (72, 232), (62, 216)
+    told = measure.propagate(block_image(scene, *pose), scene, *pose, "arrangement")
+    assert told.status == "ok"
+    assert 0.99 < told.variance_px2 / measure.bound(scene, *pose) < 1.05
+    tool = prepared(layout_of(Picture.of(scene, *pose)), "arrangement", 1.0)
+    close = Information(*_told(tool, NEAR))
+    index = tool.index(tool.arrangement.corners)
+    across = asked_of(tool.arrangement.vertices[tool.arrangement.corners])[0]
+    assert across @ close.covariance()[np.ix_(index, index)] @ across > 1.9 * told.variance_px2
+
+
+def _told(tool, reach):
+    model = model_within(tool.arrangement, tool.shape, reach)
+    return model, fisher(model, tool.noise, False), known(model).precision
 
 
 def test_a_sliver_that_the_image_does_not_tell(task1):
