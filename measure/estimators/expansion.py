@@ -175,9 +175,8 @@ def _contrast_steps(model: BlurredModel, moving: np.ndarray, ends: np.ndarray) -
 
 def _integrals(model, state, moving, lengths, normal, direction):
     """For each moving piece its pixels and the integrals along it, (ROWS, p)."""
-    traced, nodes = model.trace(state), model.nodes
-    kernels = model.kernels(traced)
-    slot = model.slots(kernels)
+    nodes, (traced, kernels, scatter, _) = model.nodes, model.drawn(state)
+    slot = scatter.slot
     contrast = model.contrasts(state, traced)
     x, y = [
         [k, *(kernels.derivative(axis, order) for order in (1, 2, 3))] for axis, k in ((0, kernels.x), (1, kernels.y))

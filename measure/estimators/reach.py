@@ -11,8 +11,8 @@ from planner.models.bound import Information, fisher, known
 from scenes import Noise
 
 NEAR = 16.0  # px up to which pixels are used; beyond it they only add to known grey levels, as a rule
-_NEAREST = 6.0  # px: the same where edges are so long that `_MANY` pixels are used
-_MANY = 72_000
+_MANY = 60_000  # pixels that are used of long edges, unless their blur needs more
+_NEAREST, _BLURS = 5.0, 6.0  # px, and the blur's standard deviations, that are used at the least
 _MORE = 1.02  # ratio of variances from which pixels farther away are worth their time
 
 
@@ -30,7 +30,7 @@ def reach_of(arrangement: Arrangement, shape: tuple[int, int], noise: Noise) -> 
     """
     ends = arrangement.vertices[arrangement.required]
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-    most = float(np.clip(_MANY / (2 * max(length, 1.0)), _NEAREST, FARTHEST))
+    most = float(np.clip(_MANY / (2 * max(length, 1.0)), max(_NEAREST, _BLURS * arrangement.blur_px), FARTHEST))
     if most <= NEAR or not _others(arrangement) or not all(region.known for region in arrangement.regions[1:]):
         return min(most, NEAR)
     near, far = (_variances(arrangement, shape, noise, reach) for reach in (NEAR, most))

@@ -153,7 +153,7 @@ def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tup
     if told and not _reliable(tool, first, 0):
         each = np.zeros(len(images), int)
         return first._replace(**{key: getattr(first, key)[each] for key in first._fields if key != "centres"}), False
-    found = find(tool, images, here, first.centres[0])
+    found = first if len(images) == 1 else find(tool, images, here, first.centres[0])
     good = np.flatnonzero(_shows(tool, layout, found))
     return found, bool(told or not good.size or _reliable(tool, found, good[0]))
 

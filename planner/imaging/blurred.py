@@ -8,6 +8,7 @@ Boundaries are taken where they are recorded, so a lens' distortion is exact; de
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -153,7 +154,7 @@ class BlurredModel:
     def _slots(self) -> np.ndarray:
         """Number of the pixel at each place of the window, P where it is not used; flat, one place more for outside."""
         left, top, width, height = self._window
-        slots = np.full(width * height + 1, self.x.size)
+        slots = np.full(width * height + 1, self.x.size, np.int32)
         slots[(self.y - top) * width + self.x - left] = np.arange(self.x.size)
         return slots
 
@@ -172,10 +173,12 @@ class BlurredModel:
     def _last(self) -> np.ndarray:
         """Which of `_order` is the row's last up to each place of the window, P for none; flat, as `_slots`."""
         left, top, width, height = self._window
-        found = np.full((height, width), -1, np.int32)
-        found[(self.y - top)[self._order], (self.x - left)[self._order]] = np.arange(self.x.size)
-        found = np.maximum.accumulate(found, 1).ravel()
-        return np.append(np.where(found < 0, self.x.size, found), self.x.size).astype(np.int32)
+        found = np.full(height * width + 1, -1, np.int32)
+        rows = found[:-1].reshape(height, width)
+        rows[(self.y - top)[self._order], (self.x - left)[self._order]] = np.arange(self.x.size)
+        np.maximum.accumulate(rows, 1, out=rows)
+        found[found < 0] = self.x.size
+        return found
 
     def start(self, levels: np.ndarray | None = None) -> State:
         """The expected state; levels as the light gives them, 0 where it is not known."""
@@ -234,21 +237,31 @@ class BlurredModel:
 
     def design(self, state: State) -> np.ndarray:
         """Derivative of the image by the level coefficients, (levels, P): the image is linear in them."""
-        traced = self.trace(state)
-        kernels = self.kernels(traced)
-        return self._design(traced, kernels, Scatter.of(self, kernels))
+        return self.drawn(state).design
 
     def evaluate(self, state: State, derivatives: bool = True) -> tuple[np.ndarray, np.ndarray | None]:
         """The image (P,) and its derivative by all parameters (P, count)."""
+        drawn = self.drawn(state)
+        image = state.levels @ drawn.design
+        if not derivatives:
+            return image, None
+        geometry, blur = self._moves(state, drawn.traced, drawn.kernels, drawn.scatter)
+        return image, np.concatenate([geometry, drawn.design, blur[None]]).T
+
+    def drawn(self, state: State) -> Drawn:
+        """What does not depend on the levels; kept of the last state, for often they alone change."""
+        return self._drawn(state.vertices.tobytes(), float(state.blur))
+
+    @cached_property
+    def _drawn(self) -> Callable[[bytes, float], Drawn]:
+        return lru_cache(maxsize=1)(self._draw)
+
+    def _draw(self, vertices: bytes, blur: float) -> Drawn:
+        state = State(np.frombuffer(vertices).reshape(-1, 2), np.empty(0), blur)
         traced = self.trace(state)
         kernels = self.kernels(traced)
         scatter = Scatter.of(self, kernels)
-        design = self._design(traced, kernels, scatter)
-        image = state.levels @ design
-        if not derivatives:
-            return image, None
-        geometry, blur = self._moves(state, traced, kernels, scatter)
-        return image, np.concatenate([geometry, design, blur[None]]).T
+        return Drawn(traced, kernels, scatter, self._design(traced, kernels, scatter))
 
     def _design(self, traced: Traced, kernels: Kernels, scatter: Scatter) -> np.ndarray:
         """What `design` gives.
@@ -401,6 +414,15 @@ class Scatter:
         across = kernels.y[:, :, None] * (kernels.derivative(0, 1) * (weight * traced.tangent[:, 1])[:, None])[:, None]
         across -= (kernels.derivative(1, 1) * (weight * traced.tangent[:, 0])[:, None])[:, :, None] * kernels.x[:, None]
         return np.bincount(self.slot.ravel(), across.ravel(), self.size + 1)[:-1]
+
+
+class Drawn(NamedTuple):
+    """The nodes where a state puts them, their kernels, these at the pixels, and what `BlurredModel.design` gives."""
+
+    traced: Traced
+    kernels: Kernels
+    scatter: Scatter
+    design: np.ndarray
 
 
 @lru_cache(maxsize=4096)
