@@ -8,7 +8,6 @@ Boundaries are taken where they are recorded, so a lens' distortion is exact; de
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -249,21 +248,10 @@ class BlurredModel:
         return image, np.concatenate([geometry, drawn.design, blur[None]]).T
 
     def drawn(self, state: State) -> Drawn:
-        """What does not depend on the levels; kept of the last state, for often they alone change."""
-        return self._drawn(state.vertices.tobytes(), float(state.blur))
+        """What does not depend on the levels; kept of the last state, for often levels alone change."""
+        return _drawn(self, state.vertices.tobytes(), float(state.blur))
 
-    @cached_property
-    def _drawn(self) -> Callable[[bytes, float], Drawn]:
-        return lru_cache(maxsize=1)(self._draw)
-
-    def _draw(self, vertices: bytes, blur: float) -> Drawn:
-        state = State(np.frombuffer(vertices).reshape(-1, 2), np.empty(0), blur)
-        traced = self.trace(state)
-        kernels = self.kernels(traced)
-        scatter = Scatter.of(self, kernels)
-        return Drawn(traced, kernels, scatter, self._design(traced, kernels, scatter))
-
-    def _design(self, traced: Traced, kernels: Kernels, scatter: Scatter) -> np.ndarray:
+    def design_of(self, traced: Traced, kernels: Kernels, scatter: Scatter) -> np.ndarray:
         """What `design` gives.
 
         A level that is linear across the kernel adds its slope times the kernel's variance times the coverage's slope.
@@ -423,6 +411,14 @@ class Drawn(NamedTuple):
     kernels: Kernels
     scatter: Scatter
     design: np.ndarray
+
+
+@lru_cache(maxsize=1)
+def _drawn(model: BlurredModel, vertices: bytes, blur: float) -> Drawn:
+    traced = model.trace(State(np.frombuffer(vertices).reshape(-1, 2), np.empty(0), blur))
+    kernels = model.kernels(traced)
+    scatter = Scatter.of(model, kernels)
+    return Drawn(traced, kernels, scatter, model.design_of(traced, kernels, scatter))
 
 
 @lru_cache(maxsize=4096)
