@@ -250,6 +250,27 @@ def behind(
     ndarray, shape (..., n)
         0 where the ray meets nothing, or what it meets is dark.
     """
+    return _past(pictures, points, wanted, own, outward, fall_off)[0]
+
+
+def seen_by_rays(pictures: Pictures, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What the sensor of one picture sees along rays (n, 3).
+
+    Returns
+    -------
+    level : ndarray, shape (n,)
+        Signal; 0 where the ray meets nothing, or what it meets is dark.
+    place : ndarray, shape (n, 3)
+        Where it meets the bodies.
+    face : ndarray of int, shape (n,)
+        Whose face; -1 where it meets none.
+    """
+    start = pictures.sensor_at + rays / np.linalg.norm(rays, axis=-1, keepdims=True) * 1e-3 * pictures.scene.solid.extent
+    return _past(pictures, start, np.ones(len(rays), bool), (), None, True)
+
+
+def _past(pictures: Pictures, points, wanted, own, outward, fall_off) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Signal of what is seen past points as of `behind`, the place (..., n, 3) where it is, and its face."""
     scene, bodies = pictures.scene, pictures.scene.bodies
     vectors = points - _widened(pictures.sensor_at, 1)
     face, t = _met(bodies, points, vectors, wanted, own)
@@ -261,7 +282,7 @@ def behind(
         place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found = np.where(ahead, on_floor, found)
-    return np.where(wanted, found, 0.0)
+    return np.where(wanted, found, 0.0), hit, face
 
 
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:
