@@ -29,6 +29,7 @@ from scenes import Circle, Picture
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
+_MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
 _CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
 _GRID = 0.25  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
@@ -92,11 +93,14 @@ class Circles:
         Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius.
     covariance : ndarray, shape (n, 3, 3)
     state : ndarray of str, shape (n,)
+    near : ndarray of bool, shape (n,)
+        Whether so many points are found that the circle must be where they say, or near it.
     """
 
     errors: np.ndarray
     covariance: np.ndarray
     state: np.ndarray
+    near: np.ndarray
 
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
@@ -124,8 +128,7 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
     tool = rim_tool(picture, name, moved)
     found = _measured(images, tool)
     found = replace(found, errors=found.errors + np.array(moved))
-    good = np.isin(found.state, status.MEASURED)
-    far = good & _is_far(tool, found.errors - np.array(moved))
+    far = found.near & _is_far(tool, found.errors - np.array(moved))
     if not far.any():
         return found
     if passes == 0:
@@ -136,22 +139,28 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
         which = np.flatnonzero(far)[(keys == key).all(1)]
         again = _find(images[which], picture, name, tuple(key.tolist()), passes - 1)
         errors[which], covariance[which], state[which] = again.errors, again.covariance, again.state
-    return Circles(errors, covariance, state.astype(str))
+    return Circles(errors, covariance, state.astype(str), found.near)
 
 
 def _measured(images: np.ndarray, tool: RimTool) -> Circles:
     count = len(images)
     if tool.state not in status.MEASURED:
-        return Circles(np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan), np.full(count, tool.state))
+        return Circles(
+            np.full((count, 3), np.nan),
+            np.full((count, 3, 3), np.nan),
+            np.full(count, tool.state),
+            np.zeros(count, bool),
+        )
     points = tool.locator.locate_each(images)
     taken = tool.weights > 0
     fit = tool.fit(points.valid)
     errors = np.einsum("nim,nm->ni", fit, points.offset + tool.inward)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
-    enough = (points.valid & clear)[:, taken].mean(1) >= _MIN_FOUND
+    part = (points.valid & clear)[:, taken].mean(1)
     determined = np.isfinite(errors).all(1)
-    state = np.where(determined, np.where(enough, tool.state, status.LOW_CONTRAST), status.ILL_CONDITIONED)
-    return Circles(errors, _covariance(images, tool, fit, points), state)
+    state = np.where(part >= _MIN_FOUND, tool.state, status.LOW_CONTRAST)
+    state = np.where(determined, state, status.ILL_CONDITIONED)
+    return Circles(errors, _covariance(images, tool, fit, points), state, determined & (part >= _MIN_NEAR))
 
 
 def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:

@@ -28,6 +28,8 @@ _STEPS = 8  # of Newton's method
 _FARTHEST = 0.25  # px that a crossing may be moved: beyond, another one may be the steepest
 _STEEPER = 0.3  # by which the slope there may differ from a lone step's
 _ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
+_LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
+_AT = 1e-6  # of the way to the next place: there is the place itself
 _MOST = 4  # times `RIM_POINTS`
 _SPACING = 2.0  # smoothing scales between places, while there are not so many
 
@@ -60,7 +62,8 @@ class RimLook:
         first, share = place.astype(int) % count, place - place.astype(int)
         then = (first + 1) % count
         told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
-        return RimLook(*told, self.good[first] & self.good[then])
+        good = (self.good[first] | (share > 1 - _AT)) & (self.good[then] | (share < _AT))
+        return RimLook(*told, good)
 
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
@@ -90,6 +93,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     with np.errstate(divide="ignore", invalid="ignore"):
         good = (np.abs(slope / (sides[1] - sides[0]) - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)
     good &= sides.max(0) <= sensor.headroom(scene.noise)
+    good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
     return RimLook(shift, np.nan_to_num(slope) ** 2, noise, good & _steady(moved, slope))
@@ -138,15 +142,31 @@ def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) ->
 def _zero(levels: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Zero crossing of the second derivative of levels (n, J, 2 cells) about steps at ``where`` (n, J), in standard
     deviations, and the contrast of a lone step that has its slope there."""
-    ends = _CELL * np.arange(-_CELLS, _CELLS + 1)
     found = start.copy()
     for _ in range(_STEPS):
-        away = where[..., None] + ends - found[:, None, None]
-        bell = np.exp(-(away**2) / 2)
-        first, second = -away * bell, (away**2 - 1) * bell  # of the bell, by the ends; both 0 at infinity
-        first[..., [0, -1]] = second[..., [0, -1]] = 0.0
-        value, slope = (np.einsum("j,njc,njc->n", _SHARES, levels, np.diff(v)) for v in (first, -second))
+        value, slope = _second(levels, where, found)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.where(slope != 0, value / slope, np.nan)
         found = found - np.clip(step, -0.5, 0.5)
     return found, -slope
+
+
+def _second(levels: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Second derivative of the blurred levels at ``at`` (n,) and its slope there, (n,), as of lone steps."""
+    away = where[..., None] + _CELL * np.arange(-_CELLS, _CELLS + 1) - at[:, None, None]
+    bell = np.exp(-(away**2) / 2)
+    first, second = -away * bell, (away**2 - 1) * bell  # of the bell, by the ends; both 0 at infinity
+    first[..., [0, -1]] = second[..., [0, -1]] = 0.0
+    value, slope = (np.einsum("j,njc,njc->n", _SHARES, levels, np.diff(v)) for v in (first, -second))
+    return value, slope
+
+
+def _steepest(levels, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """Whether no other crossing in the search window (n,) is nearly as steep, which noise would let win, (n,)."""
+    steps = np.linspace(-1, 1, _LOOKED)
+    told = np.stack([_second(levels, where, step * window)[0] for step in steps], 1) * np.sign(slope)[:, None]
+    left, right = told[:, :-1], told[:, 1:]
+    size = window * (steps[1] - steps[0])
+    fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)
+    others = np.abs((steps[:-1] + steps[1:]) / 2 * window[:, None] - crossing[:, None]) > size[:, None]
+    return (fall * others).max(1) <= _RIVAL * np.abs(slope)

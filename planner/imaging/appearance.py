@@ -265,7 +265,9 @@ def seen_by_rays(pictures: Pictures, rays: np.ndarray) -> tuple[np.ndarray, np.n
     face : ndarray of int, shape (n,)
         Whose face; -1 where it meets none.
     """
-    start = pictures.sensor_at + rays / np.linalg.norm(rays, axis=-1, keepdims=True) * 1e-3 * pictures.scene.solid.extent
+    start = (
+        pictures.sensor_at + rays / np.linalg.norm(rays, axis=-1, keepdims=True) * 1e-3 * pictures.scene.solid.extent
+    )
     return _past(pictures, start, np.ones(len(rays), bool), (), None, True)
 
 
