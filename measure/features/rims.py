@@ -212,8 +212,9 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         inward = inward - seen.shift
     arc = speed * 2 * np.pi / angle.size
     weight, state = _weights(pictures, nominal, angle, places, arc, optics, seen)
-    taken = weight > 0
+    taken = (weight > 0) & np.isfinite(inward)
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
+    weight, inward = np.where(taken, weight, 0.0), np.nan_to_num(inward)
     recorded_normals = gradient / size[:, None]
     locator = gradient_along(optics, angle[keep], _held(places[keep], optics), recorded_normals[keep], size[keep])
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)

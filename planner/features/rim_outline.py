@@ -10,6 +10,7 @@ from planner.imaging.projection import from_axis
 from scenes import Circle, Solid
 
 _SPACING, _FARTHEST = 0.25, 4.0  # standard deviations: of the lines beside a place, and how far they go
+_LEAST = 2.5  # as far they must meet the outline
 _STEPS = 5  # of Newton's method
 _AT_ONCE = 1 << 20  # numbers
 
@@ -85,18 +86,21 @@ def _crossed(ends: np.ndarray, places: np.ndarray, normals: np.ndarray, beside: 
 def smooth_outline(
     pictures: Pictures, circle: Circle, places: np.ndarray, normals: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
-    """How far outwards the zero crossing lies for the outline is no straight line, ideal px, shape (m,).
+    """How far outwards the zero crossing lies for the outline is no straight line, ideal px, shape (m,); NaN where the
+    outline turns away within `_LEAST` standard deviations.
 
     Of an image of two levels under a Gaussian of ``width`` (m,), blur and smoothing together, ideal px.
     """
     steps = np.arange(-_FARTHEST, _FARTHEST + _SPACING / 2, _SPACING)
     weight = np.exp(-(steps**2) / 2)
     where = outline_beside(pictures, circle, places, normals, width[:, None] * steps) / width[:, None]
-    return width * zero_of_steps(where, weight)
+    missed, needed = ~np.isfinite(where), np.abs(steps) <= _LEAST
+    found = width * zero_of_steps(np.where(missed, 0.0, where), np.where(missed, 0.0, weight))
+    return np.where((missed & needed).any(1), np.nan, found)
 
 
 def zero_of_steps(where: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Zero crossing of the second derivative of unit steps at places (m, J), of weights (J,), in standard deviations."""
+    """Zero crossing of the second derivative of unit steps at places (m, J), of weights (..., J), in standard deviations."""
     found = np.zeros(len(where))
     for _ in range(_STEPS):
         away = where - found[:, None]
