@@ -77,7 +77,7 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     rules about what is near stand for that.
     """
     scene = pictures.scene
-    seen = look(pictures, circle) if fall_off and _is_one(pictures) else None
+    seen = look(pictures, circle) if fall_off and pictures.closely else None
     angle = equal_angles(RIM_POINTS if seen is None else seen.shift.size)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
@@ -92,11 +92,6 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
     return Rim(design, arc, squared, noise, clear)
-
-
-def _is_one(pictures: Pictures) -> bool:
-    """Whether it is one picture with its lights, no array of them."""
-    return bool(pictures.lights) and all(poses.ndim == 1 for poses in (pictures.sensors, *pictures.lights))
 
 
 def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:

@@ -16,7 +16,6 @@ from planner.features.rim_outline import facets, outline_beside, zero_of_steps
 from planner.features.rim_sides import RIM_POINTS, equal_angles, outward_normals, radials
 from planner.imaging import sensor
 from planner.imaging.appearance import seen_by_rays
-from planner.imaging.bore import light_between_walls
 from planner.imaging.lens import image_centre, lens_jacobian
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import frame, from_axis
@@ -134,8 +133,7 @@ def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) ->
     points = _places(pictures, circle, angle)[:, None, None] + width[:, None, None, None] * (beside + away)
     axes, flat = frame(pictures.sensors), np.nan_to_num(points.reshape(-1, 2))
     rays = pictures.scene.camera.focal_px * axes.forward + flat @ np.stack([axes.right, axes.down])
-    levels, hit, face = seen_by_rays(pictures, rays)
-    levels = levels + light_between_walls(pictures, hit, face)
+    levels = seen_by_rays(pictures, rays)
     return np.where(np.isfinite(points).all(-1), levels.reshape(points.shape[:-1]), np.nan)
 
 

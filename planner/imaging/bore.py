@@ -14,11 +14,11 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from planner.features.seen import plane_axes
+from planner.imaging.exchange import Exchanged, received
 from planner.imaging.irradiance import beam
-from planner.imaging.pictures import Pictures
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
-from scenes import Circle, Solid
+from scenes import Circle, Scene, Solid
 
 _AROUND, _DEEP = 48, 24  # patches
 _FINE = 5  # places in a patch, around, over which a form factor is averaged
@@ -59,47 +59,71 @@ def _bore(solid: Solid, rim: Circle, length: float) -> Bore:
     return Bore(rim, length, tuple(sorted(faces)), float(np.linalg.norm(middles - rim.centre, axis=1).min()))
 
 
-def light_between_walls(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Signal that points (..., 3) on faces (...) have from the wall that they lie on; 0 outside bores; one picture."""
-    found = np.zeros(faces.shape)
-    for bore in bores(pictures.scene.solid):
-        inside = np.isin(faces, bore.faces)
-        if inside.any():
-            told = pictures.once(("bore", bore.rim.name), lambda bore=bore: _exchanged(pictures, bore))
-            one, two = plane_axes(bore.rim.axis)
-            away = points[inside] - bore.rim.centre
-            angle = np.arctan2(away @ two, away @ one) % (2 * np.pi)
-            found[inside] = told.ev(angle, np.clip(-away @ bore.rim.axis, 0, bore.length))
+def light_in_bore(scene: Scene, lights_at: np.ndarray, bore: Bore, others: Exchanged | None) -> RectBivariateSpline:
+    """Light that a wall has from itself and from the faces outside, over the angle and the depth below the rim.
+
+    Irradiance in units of the signal of a white face. ``others`` sends what comes from outside.
+    """
+    white = diffuse(scene.material)
+    form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
+    depth = (np.arange(_DEEP) + 0.5) / _DEEP
+    outside = [_from_outside(bore, at * bore.length, others) for at in (depth, nodes)]
+    direct = np.fft.fft(white * (_direct(scene, lights_at, bore) + outside[0]), axis=0)
+    whole = np.linalg.solve(np.eye(_DEEP) - white * form, direct[..., None])
+    found = np.fft.ifft((gather @ whole)[..., 0], axis=0).real + outside[1]
+    around = np.concatenate([found[-3:], found, found[:4]])
+    angle = (np.arange(-3, _AROUND + 4) + 0.5) * 2 * np.pi / _AROUND
+    return RectBivariateSpline(angle, nodes * bore.length, around)
+
+
+def place_in(bore: Bore, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angle and depth below the rim of points (..., 3) on the wall."""
+    one, two = plane_axes(bore.rim.axis)
+    away = points - bore.rim.centre
+    return np.arctan2(away @ two, away @ one) % (2 * np.pi), np.clip(-away @ bore.rim.axis, 0, bore.length)
+
+
+def _on_wall(bore: Bore, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places before the facets at the patches' angles and some depths, and the wall's normals, (around, depths, 3)."""
+    angle = (np.arange(_AROUND) + 0.5) * 2 * np.pi / _AROUND
+    one, two = plane_axes(bore.rim.axis)
+    radial = np.cos(angle)[:, None, None] * one + np.sin(angle)[:, None, None] * two
+    points = bore.rim.centre + _WITHIN * bore.free_radius * radial - depth[:, None] * bore.rim.axis
+    return points, np.broadcast_to(-radial, points.shape)
+
+
+def _direct(scene: Scene, lights_at: np.ndarray, bore: Bore) -> np.ndarray:
+    """What arrives on the wall's patches from the lights, (around, deep)."""
+    points, normals = _on_wall(bore, (np.arange(_DEEP) + 0.5) / _DEEP * bore.length)
+    found = np.zeros(points.shape[:-1])
+    for light, at in zip(scene.lights, lights_at, strict=True):
+        blocker, t = first_face(scene.bodies, np.broadcast_to(at, points.shape), points - at, ())
+        arriving = beam(light, at, points)
+        cosine = np.einsum("...i,...i->...", arriving.to_light, normals)
+        found += np.where((blocker < 0) | (t >= 1), arriving.strength * np.maximum(cosine, 0), 0.0)
     return found
 
 
-def _exchanged(pictures: Pictures, bore: Bore) -> RectBivariateSpline:
-    """Signal of the light exchanged, over the angle and the depth below the rim."""
-    white = diffuse(pictures.scene.material)
-    form, gather, depths = _form_factors(bore.rim.radius / bore.length)
-    direct = np.fft.fft(_direct(pictures, bore), axis=0)
-    whole = np.linalg.solve(np.eye(_DEEP) - white * form, direct[..., None])
-    found = np.fft.ifft((white * gather @ whole)[..., 0], axis=0).real
-    around = np.concatenate([found[-3:], found, found[:4]])
-    angle = (np.arange(-3, _AROUND + 4) + 0.5) * 2 * np.pi / _AROUND
-    return RectBivariateSpline(angle, depths * bore.length, around)
+def _from_outside(bore: Bore, depth: np.ndarray, others: Exchanged | None) -> np.ndarray:
+    """What arrives at some depths of the wall through its openings, (around, depths)."""
+    points, normals = _on_wall(bore, depth)
+    if others is None:
+        return np.zeros(points.shape[:-1])
+    points, normals = points.reshape(-1, 3), normals.reshape(-1, 3)
+    return received(others, points, normals, lambda ends: _through(bore, points, ends)).reshape(_AROUND, -1)
 
 
-def _direct(pictures: Pictures, bore: Bore) -> np.ndarray:
-    """Diffuse signal of the wall's patches by the lights alone, whether the sensor sees them or not, (around, deep)."""
-    scene, rim, bodies = pictures.scene, bore.rim, pictures.scene.bodies
-    white = scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None)
-    angle, depth = (np.arange(_AROUND) + 0.5) * 2 * np.pi / _AROUND, (np.arange(_DEEP) + 0.5) / _DEEP * bore.length
-    one, two = plane_axes(rim.axis)
-    radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
-    points = rim.centre + _WITHIN * bore.free_radius * radial[:, None] - depth[:, None] * rim.axis
-    points, normals, found = points.reshape(-1, 3), np.repeat(-radial, _DEEP, 0), 0.0
-    for light, at in zip(scene.lights, pictures.lights_at, strict=True):
-        blocker, t = first_face(bodies, np.broadcast_to(at, points.shape), points - at, ())
-        arriving = beam(light, at, points)
-        cosine = np.einsum("ni,ni->n", arriving.to_light, normals)
-        found = found + np.where((blocker < 0) | (t >= 1), arriving.strength * np.maximum(cosine, 0), 0.0)
-    return white * found.reshape(_AROUND, _DEEP)
+def _through(bore: Bore, points: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Whether the ways from points (n, 3) of the wall to ends (p, 3) outside leave through an opening, (n, p)."""
+    axis, rim = bore.rim.axis, bore.rim
+    start, stop = (points - rim.centre) @ axis, (ends - rim.centre) @ axis
+    found = np.zeros((len(points), len(ends)), bool)
+    for level, beyond in ((0.0, stop > 0), (-bore.length, stop < -bore.length)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (level - start)[:, None] / (stop - start[:, None])
+            place = points[:, None] + share[..., None] * (ends - points[:, None]) - rim.centre
+            found |= beyond & ((place**2).sum(-1) - level**2 < rim.radius**2)
+    return found
 
 
 @lru_cache(maxsize=64)

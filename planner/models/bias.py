@@ -97,7 +97,7 @@ def _in_blocks(pictures: Pictures) -> Bias:
     for first in range(0, max(len(flat[0]), 1), _BLOCK):
         sensors, *lights = (poses[first : first + _BLOCK] for poses in flat)
         with np.errstate(all="ignore"):
-            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights))))
+            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights), pictures.closely)))
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Bias)}
     return Bias(**{name: values.reshape((*lead, *values.shape[1:])) for name, values in whole.items()})
 
