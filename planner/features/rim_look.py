@@ -23,6 +23,7 @@ from scenes import Circle
 
 _BESIDE, _SHARES = np.array([-np.sqrt(3), 0.0, np.sqrt(3)]), np.array([1, 4, 1]) / 6  # Gauss-Hermite, tangentially
 _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
+_SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS = 8  # of Newton's method
 _FARTHEST = 0.25  # px that a crossing may be moved: beyond, another one may be the steepest
 _STEEPER = 0.3  # by which the slope there may differ from a lone step's
@@ -125,16 +126,50 @@ def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray
 
 
 def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) -> np.ndarray:
-    """Signal in the cells (n, J, 2 cells) on both sides of the outline, from the inside outwards."""
-    cells = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
-    tangents = np.stack([-normals[:, 1], normals[:, 0]], -1)
-    away = (where[..., None] + cells)[..., None] * normals[:, None, None]
-    beside = _BESIDE[:, None, None] * tangents[:, None, None]
-    points = _places(pictures, circle, angle)[:, None, None] + width[:, None, None, None] * (beside + away)
-    axes, flat = frame(pictures.sensors), np.nan_to_num(points.reshape(-1, 2))
-    rays = pictures.scene.camera.focal_px * axes.forward + flat @ np.stack([axes.right, axes.down])
-    levels = seen_by_rays(pictures, rays)
-    return np.where(np.isfinite(points).all(-1), levels.reshape(points.shape[:-1]), np.nan)
+    """Mean signal of the cells (n, J, 2 cells) on both sides of the outline, from the inside outwards.
+
+    One ray tells a cell, but several those beside the outline and those that differ from a neighbour: a wall may be
+    seen narrower than a cell.
+    """
+    places, tangents = _places(pictures, circle, angle), np.stack([-normals[:, 1], normals[:, 0]], -1)
+    lines = places[:, None] + width[:, None, None] * (
+        _BESIDE[:, None] * tangents[:, None] + where[..., None] * normals[:, None]
+    )
+
+    def seen(which: tuple[np.ndarray, ...], cells: np.ndarray) -> np.ndarray:
+        place, line = which
+        points = lines[place, line] + (width[place] * cells)[:, None] * normals[place]
+        levels = _looked_at(pictures, points)
+        return np.where(np.isfinite(points).all(-1), levels, np.nan)
+
+    middles = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
+    place, line, cell = np.indices((*where.shape, middles.size)).reshape(3, -1)
+    levels = seen((place, line), middles[cell]).reshape(*where.shape, -1)
+    uneven = _uneven(levels)
+    place, line, cell = (np.repeat(v, _SHARP) for v in np.nonzero(uneven))
+    offsets = _CELL * ((np.arange(_SHARP) + 0.5) / _SHARP - 0.5)
+    several = seen((place, line), middles[cell] + np.tile(offsets, uneven.sum()))
+    levels[uneven] = several.reshape(-1, _SHARP).mean(1)
+    return levels
+
+
+def _uneven(levels: np.ndarray) -> np.ndarray:
+    """Cells beside the outline, and such as differ from a neighbour on their side of it, bool (n, J, 2 cells)."""
+    found = np.zeros(levels.shape, bool)
+    found[..., [_CELLS - 1, _CELLS]] = True
+    limit = _EVEN * np.nanmax(levels, initial=0.0)
+    for side in (slice(0, _CELLS), slice(_CELLS, None)):
+        apart = np.abs(np.diff(levels[..., side])) > limit
+        found[..., side][..., 1:] |= apart
+        found[..., side][..., :-1] |= apart
+    return found
+
+
+def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
+    """Signal at image points (k, 2) from the image's middle, ideal px."""
+    axes = frame(pictures.sensors)
+    rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points) @ np.stack([axes.right, axes.down])
+    return seen_by_rays(pictures, rays)
 
 
 def _zero(levels: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
