@@ -25,7 +25,7 @@ _BESIDE, _SHARES = np.array([-np.sqrt(3), 0.0, np.sqrt(3)]), np.array([1, 4, 1])
 _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS = 8  # of Newton's method
-_FARTHEST = 0.25  # px that a crossing may be moved: beyond, another one may be the steepest
+_FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
 _STEEPER = 0.3  # by which the slope there may differ from a lone step's
 _ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
 _LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
@@ -67,8 +67,7 @@ class RimLook:
 
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
-    """Number of places on a rim that are about ``spacing`` px apart in one picture: `RIM_POINTS`, or 2 to ``most`` times
-    as many."""
+    """Number of places on a rim, about ``spacing`` px apart in one picture: `RIM_POINTS`, or 2 to ``most`` times it."""
     places = circle.centre + circle.radius * radials(circle, equal_angles())
     rim = from_axis(places, pictures.sensors, pictures.scene.camera)
     length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()

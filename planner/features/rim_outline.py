@@ -100,7 +100,7 @@ def smooth_outline(
 
 
 def zero_of_steps(where: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Zero crossing of the second derivative of unit steps at places (m, J), of weights (..., J), in standard deviations."""
+    """Zero crossing (m,) of the second derivative of unit steps at places (m, J) of weights (..., J), in sigma."""
     found = np.zeros(len(where))
     for _ in range(_STEPS):
         away = where - found[:, None]

@@ -14,7 +14,6 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from planner.features.seen import plane_axes
 from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
@@ -251,7 +250,9 @@ def _direct(scene: Scene, patches: Patches, lights_at: np.ndarray) -> np.ndarray
 def received(
     exchange: Exchanged, points: np.ndarray, normals: np.ndarray, free: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """What arrives at points (n, 3) of unit normals (n, 3) from the patches; ``free`` says of their middles (p, 3) which
-    ways are, bool (n, p)."""
+    """What arrives at points (n, 3) of unit normals (n, 3) from the patches, (n,).
+
+    ``free`` says which ways to their middles (p, 3) are, bool (n, p).
+    """
     patches = exchange.exchange.patches
     return np.where(free(patches.points), form_factors(points, normals, patches), 0.0) @ exchange.sent
