@@ -21,7 +21,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     Diffuse light alone; 0 on faces of obstacles and in pictures that are not looked at closely.
     """
     scene = pictures.scene
-    if not pictures.closely or scene.solid.is_convex:
+    if not pictures.closely or scene.solid.is_convex or not points.size:
         return 0.0
     known = _known(scene, tuple(tuple(map(float, at.reshape(-1, 3)[0])) for at in pictures.lights_at))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
