@@ -1,4 +1,4 @@
-"""Rims of bores whose walls are lit: rendered without noise and measured, with the light that a wall sends to itself."""
+"""Rims of bores whose walls are lit, and send light to themselves: rendered without noise and measured."""
 
 from dataclasses import replace
 
@@ -64,7 +64,7 @@ def test_the_diameter_is_unbiased(bored, sensor, light, monkeypatch):
 
 
 def test_levels_of_the_wall_are_those_of_the_picture(bored):
-    """Contrast that the locator's slope shows around the rim, to 3 % at nine places of ten; not so without the wall's own light."""
+    """Contrast by the locator's slope, to 3 % at nine places of ten; not so without the wall's own light."""
     sensor, light = POSES[0]
     clean = rendered(bored, sensor, light)
     pictures = Pictures.of(bored, sensor, light)

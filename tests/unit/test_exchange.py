@@ -10,7 +10,7 @@ from planner.imaging.exchange import Patches, form_factors
 
 @pytest.mark.parametrize("deep", [0.5, 2.0, 4.0])
 def test_a_bore_sees_itself(deep):
-    """Wall to wall and rim to wall of an open cylinder, from those to its end discs; the rim of a flat one sees none."""
+    """Form factors from an open cylinder's wall, and from depths of it, to the wall: 1 less those to its end discs."""
     between, at_nodes, nodes = _form_factors(1 / deep)
     deeper = deep**2 + 2
     to_disc = (1 - (deeper - np.sqrt(deeper**2 - 4)) / 2) / (2 * deep)
