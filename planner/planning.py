@@ -8,8 +8,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from planner.features.measurand import required_edges
+from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.prediction import Prediction, predict
+from planner.prediction import Prediction, minimised, predict
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates, edges_of
@@ -260,6 +261,11 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         descents = [refine(scene, *at, *how, sizes=(0.7,)) for at in starts]
         sensor, light, _ = min(descents, key=lambda descent: descent[2])
         sensor, light, variance = refine(scene, sensor, light, *how, sizes=(0.1,))
+    on_grid = result.variance
+    if not scene.solid.is_convex:  # the search glances at pictures; what is told of the best is from a close look
+        how = option.model, aim
+        variance = _closely(scene, sensor, light, *how)
+        on_grid = _closely(scene, result.sensor, result.light, *how)
     prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
     return Plan(
         scene=scene,
@@ -272,7 +278,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         limiting=prediction.limiting or prediction.measurands[0].name,
         grid_sensor=Pose(*map(float, result.sensor)),
         grid_light=Pose(*map(float, result.light)),
-        grid_variance=float(result.variance),
+        grid_variance=float(on_grid),
         prediction=prediction,
         trace=partial.trace if partial else (),
         partial_variance=float(partial.variance) if partial else float("nan"),
@@ -282,6 +288,11 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         evaluated=sum(r.found.evaluated for r in results if r.found),
         candidates=choice,
     )  # fmt: skip
+
+
+def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:
+    """What is minimised, of one picture looked at closely."""
+    return float(minimised(variance_model(model)(Pictures.of(scene, sensor, light)), aim))
 
 
 def _guarantee(option: _Option, found: Found | None) -> str:

@@ -18,7 +18,7 @@ from scipy.stats import qmc
 
 _AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
 LARGE_AT_ONCE = 1 << 22  # the same beside a large image
-SURFACES = 8  # that light may meet; the ninth would add less than reflectance^8 of the first
+SURFACES = 16  # that light may meet; in a bore four radii deep, of reflectance 0.9, 0.3 % of what is sent on is left
 _DIMENSIONS = 4  # of a reflection: where on the light, which way to the next surface
 
 

@@ -17,30 +17,23 @@ from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
 from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
 from planner.features.locator import MIN_CONTRAST, edge_blur, reach
-from planner.features.rim_sides import (
-    RIM_POINTS,
-    clearance,
-    contrast_along,
-    equal_angles,
-    outward_normals,
-    radials,
-    seen_along,
-    shading_shift,
-    steady,
-)
+from planner.features.rim_look import RimLook, look, places_around
+from planner.features.rim_outline import facets, smooth_outline
+from planner.features.rim_sides import clearance, equal_angles, outward_normals, radials, seen_along
 from planner.features.seen import plane_axes
+from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project_ideal
-from scenes import Circle, Picture, Solid
+from scenes import Circle, Picture
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
+_MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
 _CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
 _GRID = 0.25  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
-_BEND = 1e-3  # rad: step of the curvature's differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +49,7 @@ class RimTool:
         Of the places in the least squares: the length that each stands for, and where the light is known the squared
         contrast over the noise's variance; 0 where it is not taken.
     inward : ndarray, shape (m,)
-        How far inside the rim the zero crossing lies, for the rim is curved and its sides are shaded, ideal px.
+        How far inside the rim the zero crossing lies, for the rim is curved and its sides are uneven, ideal px.
     state : str
         ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
     optics : Optics
@@ -100,11 +93,14 @@ class Circles:
         Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius.
     covariance : ndarray, shape (n, 3, 3)
     state : ndarray of str, shape (n,)
+    near : ndarray of bool, shape (n,)
+        Whether so many points are found that the circle must be where they say, or near it.
     """
 
     errors: np.ndarray
     covariance: np.ndarray
     state: np.ndarray
+    near: np.ndarray
 
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
@@ -132,8 +128,7 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
     tool = rim_tool(picture, name, moved)
     found = _measured(images, tool)
     found = replace(found, errors=found.errors + np.array(moved))
-    good = np.isin(found.state, status.MEASURED)
-    far = good & _is_far(tool, found.errors - np.array(moved))
+    far = found.near & _is_far(tool, found.errors - np.array(moved))
     if not far.any():
         return found
     if passes == 0:
@@ -144,22 +139,28 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
         which = np.flatnonzero(far)[(keys == key).all(1)]
         again = _find(images[which], picture, name, tuple(key.tolist()), passes - 1)
         errors[which], covariance[which], state[which] = again.errors, again.covariance, again.state
-    return Circles(errors, covariance, state.astype(str))
+    return Circles(errors, covariance, state.astype(str), found.near)
 
 
 def _measured(images: np.ndarray, tool: RimTool) -> Circles:
     count = len(images)
     if tool.state not in status.MEASURED:
-        return Circles(np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan), np.full(count, tool.state))
+        return Circles(
+            np.full((count, 3), np.nan),
+            np.full((count, 3, 3), np.nan),
+            np.full(count, tool.state),
+            np.zeros(count, bool),
+        )
     points = tool.locator.locate_each(images)
     taken = tool.weights > 0
     fit = tool.fit(points.valid)
     errors = np.einsum("nim,nm->ni", fit, points.offset + tool.inward)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
-    enough = (points.valid & clear)[:, taken].mean(1) >= _MIN_FOUND
+    part = (points.valid & clear)[:, taken].mean(1)
     determined = np.isfinite(errors).all(1)
-    state = np.where(determined, np.where(enough, tool.state, status.LOW_CONTRAST), status.ILL_CONDITIONED)
-    return Circles(errors, _covariance(images, tool, fit, points), state)
+    state = np.where(part >= _MIN_FOUND, tool.state, status.LOW_CONTRAST)
+    state = np.where(determined, state, status.ILL_CONDITIONED)
+    return Circles(errors, _covariance(images, tool, fit, points), state, determined & (part >= _MIN_NEAR))
 
 
 def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
@@ -191,30 +192,29 @@ def _rounded(tool: RimTool, errors: np.ndarray) -> tuple[float, ...]:
 def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     """What measures a circle of the object, expected with some errors."""
     scene, solid = picture.scene, picture.scene.solid
-    optics, pictures, camera = Optics.of(scene), Pictures.of(picture), scene.camera
+    optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
-    angle = equal_angles(_count(pictures, nominal, optics.scale_px))
+    angle = equal_angles(places_around(pictures, nominal, SPACING * optics.scale_px, _MOST))
     circle = _with_errors(nominal, moved)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
     spokes = radial * (circle.radius * facets(solid, nominal, angle))[:, None]
-    ideal, smooth, ahead, behind = (
-        project_ideal(circle.centre + away, pictures.sensors, camera)
-        for away in (spokes, *(circle.radius * radials(circle, angle + s * _BEND) for s in (0, 1, -1)))
-    )
+    ideal = project_ideal(circle.centre + spokes, pictures.sensors, scene.camera)
     normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("ni,nij->nj", normal, slope)
     design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
-    curvature = -((ahead - 2 * smooth + behind) / _BEND**2 * normal).sum(-1) / speed**2
-    inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature
-    if pictures.lights:
-        inward = inward - shading_shift(pictures, nominal, angle)
     places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
     size = np.linalg.norm(gradient, axis=-1)
+    width = np.hypot(optics.scale_px, edge_blur(optics.blur_px)) * size
+    inward = -smooth_outline(pictures, circle, ideal - image_centre(scene.camera), normal, width)
+    seen = look(pictures, nominal).at(angle) if pictures.lights else None
+    if seen is not None:
+        inward = inward - seen.shift
     arc = speed * 2 * np.pi / angle.size
-    weight, state = _weights(pictures, nominal, angle, places, arc, optics)
-    taken = weight > 0
+    weight, state = _weights(pictures, nominal, angle, places, arc, optics, seen)
+    taken = (weight > 0) & np.isfinite(inward)
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
+    weight, inward = np.where(taken, weight, 0.0), np.nan_to_num(inward)
     recorded_normals = gradient / size[:, None]
     locator = gradient_along(optics, angle[keep], _held(places[keep], optics), recorded_normals[keep], size[keep])
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
@@ -226,59 +226,33 @@ def _held(places: np.ndarray, optics: Optics) -> np.ndarray:
     return np.clip(np.nan_to_num(places), margin, np.maximum(np.array(optics.shape[::-1]) - 1 - margin, margin))
 
 
-def _count(pictures: Pictures, circle: Circle, scale: float) -> int:
-    """Number of places: the planner's, or as many times that as the image's length needs."""
-    places = circle.centre + circle.radius * radials(circle, equal_angles())
-    rim = project_ideal(places, pictures.sensors, pictures.scene.camera)
-    length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()
-    return RIM_POINTS * int(np.clip(np.ceil(length / (SPACING * scale * RIM_POINTS)), 1, _MOST))
-
-
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
     one, two = plane_axes(circle.axis)
     return replace(circle, centre=circle.centre + errors[0] * one + errors[1] * two, radius=circle.radius + errors[2])
 
 
 def _weights(
-    pictures: Pictures, circle: Circle, angle: np.ndarray, places: np.ndarray, arc: np.ndarray, optics: Optics
-) -> tuple[np.ndarray, str]:
+    pictures: Pictures, circle: Circle, angle: np.ndarray, places: np.ndarray, arc: np.ndarray, optics: Optics,
+    seen: RimLook | None,
+) -> tuple[np.ndarray, str]:  # fmt: skip
     """Weights of places (m,), 0 where they are not taken, and the status that this makes.
 
     The rules are those of `planner.features.circles`.
     """
     margin = optics.window_px + 4 * optics.scale_px + 1
     inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(-1)
-    seen = inside & seen_along(pictures, circle, angle)
-    if seen.mean() < LEAST_SEEN:
-        return np.zeros(seen.size), status.NOT_VISIBLE
-    strong, weight, far = seen, arc, reach(optics.scale_px, optics.blur_px)
-    clear = clearance(pictures, circle, angle) >= far
-    if pictures.lights:
-        squared, noise = contrast_along(pictures, circle, angle)
-        strong = seen & (squared >= MIN_CONTRAST**2 * noise)
-        weight, clear = arc * squared / noise, clear & steady(squared, shading_shift(pictures, circle, angle), arc, far)
+    shown = inside & seen_along(pictures, circle, angle)
+    if shown.mean() < LEAST_SEEN:
+        return np.zeros(shown.size), status.NOT_VISIBLE
+    if seen is None:
+        strong, weight = shown, arc
+        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.blur_px)
+    else:
+        strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
+        weight, clear = arc * seen.squared / seen.noise_variance, seen.good
         if strong.mean() < LEAST_SEEN:
-            return np.zeros(seen.size), status.LOW_CONTRAST
+            return np.zeros(shown.size), status.LOW_CONTRAST
     part = (strong & clear).mean()
     if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or part < LEAST_SEEN:
         return np.where(strong, weight, 0.0), status.CLUTTER
     return np.where(strong & clear, weight, 0.0), status.OK
-
-
-def facets(solid: Solid, circle: Circle, angle: np.ndarray) -> np.ndarray:
-    """Radius of the mesh's rim, a polygon, over the circle's at angles (m,).
-
-    The picture is one of the mesh: between its vertices, which lie on the circle, the rim runs inside it.
-    """
-    one, two = plane_axes(circle.axis)
-    ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in circle.edges]) - circle.centre
-    first, last = np.moveaxis(np.stack([ends @ one, ends @ two], -1), 1, 0)
-    toward = np.stack([np.cos(angle), np.sin(angle)], -1)
-    along = last - first
-    turn = toward[:, None, 0] * along[:, 1] - toward[:, None, 1] * along[:, 0]  # (m, pieces)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = (first[:, 0] * along[:, 1] - first[:, 1] * along[:, 0]) / turn
-        share = (first[:, 0] * toward[:, None, 1] - first[:, 1] * toward[:, None, 0]) / turn
-    hit = (share >= -1e-9) & (share <= 1 + 1e-9) & (far > 0)
-    found = np.where(hit, far, np.nan)
-    return np.nan_to_num(np.nanmax(found, axis=1) / circle.radius, nan=1.0)

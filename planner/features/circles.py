@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.features.locator import reach
+from planner.features.rim_look import look
 from planner.features.rim_sides import (
     RIM_POINTS,
     clearance,
@@ -18,6 +19,7 @@ from planner.features.rim_sides import (
     equal_angles,
     outward_normals,
     radials,
+    seen_along,
     shading_shift,
     steady,
 )
@@ -45,8 +47,9 @@ class Rim:
     noise_variance : ndarray, shape (..., n), or float
         Mean of both sides, grey levels^2.
     clear : ndarray of bool, shape (..., n)
-        Whether the locator is undisturbed there: the far rim of the wall beside, where the wall is seen, the straight
-        edges around the circle's face, and jumps of the contrast along the rim are `locator.reach` away.
+        Whether what the locator finds there is known. In one picture `RimLook.good`; in many whether it is undisturbed:
+        the far rim of the wall beside, where the wall is seen, the straight edges around the circle's face, and jumps
+        of the contrast along the rim are `locator.reach` away.
     """
 
     design: np.ndarray
@@ -68,16 +71,24 @@ class Rim:
 
 
 def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
-    """Sample a circular edge at equal angles."""
+    """Sample a circular edge at equal angles.
+
+    One picture is looked at (`planner.features.rim_look`), as a measurement does; of many the levels at the rim and
+    rules about what is near stand for that.
+    """
     scene = pictures.scene
-    angle = equal_angles()
+    seen = look(pictures, circle) if fall_off and pictures.closely else None
+    angle = equal_angles(RIM_POINTS if seen is None else seen.shift.size)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
     normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("...ni,...nij->...nj", normal, slope)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
+    arc, far = speed * 2 * np.pi / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
+    if seen is not None:
+        squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
+        return Rim(design, arc, squared, seen.noise_variance, seen.good)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
-    arc, far = speed * 2 * np.pi / RIM_POINTS, reach(scene.locator.scale_px, scene.camera.blur_px)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
     return Rim(design, arc, squared, noise, clear)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from planner.features.locator import edge_blur
@@ -129,7 +131,7 @@ def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndar
         np.einsum("...i,...i->...", normal, sensor_at - points) > 0
         for normal in (np.broadcast_to(circle.axis, points.shape), -radial if circle.hole else radial)
     ]
-    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(circle, points), sensor_at)
+    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(pictures, circle, points), sensor_at)
 
 
 def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
@@ -198,17 +200,23 @@ def _to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = 
     return nearest
 
 
-def _probe(circle: Circle, points: np.ndarray) -> np.ndarray:
+def _probe(pictures: Pictures, circle: Circle, points: np.ndarray) -> np.ndarray:
     """Places that stand for those of a rim where it is asked what they see: the mesh's facets reach into a hole."""
-    chord = np.cos(np.pi / len(circle.edges)) if circle.hole else 1.0
-    return circle.centre + chord * (points - circle.centre)
+    return circle.centre + (_narrowest(pictures.scene.solid, circle) if circle.hole else 1.0) * (points - circle.centre)
+
+
+@lru_cache(maxsize=64)
+def _narrowest(solid: Solid, circle: Circle) -> float:
+    """Radius of the widest circle free of the mesh's facets, over the circle's."""
+    middles = solid.vertices[[solid.edge(name).ends for name in circle.edges]].mean(1)
+    return float(np.linalg.norm(middles - circle.centre, axis=1).min() / circle.radius)
 
 
 def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
     """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
     bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
     wall = -radial if circle.hole else radial
-    probe = _probe(circle, points)
+    probe = _probe(pictures, circle, points)
     lit = tuple(_free(bodies, probe, at[..., None, :]) for at in pictures.lights_at)
     sides = []
     for normal in (np.broadcast_to(circle.axis, points.shape), wall):

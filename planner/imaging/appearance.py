@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.imaging import sensor
+from planner.imaging.between import light_between
 from planner.imaging.irradiance import bands, beam, electric_field, squared_distance
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, facing, frame
@@ -21,6 +22,7 @@ from planner.imaging.visibility import seen, turned
 from scenes import Edge, Floor, Material, Scene
 
 _UP = np.array([0.0, 0.0, 1.0])
+_NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
 _LIFT = 1e-6  # of the object's size: how far beside an edge the floor behind it is looked at
 
 
@@ -215,6 +217,7 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
     )
     normals = bodies.normals[list(edge.faces)][:, None]
     level = signal(pictures, points[..., None, :, :], normals, 2, lit, fall_off=fall_off)
+    level = level + light_between(pictures, points[..., None, :, :], np.array(edge.faces)[:, None])
     looked_at = turned(bodies, edge, pictures.sensor_at)[..., None]
     visible = (looked_at.any(-2) & seen(bodies, edge, pictures.sensor_at, fractions))[..., None, :]
     found = np.where(visible & looked_at, level, 0.0)
@@ -255,13 +258,20 @@ def behind(
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, at, partial(reaches, bodies)) for at in pictures.lights_at)
-    found = np.where(face >= 0, signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off), 0.0)
+    found = signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off)
+    found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     if scene.floor is not None and scene.floor.reflectance > 0:
         place, ahead = _on_floor(scene.floor, points, vectors, t)
         place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found = np.where(ahead, on_floor, found)
     return np.where(wanted, found, 0.0)
+
+
+def seen_by_rays(pictures: Pictures, rays: np.ndarray) -> np.ndarray:
+    """Signal of what the sensor of one picture sees along rays (n, 3), shape (n,)."""
+    start = pictures.sensor_at + _NEAR * pictures.scene.solid.extent * _unit(rays)
+    return behind(pictures, start, np.ones(len(rays), bool), ())
 
 
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:

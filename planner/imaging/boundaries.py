@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.imaging.appearance import is_plain, side_signals, signal
+from planner.imaging.between import light_between
 from planner.imaging.blurred_segment import Segments
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, edge_points, facing, frame, from_axis
@@ -186,7 +187,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     Shape (T, support, 3); whether the face is seen does not matter.
     """
     scene, solid, camera = pictures.scene, pictures.scene.solid, pictures.scene.camera
-    of_each = Pictures(scene, *_of_each(pictures, picture))
+    of_each = Pictures(scene, *_of_each(pictures, picture), pictures.closely)
     at, axes = of_each.sensor_at[:, None], frame(of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
     near, far = (depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
@@ -200,7 +201,8 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     heights = solid.offsets[face] - (of_each.sensor_at * normal[:, 0, 0]).sum(-1)
     with np.errstate(all="ignore"):
         met = at[..., None, :] + (heights[:, None, None] / (rays * normal).sum(-1))[..., None] * rays
-        values = np.nan_to_num(signal(of_each, met, normal, 2), posinf=0.0, neginf=0.0)
+        values = signal(of_each, met, normal, 2) + light_between(of_each, met, face[:, None, None])
+        values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
     return np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
 
 
@@ -232,7 +234,7 @@ def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, neare
     for which in np.unique(other):
         edge, rows = solid.edges[which], np.flatnonzero(other == which)
         spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
-        alone = Pictures(scene, *_of_each(pictures, picture[rows]))
+        alone = Pictures(scene, *_of_each(pictures, picture[rows]), pictures.closely)
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
         levels[rows] = found if sided[which, 0] == edge.faces[0] else found[:, ::-1]
     return levels

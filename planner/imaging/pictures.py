@@ -27,11 +27,15 @@ class Pictures:
         Polar angle and azimuth, degrees.
     lights : tuple of ndarray, shape (..., 2)
         For each of the scene's lights; broadcast against the sensors.
+    closely : bool
+        Whether this is one picture to be looked at closely: with the light that surfaces send to each other, and along
+        circles (`planner.features.rim_look`). Many pictures are glanced at, which takes a thousandth of the time.
     """
 
     scene: Scene
     sensors: np.ndarray
     lights: tuple[np.ndarray, ...] = ()
+    closely: bool = False
     _known: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -42,11 +46,12 @@ class Pictures:
         if not isinstance(scene, Scene):
             raise InvalidInput(f"scene must be a Scene or a Picture, got {type(scene).__name__}")
         each = () if lights is None else lights if isinstance(lights, tuple) and len(scene.lights) > 1 else (lights,)
-        return cls(scene, poses(sensors, "sensors"), tuple(poses(some, "lights") for some in each))
+        parts = poses(sensors, "sensors"), tuple(poses(some, "lights") for some in each)
+        return cls(scene, *parts, bool(parts[1]) and all(part.ndim == 1 for part in (parts[0], *parts[1])))
 
     def with_scene(self, scene: Scene) -> Pictures:
         """The same poses in another scene."""
-        return Pictures(scene, self.sensors, self.lights)
+        return Pictures(scene, self.sensors, self.lights, self.closely)
 
     @property
     def sensor_at(self) -> np.ndarray:
@@ -73,4 +78,4 @@ class Pictures:
 def _of_picture(picture: Picture) -> Pictures:
     """One object for equal pictures, so that what one asks of it is there for all who ask."""
     lights = tuple(np.array(list(pose)) for pose in picture.lights)
-    return Pictures(picture.scene, np.array(list(picture.sensor)), lights)
+    return Pictures(picture.scene, np.array(list(picture.sensor)), lights, bool(lights))

@@ -15,12 +15,14 @@ import numpy as np
 from planner.features.locator import CLEARANCE, edge_blur
 from planner.features.measurand import Measurands, corner_response, measurands, normals
 from planner.features.sampling import sampled_line
+from planner.imaging.appearance import is_plain, side_signals
 from planner.imaging.blurred_segment import Segments, second_and_third
 from planner.imaging.boundaries import Boundaries, Places, boundaries_near
 from planner.imaging.clipped_step import clipped
 from planner.imaging.lens import lens_jacobian
 from planner.imaging.lens import recorded as recorded_at
 from planner.imaging.pictures import Pictures
+from planner.imaging.projection import edge_points
 from planner.imaging.sensor import recorded
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
 from planner.models.calibrated import calibrated
@@ -34,6 +36,9 @@ _SETTLED = 1e-4  # px: the next step would be its square
 MOST = 0.3  # standard deviations of the measurand: the largest bias of what is `ok`
 _NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
 _FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
+_LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length: where it is asked where its light comes from
+_MOSTLY, _FELT = 0.5, 0.05  # parts of a side's light, and of the contrast
+_JUMP = 0.2  # of the contrast, that neighbouring places on an edge may differ by
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
 
@@ -54,7 +59,8 @@ class Bias:
         What each edge adds to ``values``.
     disturbed : ndarray of bool, shape (..., E)
         Edges of which neither bias nor variance are to be trusted: somewhere along them the crossing is far off, or
-        flatter or steeper than a lone step's, for errors by noise are divided by its slope; or an obstacle is near.
+        flatter or steeper than a lone step's, for errors by noise are divided by its slope; or the contrast jumps; or
+        an obstacle is near; or a side has most of its light from other faces.
     """
 
     values: np.ndarray
@@ -97,7 +103,7 @@ def _in_blocks(pictures: Pictures) -> Bias:
     for first in range(0, max(len(flat[0]), 1), _BLOCK):
         sensors, *lights = (poses[first : first + _BLOCK] for poses in flat)
         with np.errstate(all="ignore"):
-            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights))))
+            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights), pictures.closely)))
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Bias)}
     return Bias(**{name: values.reshape((*lead, *values.shape[1:])) for name, values in whole.items()})
 
@@ -122,8 +128,20 @@ def _bias(pictures: Pictures) -> Bias:
     needed = known.depends()[:, : len(known.view.names)]
     values, values_object = (np.where(needed, each, 0.0).sum(-1) for each in (shares, shares_object))
     disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
+    if pictures.closely and not pictures.scene.solid.is_convex:
+        disturbed |= _by_other_faces(pictures, known.view.names)
     corners = _corners(pictures.scene, known.view, lines)
     return Bias(values, values_object, lines, corners, shares, disturbed)
+
+
+def _by_other_faces(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
+    """Edges with a side that has most of its light from other faces, bool (N, E): its slope is known but roughly."""
+    points = edge_points(pictures.scene.solid, names, _LOOKED)
+    glanced = Pictures(pictures.scene, pictures.sensors, pictures.lights)
+    whole, direct = (side_signals(each, names, points) for each in (pictures, glanced))
+    lent = whole - direct
+    contrast = np.abs(whole[..., 1, :] - whole[..., 0, :])[..., None, :]
+    return ((lent > _MOSTLY * whole) & (lent > _FELT * contrast)).any((-1, -2))
 
 
 def _nothing(count: int, known: Measurands) -> Bias:
@@ -172,11 +190,22 @@ def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np
     contrast = np.zeros(width.size)
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
     contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]
+    uneven = _uneven(contrast.reshape(shape)).ravel() & (not is_plain(scene))
     moved, slope = _zero(near, width, clipped(scene.noise, near, blur, scale))
-    steepness = np.where(near.unknown, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
+    steepness = np.where(near.unknown | uneven, np.nan, -slope / contrast * (np.sqrt(2 * np.pi) * width**3))
     wrong = ~(np.abs(moved) < scene.locator.window_px) | ~(steepness > 0)
     across = np.broadcast_to(nodes.across, nodes.t.shape)[..., 1:-1]
     return np.where(wrong, np.nan, moved).reshape(shape) * across, steepness.reshape(shape)
+
+
+def _uneven(contrast: np.ndarray) -> np.ndarray:
+    """Places (..., n) along edges between which and a neighbour the contrast jumps: a shadow ends there, or another
+    thing is seen past the edge, at a place between them that nothing tells."""
+    apart = np.abs(np.diff(contrast)) > _JUMP * np.maximum(np.abs(contrast[..., 1:]), np.abs(contrast[..., :-1]))
+    found = np.zeros(contrast.shape, bool)
+    found[..., 1:] |= apart
+    found[..., :-1] |= apart
+    return found
 
 
 def _zero(near: Boundaries, width: np.ndarray, cut_off: Callable | None) -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.features.projected_edges import circles
 from planner.imaging.appearance import floor_material, signal
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides
@@ -71,8 +72,13 @@ class Interreflection(Effect):
         return "one convex body before darkness: no surface sees another" if _alone(scene) else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height."""
+        """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height.
+
+        Not bounded at the rim of a hole, whose wall sees itself right beside the rim.
+        """
         scene = pictures.scene
+        if any(scene.solid.circle(name).hole for name in circles(scene)):
+            return EVERYTHING
         own, albedo, bodies = sides(pictures), _albedo(scene), _bodies(scene)
         reflectance = scene.floor.reflectance if scene.floor else 0.0
         down = np.broadcast_to(((1 - own.normals[..., 2]) / 2)[..., None], own.levels.shape[1:])

@@ -51,7 +51,8 @@ def test_prediction_is_the_same(name, model):
     scene, poses = SCENES[name], POSES.get(name, ELSEWHERE)
     here, there = (planner.predict(s, *poses, model) for s in (scene, moved(scene)))
     assert here.status == there.status
-    assert here.status == ("clutter" if name == "grey_floor" and model != "bound" else "ok")  # beside the upright
+    crowded = name in ("bracket", "grey_floor") and model != "bound"  # light between its faces; beside the upright
+    assert here.status == ("clutter" if crowded else "ok")
     for value in ("value_image", "value_object", "variance_image", "variance_object"):
         assert getattr(there, value) == pytest.approx(getattr(here, value), rel=1e-9)
     assert there.corners == pytest.approx(here.corners, abs=1e-9)
