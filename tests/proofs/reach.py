@@ -53,7 +53,7 @@ def pytest_sessionfinish() -> None:
 
 
 def reached(kept: Path, files: list[Path]) -> dict[str, dict[str, Any]]:
-    """By test: processor seconds and the functions called, as ``file:qualified name``. ``kept`` saves doing it twice."""
+    """By test: processor seconds, and the functions called as ``file:qualified name``; what ``kept`` knows is kept."""
     known = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
     every: dict[str, dict[str, Any]] = {}
     for path in files:

@@ -4,9 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from measure.estimators.arrangement import ArrangementEstimator, _chi_square
-from measure.estimators.ellipse import _with_axes, free_parameters
+from measure.estimators.ellipse import _Linear, _with_axes, free_parameters
+from measure.estimators.expansion import ROWS, Pieces
 from measure.estimators.registry import estimator
 from measure.features.arranged import _seen
 from measure.features.blurred_ellipse import from_symmetric, to_symmetric
@@ -153,3 +155,32 @@ def test_a_circle_has_three_parameters(rng):
     assert parameters == pytest.approx([14, 11, 6, 6, 0])
     assert covariance[:4, :4] == pytest.approx((root @ root.T)[np.ix_(pick, pick)])
     assert not covariance[4].any()
+
+
+def test_gradient_by_the_displacements(tool, fit, rng):
+    """Of the rows times their coefficients, by the parameters: central differences, at steps that bend the image."""
+    pieces = Pieces.of(tool.model, fit.state)
+    rows = rng.standard_normal((1, len(pieces.rows), ROWS))
+    steps = 0.1 * rng.standard_normal((1, tool.model.count))
+
+    def value(steps):
+        return float((pieces.coefficients(pieces.displaced(steps)) * rows).sum())
+
+    found = pieces.gradient(pieces.displaced(steps), rows)[0]
+    for i in range(tool.model.count):
+        step = 1e-5 * (np.arange(tool.model.count) == i)
+        numeric = (value(steps + step) - value(steps - step)) / 2e-5
+        assert found[i] == pytest.approx(numeric, rel=1e-6, abs=1e-5)
+
+
+@pytest.mark.parametrize("noise", [None, Noise(sigma=1.0, gain=0.5)])
+def test_what_noise_leaves_of_an_ellipse(noise):
+    """The residual's chi-square over 1.1, with a freedom of pixels less parameters, at a chance of 1e-6."""
+    pixels, parameters, level = 30, 8, 40.0
+    variance = 4.0 if noise is None else 1.0 + 0.5 * level
+    optics = Optics(SHAPE, BLUR, 4.0, 1.0, 3.0, noise)
+    most = 1.1 * chi2.isf(1e-6, pixels - parameters) * variance
+    for share, fits in ((0.999, True), (1.001, False)):
+        residual = np.full(pixels, np.sqrt(share * most / pixels))
+        made = _Linear(np.arange(pixels), np.zeros((pixels, parameters)), np.eye(parameters), None, residual)
+        assert made.fits(optics, np.full(SHAPE, level)) is fits

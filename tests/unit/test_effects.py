@@ -101,3 +101,10 @@ def test_saturation_only_where_levels_reach_the_end(task1):
     assert "saturation" not in active(task1)
     bright = task1.model_copy(update={"noise": Noise(sigma=2.4, bits=7)})
     assert "saturation" in active(bright)
+
+
+def test_costs():
+    """No effect makes a render cheaper, and what says that it costs nothing costs 1."""
+    assert {name: effect.cost >= 1 for name, effect in REGISTER.items()} == dict.fromkeys(REGISTER, True)
+    free = {name for name, effect in REGISTER.items() if effect.cost == 1}
+    assert free == {name for name, effect in REGISTER.items() if "costs nothing" in effect.switch}

@@ -6,9 +6,11 @@ import pytest
 
 import scenes
 from planner.imaging.pictures import Pictures
+from planner.models import variance_model
 from render.phenomena.base import SAFETY
+from render.phenomena.edges import sides
 from render.phenomena.register import REGISTER
-from scenes import Floor, Jitter, Lens
+from scenes import Floor, Jitter, Lens, Noise
 from tests.oracle import axes, pinhole
 
 SENSORS = np.array([[30.0, 135.0], [50.0, 60.0]])
@@ -117,3 +119,17 @@ def test_blur_of_the_lens(task1):
     found = REGISTER["lens_blur"].influence(Pictures.of(task1, SENSORS, LIGHTS))
     own, blur = task1.locator.scale_px**2, task1.camera.blur_px**2 + 1 / 12
     assert found.variance == pytest.approx(SAFETY * ((1 + blur / own) ** 3 - 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 3.0])
+def test_fixed_pattern_does_not_depend_on_the_noise(sigma, task1):
+    """4 standard deviations: those of the value at a noise of 1 grey level, times the pattern's."""
+    noise = Noise(sigma=sigma, bits=8, prnu=0.01, dsnu=0.6)
+    scene = task1.model_copy(update={"noise": noise})
+    plain = task1.model_copy(update={"noise": Noise(sigma=1.0)})
+    unit = variance_model("calibrated")(Pictures.of(plain, SENSORS, LIGHTS)).variance.max()
+    signals = sides(Pictures.of(plain, SENSORS, LIGHTS)).levels
+    pattern = 0.6**2 + (0.01 * signals.max()) ** 2
+    found = REGISTER["fixed_pattern"].influence(Pictures.of(scene, SENSORS, LIGHTS))
+    assert found.bias_px == pytest.approx(4 * np.sqrt(unit * pattern), rel=1e-9)
+    assert found.variance == 0
