@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from measure.estimators.arrangement import ArrangementEstimator, _chi_square
 from measure.estimators.ellipse import _Linear, _with_axes, free_parameters
-from measure.estimators.expansion import ROWS, Pieces
+from measure.estimators.expansion import ROWS, Pieces, _vertex_steps
 from measure.estimators.registry import estimator
 from measure.features.arranged import _seen
 from measure.features.blurred_ellipse import from_symmetric, to_symmetric
@@ -184,3 +184,33 @@ def test_what_noise_leaves_of_an_ellipse(noise):
         residual = np.full(pixels, np.sqrt(share * most / pixels))
         made = _Linear(np.arange(pixels), np.zeros((pixels, parameters)), np.eye(parameters), None, residual)
         assert made.fits(optics, np.full(SHAPE, level)) is fits
+
+
+def test_the_expansion_is_the_model(tool, fit, rng):
+    """A step of 0.02 px, 0.1 % of the levels and 0.01 % of the blur: the image to 1e-4 of its change."""
+    model, state = tool.model, fit.state
+    pieces, free = Pieces.of(model, state), 2 * model.free.size
+    step = np.concatenate([0.02 * rng.standard_normal(free), 1e-3 * state.levels, [1e-4 * state.blur]])
+    image, jacobian = model.evaluate(state, True)
+    change = model.evaluate(model.moved(state, step), False)[0] - image
+    found = jacobian[:, free:] @ step[free:]
+    coefficients = pieces.coefficients(pieces.displaced(step[None]))[0]
+    for pixels, rows, part in zip(pieces.pixels, pieces.rows, coefficients, strict=True):
+        found[pixels] += part @ rows
+    first = jacobian @ step
+    assert np.abs(found - change).max() < 1e-4 * np.abs(change).max()
+    assert np.abs(first - change).max() > 5e-3 * np.abs(change).max()  # negative control: the first order alone
+
+
+def test_only_free_vertices_move_pieces():
+    """The displacement of a piece's first end, and what the other's is more; vertices that are not free stay."""
+    pieces = np.array([[0, 1], [1, 3], [3, 0], [2, 3]])
+    model = SimpleNamespace(
+        free=np.array([1, 3]), count=6, arrangement=SimpleNamespace(vertices=np.zeros((4, 2)), pieces=pieces)
+    )
+    steps, moving = np.array([0.3, -0.2, 0.7, 0.5, 9.0, 9.0]), np.array([0, 1, 3, 2])
+    places = np.zeros((4, 2))
+    places[[1, 3]] = steps[:4].reshape(2, 2)
+    found = _vertex_steps(model, moving) @ steps
+    assert found[:, 0] == pytest.approx(places[pieces[moving, 0]])
+    assert found[:, 1] == pytest.approx(places[pieces[moving, 1]] - places[pieces[moving, 0]])

@@ -1,9 +1,13 @@
 """Each estimator of straight edges on exact images of a polygon: offsets, contrast, and how they respond to pixels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from measure.estimators.registry import estimator
+from measure.estimators.strip import _strip
+from measure.features.calipers import distance_to_segment, edge_calipers
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from tests.oracle import polygon_image
@@ -79,3 +83,29 @@ def test_response(name, rng):
     ahead, behind = (tool.estimate((clean + step * pattern)[None]) for step in (1e-3, -1e-3))
     numeric = np.stack([(ahead.level - behind.level)[0], (ahead.slope - behind.slope)[0]], 1).ravel() / 2e-3
     assert np.asarray(lines @ pattern.ravel()).ravel() == pytest.approx(numeric, rel=1e-2, abs=1e-7)
+
+
+@pytest.mark.parametrize("apart", [None, 4.0, 6.5])
+def test_pixels_of_a_strip(apart):
+    """Beside the part that is used, clear of other edges; of a crowding one all along, so many times nearer to it."""
+    layout = polygon_layout(CORNERS, OPTICS)
+    caliper = edge_calipers(layout, 4.0, 0.0, 8.0)[0]
+    start, stop = layout.ends[0]
+    if apart:
+        beside = (layout.ends[0] + apart * caliper.normal)[None]
+        layout = replace(layout, others=beside, apart=(beside, *layout.apart[1:]))
+    flat, ideal, along, across = _strip(layout, caliper, 0, 4.0)
+    y, x = (part.ravel() for part in np.mgrid[: SHAPE[0], : SHAPE[1]])
+    away = np.stack([x, y], 1) - start
+    u, v = away @ caliper.direction, away @ caliper.normal
+    first, last = caliper.positions[[0, -1]]
+    wanted = (u >= first - 0.5) & (u <= last + 0.5) & (np.abs(v) <= 16)
+    for a, b in layout.ends[1:]:
+        wanted &= distance_to_segment(np.stack([x, y], 1).astype(float), a, b) > 4.0
+    if apart:
+        wanted &= (np.abs(v - apart) > 4.0) | (np.abs(v - apart) > 1.5 * np.abs(v))
+    assert flat.tolist() == np.flatnonzero(wanted).tolist()
+    assert ideal == pytest.approx(np.stack([x, y], 1)[wanted])
+    assert along == pytest.approx(u[wanted])
+    assert across == pytest.approx(v[wanted])
+    assert np.linalg.norm(stop - start) == pytest.approx(caliper.length)
