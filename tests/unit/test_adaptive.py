@@ -6,6 +6,7 @@ import pytest
 import scenes
 from planner.features.projected_edges import circles
 from render.adaptive import crossed, near_edges
+from render.large import near_required
 from scenes import Picture, Pose
 from tests.oracle import pinhole
 
@@ -72,3 +73,19 @@ def test_crossed_with_surroundings():
     assert not crossed(fine, step=1.0).any()
     assert crossed(fine, step=0.99).any()
     assert not crossed(np.zeros((3, 3))).any()
+
+
+@pytest.mark.parametrize(("top", "left", "height", "width", "k"), [(0, 0, 240, 256, 1), (30, 90, 110, 70, 3)])
+def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k, task1):
+    """With the blur's six standard deviations more, a square each way, around what of the edges the crop shows."""
+    sensor, camera, locator = (30.0, 135.0), task1.camera, task1.locator
+    crop = slice(k * top, k * (top + height)), slice(k * left, k * (left + width))
+    found = near_required(Picture.of(task1, Pose(*sensor), Pose(15, 315)), crop, k)
+    reach = int(np.ceil(locator.window_px + 4 * locator.scale_px + 6 * camera.blur_px + 1))
+    expected = np.zeros((height, width), bool)
+    for start, stop in segments(task1, sensor):
+        for x, y in np.rint(start - [left, top] + np.linspace(0, 1, 4000)[:, None] * (stop - start)).astype(int):
+            if 0 <= x < width and 0 <= y < height:
+                expected[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1] = True
+    assert (found != expected).mean() < 2e-3  # at corners of the line of pixels
+    assert 0.1 < found.mean() < 0.9
