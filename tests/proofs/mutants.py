@@ -1,9 +1,9 @@
 """``make mutants``: are the tests there that would notice a slip? A sample of them, each judged by the nearest tests.
 
 A mutant is one place of the code changed by one of cosmic-ray's operators: a sign, a comparison, a number, a condition.
-Each is made in a copy of the repository and tested there: first the examples of its own module, then the unit tests
-that call the changed function, the quickest first (``tests.proofs.reach``), then the other test files that speak most
-of the names that the module defines. Killed is what makes one of them fail. What survives is printed with its
+Each is made in a copy of the repository and tested there: first the examples of its own module and the tests
+that read the code, then the unit tests that call the changed function and others of the module, the quickest first
+(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what makes one of them fail. What survives is printed with its
 line: a test is missing, or the mutant is equivalent.
 """
 
@@ -37,6 +37,7 @@ SOURCES = (
     "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py",
     "validation/cost/interval.py",
 )  # fmt: skip
+READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
@@ -166,7 +167,8 @@ def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_firs
     path = root / mutant.file
     before = path.read_text(encoding="utf-8")
     after, line = changed(mutant, root)
-    asked = calling(mutant, int(line.split(":")[1]), tests, root) + ([] if is_first else nearest(mutant.file, root))
+    asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
+    asked += [] if is_first else nearest(mutant.file, root)
     path.write_text(after, encoding="utf-8")
     try:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", mutant.file]

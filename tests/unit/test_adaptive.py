@@ -87,5 +87,5 @@ def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k
         for x, y in np.rint(start - [left, top] + np.linspace(0, 1, 4000)[:, None] * (stop - start)).astype(int):
             if 0 <= x < width and 0 <= y < height:
                 expected[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1] = True
-    assert (found != expected).mean() < 2e-3  # at corners of the line of pixels
+    assert (found != expected).mean() < 4e-3  # at corners of the line of pixels
     assert 0.1 < found.mean() < 0.9
