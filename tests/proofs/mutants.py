@@ -1,10 +1,10 @@
 """``make mutants``: are the tests there that would notice a slip? A sample of them, each judged by the nearest tests.
 
 A mutant is one place of the code changed by one of cosmic-ray's operators: a sign, a comparison, a number, a condition.
-Each is made in a copy of the repository and tested there: first the examples of its own module and the tests
-that read the code, then the unit tests that call the changed function and others of the module, the quickest first
-(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what makes one of them fail. What survives is printed with its
-line: a test is missing, or the mutant is equivalent.
+Each is made in a copy of the repository and tested there: first the examples of its own module and the tests that read
+the code, then the unit tests that call the changed function and others of the module, the quickest first
+(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what
+makes one of them fail. What survives is printed with its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
