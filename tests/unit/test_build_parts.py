@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import scenes
-from render import build, lights
+from render import bsdf, build, lights
+from render.rays import SURFACES
 from scenes import Floor, Lens, Light, Picture, Pose
 from tests.oracle import axes
 
@@ -132,3 +133,35 @@ def test_textures_only_where_one_direction_is_enough():
     assert build.textured(glossy, frozenset({"specular_lobe"})) is not None
     for effect in build.MANY_WAYS:
         assert build.textured(glossy, frozenset({"specular_lobe", effect})) is None
+
+
+@pytest.mark.parametrize("way", [0.0, 0.9e-3, 2e-3, 0.099, 0.102])
+@pytest.mark.parametrize("angle", [0.0, 0.1])
+def test_whether_a_way_leads_to_a_lamp(way, angle):
+    """Within the angle that it spans, and what single precision makes of a cosine: 1e-6."""
+    dr = SimpleNamespace(normalize=lambda v: v / np.linalg.norm(v), dot=np.dot)
+    hit = SimpleNamespace(p=np.array([1.0, 2.0, 3.0]), to_local=lambda v: v)
+    place = hit.p + 7 * np.array([0.6, 0.0, 0.8])
+    slanted = np.cos(way) * np.array([0.6, 0.0, 0.8]) + np.sin(way) * np.array([0.0, 1.0, 0.0])
+    found = bsdf._along(dr, SimpleNamespace(Point3f=lambda *v: np.array(v)), hit, place, slanted, angle)
+    assert found == (way <= max(angle, 1e-3))
+
+
+@pytest.mark.parametrize("active", [(), ("interreflection",)])
+def test_surfaces_that_light_meets(active, task1, monkeypatch):
+    """The first alone, or so many as the random numbers are made for, none ended by chance."""
+    monkeypatch.setattr(build, "mesh", lambda *args: None)
+    crop = slice(0, 4), slice(0, 4)
+    told = build.description(MITSUBA, picture(task1), frozenset(active), (8, 8), crop, 1)
+    assert told["integrator"]["hide_emitters"]
+    if active:
+        assert told["integrator"]["type"] == "path"
+        assert told["integrator"]["max_depth"] == SURFACES + 1
+        assert told["integrator"]["rr_depth"] > SURFACES + 1
+    else:
+        assert told["integrator"]["type"] == "direct"
+        assert (told["integrator"]["emitter_samples"], told["integrator"]["bsdf_samples"]) == (1, 0)
+    assert {"sensor", "light0", "part0"} <= told.keys()
+    assert "part1" not in told
+    floor = build.description(MITSUBA, picture(task1), frozenset({"floor"}), (8, 8), crop, 1)["floor"]
+    assert floor["bsdf"]["reflectance"]["value"] == 0  # none is described: a black one

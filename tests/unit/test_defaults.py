@@ -4,7 +4,9 @@ import inspect
 
 import pytest
 
+from measure.features.optics import Optics
 from planner import plan
+from scenes import Locator, Noise
 from validation import run
 from validation.cli.batch import validate_command
 from validation.cli.calibrate import calibrate_command
@@ -25,3 +27,10 @@ def test_one_start():
     """The alternating search begins at the paper's pose, from Python and from the command line."""
     assert inspect.signature(plan).parameters["start"].default == (40, 41)
     assert inspect.signature(plan_command).parameters["start"].default == "40,41"
+
+
+def test_one_locator():
+    """Optics that nobody describes have the settings of a scene that nobody describes."""
+    optics, locator = Optics((10, 10)), Locator()
+    assert (optics.scale_px, optics.window_px) == (locator.scale_px, locator.window_px) == (1.0, 3.0)
+    assert (optics.noise_variance, optics.dark_level, optics.sensor) == (1.0, 0.0, Noise(sigma=1.0))
