@@ -55,7 +55,7 @@ def test_a_bent_step():
         y = np.linspace(row - 4, row + 4, 9)
         edge = recorded(np.column_stack([np.full(9, 40.5), y]), seen)
         place = np.interp(row, edge[:, 1], edge[:, 0])
-        assert (1 - image[row, 30:52]).sum() + 29.5 == pytest.approx(place, abs=4e-3)
+        assert (1 - image[row, 30:52]).sum() + 29.5 == pytest.approx(place, abs=1e-3)
 
 
 def test_a_crop_is_bent_as_the_whole():
