@@ -22,6 +22,8 @@ EQUIVALENT: dict[str, str] = {
     "(across**2 - 0) / scale**2)": "the next line takes off whatever part of the Gaussian is in it",
     "measure/photo/lens.py: _Focal = Annotated[float, Field(gt= -1, le=1e12), AfterValidator(_not_tiny)]":
         "what is not above 0 is less than the least, too",
+    "render/texture.py: for index in np.flatnonzero((heights[0] > _GRAZING * distances[ -1]) & "
+    "(heights[1] > _GRAZING * distances[1])):": "1e-9 of either distance is nothing",
 }  # fmt: skip
 
 # by operator and what the mutated line holds

@@ -6,7 +6,15 @@ import pytest
 import planner
 import render
 import scenes
-from planner.imaging.appearance import _on_floor, behind, edge_contrast, paper_contrast2, side_signals, signal
+from planner.imaging.appearance import (
+    _on_floor,
+    behind,
+    edge_contrast,
+    floor_signal,
+    paper_contrast2,
+    side_signals,
+    signal,
+)
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points
 from scenes import Floor, Noise, Obstacle, Picture, Scene
@@ -241,3 +249,17 @@ def test_only_what_is_wanted_is_looked_for_behind(task1):
     some = np.array([True, False, True, True, False, False])
     assert (every > 0).any()
     assert (behind(pictures, points, some, ()) == np.where(some, every, 0.0)).all()
+
+
+def test_floor_signal(task1):
+    """Albedo times the cosine at a horizontal plane over the squared distance; 0 where not wanted."""
+    scene = task1.model_copy(update={"floor": Floor(reflectance=0.4, height=-2.0)})
+    pictures = Pictures.of(scene, (30.0, 135.0), (40.0, 200.0))
+    places = np.array([[30.0, -20.0, -2.0], [-25.0, 30.0, -2.0], [40.0, 5.0, -2.0]])
+    lamp = scene.light.distance * axes((40.0, 200.0))[0]
+    away = lamp - places
+    size = np.linalg.norm(away, axis=1)
+    expected = scene.camera.exposure * 0.4 * away[:, 2] / size * (scene.light.distance / size) ** 2
+    assert floor_signal(pictures, places, np.ones(3, bool)) == pytest.approx(expected)
+    some = np.array([True, False, True])
+    assert floor_signal(pictures, places, some) == pytest.approx(np.where(some, expected, 0.0))
