@@ -23,8 +23,12 @@ def test_one_seed(function):
     assert inspect.signature(function).parameters["seed"].default == 1995
 
 
-def test_one_start():
+def test_one_start(task1):
     """The alternating search begins at the paper's pose, from Python and from the command line."""
+    found, given = (
+        plan(task1, search="alternating", step_deg=30, refined=False, **start) for start in ({}, {"start": (40, 41)})
+    )
+    assert found.poses == given.poses
     assert inspect.signature(plan).parameters["start"].default == (40, 41)
     assert inspect.signature(plan_command).parameters["start"].default == "40,41"
 
