@@ -68,12 +68,17 @@ def reached(kept: Path, files: list[Path]) -> dict[str, dict[str, Any]]:
 def _noted(test_file: str, result: Path) -> dict[str, Any]:
     environment = {**os.environ, _RESULT: str(result.absolute()), "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.proofs.reach", test_file]
+    result.unlink(missing_ok=True)
     subprocess.run(command, cwd=ROOT, env=environment, capture_output=True)
     return json.loads(result.read_text(encoding="utf-8"))
 
 
 def function(text: str, line: int) -> str:
-    """The qualified name of the function or class around a line; empty outside of them."""
+    """The qualified name of the function or class around a line; empty outside of them.
+
+    >>> [function("class A:\\n    b = 1\\n    def f(self):\\n        return 1\\nx = 2\\n", n) for n in (2, 3, 4, 5)]
+    ['A', 'A.f', 'A.f', '']
+    """
     name, nodes = "", ast.parse(text).body
     while nodes:
         inner = next((node for node in nodes if isinstance(node, _NAMED) and _spans(node, line)), None)
