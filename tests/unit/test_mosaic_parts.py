@@ -40,7 +40,7 @@ def test_marked_pixels_are_rendered_again(kind, start, size, tiles, rng):
     """Every marked pixel has the new value, no tile without one is rendered; with a lens none leaves the frame."""
     view = {"type": kind, "film": {"height": FRAME[0], "width": FRAME[1]}}
     marked = rng.random(size) < 0.01
-    marked[-1, -1] = marked[0, 0] = True
+    marked[-9:, -7:] = marked[0, 0] = True  # together, so that large tiles pay, up to the frame's border
     fine = np.full(size, -1.0)
     found = mosaic(SimpleNamespace(render=render), None, view, np.array(start), fine, marked, 16, (5, 0))
     y, x = np.mgrid[: size[0], : size[1]]
@@ -49,9 +49,8 @@ def test_marked_pixels_are_rendered_again(kind, start, size, tiles, rng):
     assert (found[marked] == truth[marked]).all()
     assert ((found == truth) | (found == -1)).all()
     for top, left, side in tiles:
-        inside = (
-            (y + start[0] >= top) & (y + start[0] < top + side) & (x + start[1] >= left) & (x + start[1] < left + side)
-        )
+        rows, columns = y + start[0] - top, x + start[1] - left
+        inside = (rows >= 0) & (rows < side) & (columns >= 0) & (columns < side)
         assert marked[inside].any()
         if kind == "thinlens":
             assert 0 <= top <= FRAME[0] - side
