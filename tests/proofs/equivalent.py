@@ -1,5 +1,7 @@
 """Mutants that no test can kill, with the reason of each: they do what the code does."""
 
+import re
+
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
@@ -8,4 +10,37 @@ EQUIVALENT: dict[str, str] = {
     "planner/imaging/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
     "sensor.headroom(scene.noise):": "a shorter way to the same numbers is not taken",
     'render/build.py: "near_clip": 1e-3 / camera.distance,': "nothing stands so near to the sensor",
+    "validation/statistics.py: pairs = np.stack([np.asarray(first, float), np.asarray(second, float)], axis=1)":
+        "of two axes the second is the last",
+    "planner/imaging/blurred.py: wanted = np.pi / 2 * min(length, 99999.0) / (_SPACING * blur) + 4":
+        "no piece in an image is so long",
+    "measure/estimators/strip.py: blurs=(thin * nodes / sigma).sum(1)[:, None],":
+        "a column of the least squares whose own coefficient nobody reads: its sign is free",
+    "measure/features/blurred_ellipse.py: count = int(np.ceil(2 * np.pi * max(np.hypot(xx, xy), np.hypot(yy, xy)) / "
+    "(_NODES * blur))) * 8": "more nodes than are needed: the sum around an outline is exact already",
+    "measure/estimators/profile.py: kernel = gauss * np.where(np.arange(_TERMS + 1) == 0, across / scale, "
+    "(across**2 - 0) / scale**2)": "the next line takes off whatever part of the Gaussian is in it",
+    "measure/photo/lens.py: _Focal = Annotated[float, Field(gt= -1, le=1e12), AfterValidator(_not_tiny)]":
+        "what is not above 0 is less than the least, too",
+    "render/texture.py: for index in np.flatnonzero((heights[0] > _GRAZING * distances[ -1]) & "
+    "(heights[1] > _GRAZING * distances[1])):": "1e-9 of either distance is nothing",
+}  # fmt: skip
+
+# by operator and what the mutated line holds
+EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
+    ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",
+    ("core/ReplaceTrueWithFalse", r"strict=False\)"): "the lengths are equal: the argument only says so",
 }
+
+
+def is_equivalent(operator: str, line: str) -> bool:
+    """Whether a mutant (file and text of its line) is one of them.
+
+    >>> is_equivalent("core/NumberReplacer", "a/b.py: @lru_cache(maxsize= 63)")
+    True
+    >>> is_equivalent("core/NumberReplacer", "a/b.py: for x, y in zip(a[1:], b, strict=False):")
+    False
+    """
+    text = line.split(": ", 1)[1]
+    rules = (re.search(rule, text) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
+    return line in EQUIVALENT or any(rules)

@@ -1,9 +1,10 @@
 """``make mutants``: are the tests there that would notice a slip? A sample of them, each judged by the nearest tests.
 
 A mutant is one place of the code changed by one of cosmic-ray's operators: a sign, a comparison, a number, a condition.
-Each is made in a copy of the repository and tested there: first the examples of its own module, then the test files
-that speak most of the names that it defines. Killed is what makes one of them fail. What survives is printed with its
-line: a test is missing, or the mutant is equivalent.
+Each is made in a copy of the repository and tested there: first the examples of its own module and the tests that read
+the code, then the unit tests that call the changed function and others of the module, the quickest first
+(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what
+makes one of them fail. What survives is printed with its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -23,17 +24,21 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from queue import Queue
+from typing import Any
 
-from tests.proofs.equivalent import EQUIVALENT
+from tests.proofs.equivalent import is_equivalent
+from tests.proofs.reach import function, reached
 
 ROOT = Path(__file__).parents[2]
 SOURCES = (
     "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py",
     "validation/cost/interval.py",
 )  # fmt: skip
-TESTS = ("tests/unit", "tests/hard", "tests/system")
+READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
+UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
 _OTHERS = (
@@ -49,8 +54,10 @@ OPERATORS = tuple(
         *_OTHERS,
     )
 )
-_FILES = 3  # unit test files that a mutant meets, and as many others
-_LIMIT_S = 30  # processor seconds of them together
+_FILES = 3  # test files that a mutant meets after the unit tests
+_UNIT_S = 20  # processor seconds of the unit tests
+_LIMIT_S = 30  # of all together
+_FIRST_S = 15  # of all together where only the unit tests are asked
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 
@@ -86,14 +93,33 @@ def sources(root: Path = ROOT) -> list[str]:
     return [str(path.relative_to(root)) for some in each for path in some if path.name != "__init__.py"]
 
 
-def nearest(file: str, root: Path = ROOT) -> list[str]:
-    """The test files that use most of a module: of the quick unit tests first, then of the others.
+def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path = ROOT) -> list[str]:
+    """The unit tests that call the function around a line, then those that call others of the module.
+
+    The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others.
+    """
+    name = f"{mutant.file}:{function((root / mutant.file).read_text(encoding='utf-8'), line)}"
+    some = {
+        t: each["calls"] for t, each in tests.items() if any(c.startswith(f"{mutant.file}:") for c in each["calls"])
+    }
+    own = {t for t, calls in some.items() if any(c == name or c.startswith(f"{name}.") for c in calls)}
+    chosen, spent = [], 0.0
+    for test in sorted(some, key=lambda test: (test not in own, tests[test]["seconds"], test)):
+        spent += tests[test]["seconds"]
+        if chosen and spent > _UNIT_S:
+            break
+        chosen.append(test)
+    return chosen
+
+
+def nearest(file: str, root: Path = ROOT, folders: tuple[str, ...] = OTHERS) -> list[str]:
+    """The test files that use most of a module.
 
     Importing the module counts most; of its names each weighs less the more files use it. For a module that no test
     uses, those of the modules that import it.
     """
     tests = {
-        path: path.read_text(encoding="utf-8") for name in TESTS for path in sorted((root / name).glob("test_*.py"))
+        path: path.read_text(encoding="utf-8") for name in folders for path in sorted((root / name).glob("test_*.py"))
     }
     score = _score(file, root, tests)
     if not any(score.values()):
@@ -101,8 +127,7 @@ def nearest(file: str, root: Path = ROOT) -> list[str]:
         every = [_score(other, root, tests) for other in uses]
         score = {path: sum(each[path] for each in every) for path in tests}
     best = sorted((path for path in tests if score[path]), key=lambda path: (-score[path], str(path)))
-    unit = [path for path in best if path.parent.name == "unit"][:_FILES]
-    return [str(path.relative_to(root)) for path in (*unit, *[path for path in best if path not in unit][:_FILES])]
+    return [str(path.relative_to(root)) for path in best[:_FILES]]
 
 
 def _module(file: str) -> str:
@@ -137,27 +162,34 @@ def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
     return after, f"{mutant.file}:{number}: {line.strip()}"
 
 
-def judged(mutant: Mutant, root: Path) -> str:
-    """ "killed", "survived" or "too slow"; ``root`` is a copy that nobody else uses."""
+def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_first: bool = False) -> tuple[str, str]:
+    """ "killed", "survived" or "too slow", and the test that killed; ``root`` is a copy that nobody else uses."""
     path = root / mutant.file
     before = path.read_text(encoding="utf-8")
-    path.write_text(changed(mutant, root)[0], encoding="utf-8")
+    after, line = changed(mutant, root)
+    asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
+    asked += [] if is_first else nearest(mutant.file, root)
+    path.write_text(after, encoding="utf-8")
     try:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", mutant.file]
         environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
-        code = subprocess.run(
-            [*command, *nearest(mutant.file, root)], cwd=root, env=environment, capture_output=True, preexec_fn=_limited
-        ).returncode
+        run = subprocess.run(
+            [*command, *asked],
+            cwd=root, env=environment, capture_output=True, text=True,
+            preexec_fn=partial(_limited, _FIRST_S if is_first else _LIMIT_S),
+        )  # fmt: skip
     finally:
         path.write_text(before, encoding="utf-8")
-    if code in (-signal.SIGXCPU, -signal.SIGKILL):
-        return "too slow"  # a loop that no longer ends, or slow tests: neither killed nor survived
-    return "survived" if code in (0, 5) else "killed"
+    if run.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
+    if run.returncode in (0, 5):
+        return "survived", ""
+    return "killed", next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)), "")
 
 
-def _limited() -> None:
+def _limited(seconds: int) -> None:
     """In the process of the tests: processor time, so that other work on the machine does not matter."""
-    resource.setrlimit(resource.RLIMIT_CPU, (_LIMIT_S, _LIMIT_S))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
 
 
 def copies(count: int, folder: Path) -> Queue[Path]:
@@ -181,8 +213,11 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
     parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
+    parser.add_argument("--first", action="store_true", help="Only the unit tests: what survives is for --again.")
     asked = parser.parse_args()
     every, began = mutants(), time.perf_counter()
+    asked.log.parent.mkdir(parents=True, exist_ok=True)
+    tests = reached(asked.log.with_name("reach.json"), sorted((ROOT / UNIT).glob("test_*.py")))
     chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
     known = _known(asked.log)
     tally = dict.fromkeys(("killed", "survived", "too slow", "equivalent", "same"), 0)
@@ -193,15 +228,16 @@ def main() -> None:
             root, since = free.get(), time.perf_counter()
             try:
                 line = changed(mutant, root)[1]
-                if not line or _bare(line) in EQUIVALENT:
+                if not line or is_equivalent(mutant.operator, _bare(line)):
                     return "equivalent" if line else "same", line
                 if line in known and (known[line] == "killed" or not asked.again):
                     return known[line], line
-                outcome = judged(mutant, root)
+                outcome, by = judged(mutant, root, tests, asked.first)
                 with asked.log.open("a", encoding="utf-8") as log:
                     seconds = round(time.perf_counter() - since)
                     log.write(
-                        json.dumps({"line": line, "outcome": outcome, "seconds": seconds, **asdict(mutant)}) + "\n"
+                        json.dumps({"line": line, "outcome": outcome, "by": by, "seconds": seconds, **asdict(mutant)})
+                        + "\n"
                     )
                 return outcome, line
             finally:
@@ -231,7 +267,6 @@ def _bare(line: str) -> str:
 
 def _known(log: Path) -> dict[str, str]:
     """The latest outcome by mutated line; a line that stands elsewhere now is judged anew."""
-    log.parent.mkdir(parents=True, exist_ok=True)
     if not log.exists():
         return {}
     found = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]

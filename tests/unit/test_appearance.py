@@ -6,7 +6,15 @@ import pytest
 import planner
 import render
 import scenes
-from planner.imaging.appearance import edge_contrast, paper_contrast2, side_signals, signal
+from planner.imaging.appearance import (
+    _on_floor,
+    behind,
+    edge_contrast,
+    floor_signal,
+    paper_contrast2,
+    side_signals,
+    signal,
+)
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points
 from scenes import Floor, Noise, Obstacle, Picture, Scene
@@ -216,3 +224,42 @@ def test_the_rendered_image_of_two_lights_is_what_the_planner_says(two_lights):
     assert image[round(y), round(x)] == pytest.approx(expected, rel=1e-3)
     one = render.image(two_lights, sensor, [poses[0], (180, 0)], effects=("attached_shadow", "fall_off")) - 20.0
     assert one[round(y), round(x)] < 0.9 * expected
+
+
+@pytest.mark.parametrize("height", [-20.0, -1.0])
+@pytest.mark.parametrize(("place", "met"), [((0, 0), True), ((2.9, -2.9), True), ((3.1, 0), False), ((0, -3.1), False)])
+def test_rays_that_meet_the_floor(height, place, met):
+    """Within its half side in x and y, however deep it lies; not behind what they meet before, nor looking up."""
+    floor, eye = Floor(reflectance=0.5, height=height, half_side=3.0), np.array([40.0, 30.0, 60.0])
+    target = np.array([*place, height])
+    point = eye + 0.7 * (target - eye)
+    vectors = np.stack([target - eye, target - eye, eye - target])
+    there, ahead = _on_floor(floor, np.tile(point, (3, 1)), vectors, np.array([np.inf, 0.2, np.inf]))
+    assert ahead.tolist() == [met, False, False]
+    assert there[0] == pytest.approx(target if met else point)
+    assert there[1:] == pytest.approx(np.tile(point, (2, 1)))
+
+
+def test_only_what_is_wanted_is_looked_for_behind(task1):
+    """Beside the block there is the floor; where it is not asked for, 0."""
+    scene = task1.model_copy(update={"floor": Floor(reflectance=0.4)})
+    pictures = Pictures.of(scene, (30.0, 135.0), (15.0, 315.0))
+    points = edge_points(scene.solid, EDGES[:1], FRACTIONS)[0] + [0.0, 0.0, 3.0]
+    every = behind(pictures, points, np.ones(6, bool), ())
+    some = np.array([True, False, True, True, False, False])
+    assert (every > 0).any()
+    assert (behind(pictures, points, some, ()) == np.where(some, every, 0.0)).all()
+
+
+def test_floor_signal(task1):
+    """Albedo times the cosine at a horizontal plane over the squared distance; 0 where not wanted."""
+    scene = task1.model_copy(update={"floor": Floor(reflectance=0.4, height=-2.0)})
+    pictures = Pictures.of(scene, (30.0, 135.0), (40.0, 200.0))
+    places = np.array([[30.0, -20.0, -2.0], [-25.0, 30.0, -2.0], [40.0, 5.0, -2.0]])
+    lamp = scene.light.distance * axes((40.0, 200.0))[0]
+    away = lamp - places
+    size = np.linalg.norm(away, axis=1)
+    expected = scene.camera.exposure * 0.4 * away[:, 2] / size * (scene.light.distance / size) ** 2
+    assert floor_signal(pictures, places, np.ones(3, bool)) == pytest.approx(expected)
+    some = np.array([True, False, True])
+    assert floor_signal(pictures, places, some) == pytest.approx(np.where(some, expected, 0.0))

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from measure.features import contrasts
 from measure.features.arranged import _is_beyond
 from measure.features.contrasts import _contrast
 from measure.features.locating import _rivals
@@ -61,3 +62,40 @@ def test_contrast_along_a_piece(rng):
         assert found[:, k] == pytest.approx(expected)
         drawn = expected @ root @ rng.standard_normal((5, 40_000))
         assert sigma[:, k] == pytest.approx(drawn.std(1), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("contrast", "state"),
+    [
+        ([[9, 9, 9], [9, 9, 9]], "ok"), ([[9, 4.1, 9], [9, -9, 9]], "sign_change"),
+        ([[9, 3.9, 9], [9, 9, 9]], "low_contrast"),
+        ([[9, 9, 9], [9, 9, -2.1]], "sign_change"), ([[9, 9, 9], [9, 9, -1.9]], "ok"),
+        ([[-9, -9, -9], [-9, -9, 2.1]], "sign_change"), ([[9, 9, 9], [-3.9, -3.9, -3.9]], "low_contrast"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("sigma", [1.0, 7.0])
+def test_what_an_edge_shows(contrast, state, sigma, monkeypatch):
+    """Each of an edge's pieces by 4 standard deviations in its middle; no change of sign by 2; a hidden edge none."""
+    here = sigma * np.array([[*contrast, [0.1, 0.1, 0.1]]], float)
+    monkeypatch.setattr(contrasts, "contrasts", lambda tool, found: (here, np.full(here.shape, sigma)))
+    monkeypatch.setattr(contrasts, "_shown", lambda tool: np.array([True, False, True]))
+    tool = SimpleNamespace(
+        arrangement=SimpleNamespace(edges=np.array([7, 0, 0, 2])), model=SimpleNamespace(moving=np.array([1, 2, 3]))
+    )
+    middle, found = contrasts.seen_edges(tool, SimpleNamespace(names=("a", "b", "c")), None)
+    assert found.tolist() == [[state, "not_visible", "low_contrast"]]
+    assert middle[0] == pytest.approx([sigma * (contrast[0][1] + contrast[1][1]) / 2, 0, 0.1 * sigma])
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "shown"),
+    [((5, 5), (30, 5), True), ((5, 5), (5.5, 5), False), ((-9, 5), (5, 5), True), ((-50, 5), (0.5, 5), False),
+     ((5, 19), (35, 19), True), ((5, 19.1), (35, 19.1), False), ((39.1, 2), (39.1, 18), False),
+     ((39, 2), (39, 18), True)],
+)  # fmt: skip
+def test_edges_within_the_image(start, stop, shown):
+    """At least 2 px of them, in an image of 40 x 20 px."""
+    arrangement = SimpleNamespace(
+        vertices=np.array([start, stop], float), required=np.array([[0, 1]]), recorded=lambda places: places
+    )
+    assert contrasts._shown(SimpleNamespace(arrangement=arrangement, shape=(20, 40))).tolist() == [shown]

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from measure.calibration import RATIOS, _curve, _square, blur_for
+from measure.calibration import RATIOS, _curve, _lines, _points, _square, blur_for
+from measure.features.layout import polygon_layout
+from planner.features.locator import information_bound, kappa2
 from tests.oracle import polygon_image
 
 
@@ -52,3 +54,29 @@ def test_blur_for_a_kappa(blur, scale):
     kappa2 = 3 / 8 * (1 + (blur**2 + 1 / 12) / scale**2) ** 3
     assert blur_for(kappa2, scale) == pytest.approx(blur, abs=1e-7)
     assert blur_for(0.1, scale) == 0
+
+
+def test_variance_of_points(task1, rng):
+    """Of 4 sides x some 25 independent points x 40 images: within 6 % of kappa^2 s_n^2 / C^2, as is the correlation."""
+    ratio = 0.02
+    clean, layout = _square(14.0, ratio, task1)
+    noisy = clean + 100.0 * ratio * rng.standard_normal((40, *clean.shape))
+    variance, length = _points(noisy, layout, "gradient")
+    scale = task1.locator.scale_px
+    assert variance == pytest.approx(kappa2(scale, task1.camera.blur_px) * ratio**2, rel=0.06)
+    assert length == pytest.approx(2 * np.sqrt(np.pi) * scale, rel=0.3)
+
+
+def test_variance_of_lines(task1, rng):
+    """Of 4 sides x 60 images: told as that of points which, one correlation length apart, make the side's middle.
+
+    One side is expected a tenth of a pixel off, which is no scatter.
+    """
+    ratio = 0.02
+    clean, layout = _square(14.0, ratio, task1)
+    noisy = clean + 100.0 * ratio * rng.standard_normal((60, *clean.shape))
+    beside = polygon_layout(layout.ends[:, 0] + [[0.1, 0], [0, 0], [0, 0], [0.1, 0]], layout.optics)
+    variance, length = _lines(noisy, beside, "strip")
+    assert length == pytest.approx(2 * np.sqrt(np.pi) * task1.locator.scale_px)
+    least = ratio**2 / float(information_bound(np.array(1.0), 1.0, task1.camera.blur_px))
+    assert 0.8 * least < variance * length < 1.6 * least

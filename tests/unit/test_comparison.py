@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from mpmath import mp
 from scipy import stats
 
 from scenes import InvalidInput
@@ -69,4 +70,24 @@ def test_f_test_against_simulation(rng):
 def test_what_is_no_result(tmp_path, text):
     (tmp_path / "result.json").write_text(text)
     with pytest.raises(InvalidInput, match=r"must be a run directory or its result.json, got"):
+        comparison.read(tmp_path)
+
+
+@pytest.mark.parametrize(("n", "m"), [(2, 3), (5, 8), (40, 3)])
+@pytest.mark.parametrize("ratio", [0.05, 0.9, 1.0, 4.0])
+def test_f_test_against_the_incomplete_beta_function(n, m, ratio):
+    """n - 1 and m - 1 degrees of freedom, twice the smaller tail; which run comes first does not matter."""
+    x = (n - 1) * ratio / ((n - 1) * ratio + m - 1)
+    below = float(mp.betainc((n - 1) / 2, (m - 1) / 2, 0, x, regularized=True))
+    assert comparison.f_test(3.0 * ratio, n, 3.0, m) == pytest.approx(min(2 * min(below, 1 - below), 1.0), rel=1e-9)
+    assert comparison.f_test(3.0, m, 3.0 * ratio, n) == pytest.approx(min(2 * min(below, 1 - below), 1.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("angles", [[30.0], [30.0, 135.0, 0.0]])
+@pytest.mark.parametrize("role", ["sensor", "light"])
+def test_a_pose_is_two_angles(rng, tmp_path, role, angles):
+    told = document(rng)
+    told["settings"][0][role] = angles
+    (tmp_path / "result.json").write_text(json.dumps(told))
+    with pytest.raises(InvalidInput, match=r"must be a run directory or its result\.json, got"):
         comparison.read(tmp_path)

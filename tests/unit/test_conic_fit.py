@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from measure import fit_ellipse, status
-from measure.features.conic import _distances
+from measure.features.conic import _distances, _start
 from scenes import InvalidInput
 
 
@@ -82,7 +82,18 @@ def test_limits():
         fit_ellipse(points + [1.1e9, 0])
     with pytest.raises(InvalidInput, match="covariance must be a number or of shape"):
         fit_ellipse(points, np.ones(5))
-    with pytest.raises(InvalidInput, match="covariance must be of variances from 0"):
+    with pytest.raises(InvalidInput, match=r"covariance must be of variances from 0 to 1e\+18 px\^2"):
         fit_ellipse(points, -np.ones(12))
     line = np.column_stack([t, 2 * t])
     assert fit_ellipse(line, 1.0).status == status.ILL_CONDITIONED or fit_ellipse(line, 1.0).parameters[2] > 1e3
+
+
+@pytest.mark.parametrize("first", [0.0, 1.0])
+def test_start(first):
+    """Kasa's fit of points that lie on a circle is the circle; the direct fit of an ellipse's is the ellipse."""
+    t = first + np.linspace(0, 4.0, 15)
+    assert _start(curve((30.0, -12.0, 15.0, 15.0, 0.0), t), True) == pytest.approx([30, -12, 15, 15, 0])
+    x, y, a, b, angle = _start(curve(TRUE, t), False)
+    assert curve((x, y, a, b, angle), np.zeros(1)).shape == (1, 2)
+    ends = curve((x, y, a, b, angle), np.pi / 2 * np.arange(4))
+    assert np.abs(_distances(ends, TRUE)[0]).max() < 1e-3

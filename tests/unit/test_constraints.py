@@ -1,10 +1,13 @@
 """Limits of a plan: what they accept and refuse, by plain geometry."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import scenes
 from planner import Constraints
+from planner.search.constraints import _clearance, _to_segment
 from scenes import InvalidInput
 from tests.oracle import axes, pinhole
 
@@ -95,3 +98,33 @@ def test_lengths_in_the_image(task1):
     told = np.abs(least - 40) > 1.0  # the product looks at 17 points of an edge
     assert (clear == (seen & (least >= 40)))[told].all()
     assert 0 < (seen & ~clear).sum() < seen.sum()
+
+
+def test_clearance_of_segments():
+    """From 17 places on one segment to the whole of the other; edges that meet do not count."""
+    ends = np.array([[[0.0, 0], [10, 0]], [[14.0, 3], [14, 9]], [[0.0, 0], [0, 5]], [[-3.0, -4], [-9, -4]]])
+    pairs = {"a": (0, 1), "b": (2, 3), "c": (0, 4), "d": (5, 6)}
+    edges = {name: SimpleNamespace(ends=pair) for name, pair in pairs.items()}
+    scene = SimpleNamespace(solid=SimpleNamespace(edge=edges.get))
+
+    def clearance(which):
+        rows = ["abcd".index(name) for name in which]
+        seen = SimpleNamespace(names=tuple(which), ends=ends[None, rows], visible=np.ones((1, len(rows))))
+        return _clearance(scene, seen)
+
+    assert clearance("ab") == pytest.approx([5.0])  # 3, 4, 5; beyond its end the first one would come nearer
+    assert clearance("ad") == pytest.approx([5.0])
+    assert clearance("abcd") == pytest.approx([5.0])
+    assert clearance("ac") == [np.inf]
+    assert clearance("bd") == pytest.approx([np.hypot(17, 7)])
+
+
+@pytest.mark.parametrize(
+    ("point", "away"), [((5, 3), 3.0), ((-3, -4), 5.0), ((13, 4), 5.0), ((0, 0), 0.0), ((10, -2), 2.0)]
+)
+def test_distance_from_a_segment(point, away):
+    ends = np.array([[0.0, 0], [10, 0]])
+    turned = np.array([[0.6, -0.8], [0.8, 0.6]])
+    found = _to_segment(np.array([point], float) @ turned.T + 7, ends @ turned.T + 7)
+    assert found == pytest.approx([away], abs=1e-12)
+    assert _to_segment(np.array([[3.0, 4.0]]), np.zeros((2, 2))) == pytest.approx([5.0])  # a segment of no length

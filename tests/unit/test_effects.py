@@ -101,3 +101,13 @@ def test_saturation_only_where_levels_reach_the_end(task1):
     assert "saturation" not in active(task1)
     bright = task1.model_copy(update={"noise": Noise(sigma=2.4, bits=7)})
     assert "saturation" in active(bright)
+
+
+def test_costs(task1):
+    """No effect makes a render cheaper; what says that it costs nothing costs 1; what is absent says why."""
+    pictures = Pictures.of(task1, np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]]))
+    reasons = {name: effect.absent(pictures) for name, effect in REGISTER.items()}
+    assert all(reason is None or reason for reason in reasons.values())
+    assert {name: effect.cost >= 1 for name, effect in REGISTER.items()} == dict.fromkeys(REGISTER, True)
+    free = {name for name, effect in REGISTER.items() if effect.cost == 1}
+    assert free == {name for name, effect in REGISTER.items() if "costs nothing" in effect.switch}

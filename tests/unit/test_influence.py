@@ -6,9 +6,11 @@ import pytest
 
 import scenes
 from planner.imaging.pictures import Pictures
-from render.phenomena.base import SAFETY
+from planner.models import variance_model
+from render.phenomena.base import SAFETY, Influence, Tolerance, largest
+from render.phenomena.edges import sides
 from render.phenomena.register import REGISTER
-from scenes import Floor, Jitter, Lens
+from scenes import Floor, InvalidInput, Jitter, Lens, Noise
 from tests.oracle import axes, pinhole
 
 SENSORS = np.array([[30.0, 135.0], [50.0, 60.0]])
@@ -66,8 +68,8 @@ def test_jitter_of_the_light_alone_moves_no_edge(task1):
     one, two = influence(0.0, 0.5), influence(0.0, 1.0)
     assert one.bias_px == two.bias_px == 0
     assert two.variance == pytest.approx(4 * one.variance)
-    # twice the largest relative change of 1 / cos^2 for tilts of one standard deviation both ways, to second order
-    assert one.variance >= SAFETY * 2 * np.radians(0.5) ** 2
+    # 1 / cos^2 for tilts of one standard deviation both ways, to second order, up to 60 degrees from the normal
+    assert one.variance == pytest.approx(SAFETY * 6 * np.radians(0.5) ** 2)
     assert influence(0.5, 0.5).variance == pytest.approx(influence(0.5, 0.0).variance + one.variance)
     assert jitter.absent(Pictures.of(task1, SENSORS, LIGHTS)) == "poses are exact"
 
@@ -117,3 +119,33 @@ def test_blur_of_the_lens(task1):
     found = REGISTER["lens_blur"].influence(Pictures.of(task1, SENSORS, LIGHTS))
     own, blur = task1.locator.scale_px**2, task1.camera.blur_px**2 + 1 / 12
     assert found.variance == pytest.approx(SAFETY * ((1 + blur / own) ** 3 - 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 3.0])
+def test_fixed_pattern_does_not_depend_on_the_noise(sigma, task1):
+    """4 standard deviations: those of the value at a noise of 1 grey level, times the pattern's."""
+    noise = Noise(sigma=sigma, bits=8, prnu=0.01, dsnu=0.6)
+    scene = task1.model_copy(update={"noise": noise})
+    plain = task1.model_copy(update={"noise": Noise(sigma=1.0)})
+    unit = variance_model("calibrated")(Pictures.of(plain, SENSORS, LIGHTS)).variance.max()
+    signals = sides(Pictures.of(plain, SENSORS, LIGHTS)).levels
+    pattern = 0.6**2 + (0.01 * signals.max()) ** 2
+    found = REGISTER["fixed_pattern"].influence(Pictures.of(scene, SENSORS, LIGHTS))
+    assert found.bias_px == pytest.approx(4 * np.sqrt(unit * pattern), rel=1e-9)
+    assert found.variance == 0
+
+
+def test_what_may_be_left_out():
+    """At most the tolerance of both; a tolerance is at least 0 and finite; what is no number is not left out."""
+    tolerance = Tolerance(0.01, 0.1)
+    assert not tolerance.exceeded_by(Influence(0.01, 0.1))
+    assert tolerance.exceeded_by(Influence(0.0101, 0.0))
+    assert tolerance.exceeded_by(Influence(0.0, 0.101))
+    assert Tolerance(0.0, 0.0).exceeded_by(Influence(1e-300, 0.0))
+    for bad in (-1e-9, float("nan"), float("inf")):
+        with pytest.raises(InvalidInput, match="tolerance bias_px must be at least 0"):
+            Tolerance(bias_px=bad)
+        with pytest.raises(InvalidInput, match="tolerance variance must be at least 0"):
+            Tolerance(variance=bad)
+    assert largest(np.array([0.1, 0.3]), np.array([0.2, 0.1])) == (SAFETY * 0.3, SAFETY * 0.2)
+    assert largest(np.array([0.1, np.nan]), np.array([np.inf, 0.1])) == (np.inf, np.inf)

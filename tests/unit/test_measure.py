@@ -267,8 +267,12 @@ def test_bad_locator(task1):
         InvalidInput, match="estimator must be one of canny, gradient, isophote, strip, arrangement, got 'sobel'"
     ):
         measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="sobel")
-    with pytest.raises(InvalidInput, match="threshold must be greater than 0, got -1"):
-        measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="canny", threshold=-1)
+    for bad in (-1, 0, -0.5):
+        with pytest.raises(InvalidInput, match=f"threshold must be greater than 0, got {bad}"):
+            measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="canny", threshold=bad)
+    for bad in (1e300, True, "12"):
+        with pytest.raises(InvalidInput, match="threshold must be a number up to"):
+            measure.distance(np.zeros((240, 256)), task1, SENSOR, estimator="canny", threshold=bad)
 
 
 def test_lines_of_exact_points():

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from render.optics import blur_and_bin
-from scenes import Camera
+from planner.imaging.lens import recorded, undistorted
+from render.optics import blur_and_bin, distort
+from scenes import Camera, Lens
 
 
 def camera(blur):
@@ -34,3 +35,35 @@ def test_no_blur_only_averages():
     assert blur_and_bin(np.arange(16.0).reshape(4, 4), camera(0.0), 2, (0, 0)) == pytest.approx(
         np.array([[2.5, 4.5], [10.5, 12.5]])
     )
+
+
+def test_a_bent_step():
+    """Each row's levels add up to where the lens records the edge there.
+
+    Fine pixels are blurred before they are bent, so that nothing rings beside the step.
+    """
+    seen = Camera(
+        width=60, height=50, focal_px=60.0, distance=100.0, blur_px=0.8, lens=Lens(distortion=(-0.1, 0.0, 0.01, -0.02))
+    )
+    k = 4
+    fine = np.zeros((50 * k, 60 * k))
+    fine[:, 41 * k :] = 1.0  # ideal x from 40.5 on
+    image = blur_and_bin(fine, seen, k, (0, 0))
+    assert -2e-4 < image.min() <= image.max() < 1 + 2e-4
+    rows = np.arange(4, 46)
+    for row in rows:
+        y = np.linspace(row - 4, row + 4, 9)
+        edge = recorded(np.column_stack([np.full(9, 40.5), y]), seen)
+        place = np.interp(row, edge[:, 1], edge[:, 0])
+        assert (1 - image[row, 30:52]).sum() + 29.5 == pytest.approx(place, abs=1e-3)
+
+
+def test_a_crop_is_bent_as_the_whole():
+    """Only the start says where in the frame it is; what the lens does not show is dark."""
+    seen = Camera(width=60, height=50, focal_px=60.0, distance=100.0, blur_px=0.8, lens=Lens(distortion=(-0.1,)))
+    y, x = np.mgrid[:100, :120] / 2
+    fine = np.sin(0.3 * x) * np.cos(0.2 * y)
+    whole, part = distort(fine, seen, (0, 0), 2), distort(fine[20:80, 30:90], seen, (30, 20), 2)
+    assert part[10:50, 10:50] == pytest.approx(whole[30:70, 40:80], abs=1e-4)
+    centre = undistorted(np.array([[20.25, 15.25]]), seen)[0]
+    assert whole[31, 41] == pytest.approx(np.sin(0.3 * (centre[0] + 0.25)) * np.cos(0.2 * (centre[1] + 0.25)), abs=1e-3)

@@ -210,3 +210,10 @@ def test_numpy_takes_tuples_and_arrays_alike(rng):
         with np.errstate(all="ignore"):
             ours = brightness(material, plain(material), up, tuple(light.T), tuple(sensor.T), ops=NUMPY)
         assert (ours == reflected(material, plain(material), np.array([0, 0, 1.0]), light, sensor)).all()
+
+
+def test_no_facet_is_turned_away():
+    """D is exactly 0 there, and nothing is divided by a cosine of 0 on the way."""
+    with np.errstate(all="raise"):
+        found = beckmann(np.array([-1.0, -0.5, 0.0]), np.array([0.0, 0.75, 1.0]), 0.3)
+    assert (found == 0).all()

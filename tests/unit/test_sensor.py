@@ -107,3 +107,13 @@ def test_squared_errors_are_those_of_drawn_pictures(noise):
     assert np.abs(squares.var(0) - 2)[-1] > 20 * fourth[-1]
     far = np.array([full_scale(noise) / 2])
     assert np.concatenate(squared_errors(noise, far, recorded(noise, far))).tolist() == [1.0, 2.0]
+
+
+def test_noise_is_drawn_by_tiles_of_16():
+    """Only the tiles that hold a wanted pixel are noisy; the others keep the noise-free value."""
+    where = np.zeros((40, 50), bool)
+    where[[15, 20], [16, 49]] = True
+    found = render.expose(np.full((40, 50), 9.0), Noise(sigma=1.0), np.random.default_rng(2), 1, where)[0]
+    expected = np.zeros((40, 50), bool)
+    expected[:16, 16:32] = expected[16:32, 48:] = True
+    assert ((found != 9.0) == expected).all()

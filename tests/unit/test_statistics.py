@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from validation.cost.interval import LEAST, simulate
-from validation.statistics import ALLOWANCE, SHARES, correlation, p_value, ratio_interval, verdict
+from validation.statistics import ALLOWANCE, SHARES, _levels, correlation, p_value, ratio_interval, verdict
 
 
 def tables(rng, count, rows, n, factor=1.0):
@@ -140,3 +140,13 @@ def test_correlation_of_the_papers_printed_columns(task1):
 def test_correlation_needs_three_rows():
     assert correlation([1.0, 2.0], [2.0, 3.0]) is None
     assert correlation([1.0, 1.0, 1.0], [2.0, 3.0, 4.0]) is None
+
+
+@pytest.mark.parametrize("with_bias", [True, False])
+def test_shares_of_the_level(with_bias):
+    """They add up to it, in the proportions of the shares; a test that is not made takes none."""
+    levels = _levels(0.02, with_bias)
+    assert sum(levels.values()) == pytest.approx(0.02)
+    assert ("bias" in levels) is with_bias
+    for one in levels:
+        assert levels[one] / levels["rows"] == pytest.approx(SHARES[one] / SHARES["rows"])

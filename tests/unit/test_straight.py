@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import measure
+from measure.features.calipers import edge_calipers
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
-from measure.photo.lens import Lens, straight_corners
+from measure.photo.lens import Lens, _bent, _room, straight_corners
 from scenes import InvalidInput
 from tests.oracle import polygon_image
 
@@ -61,3 +62,37 @@ def test_focal_lengths_have_a_least():
 def test_a_lens_that_leaves_no_side_in_the_image_is_refused(lens):
     with pytest.raises(InvalidInput, match=r"side s\d must have edge points in the image, got none"):
         measure.measure_quadrilateral(picture(), lens=lens)
+
+
+@pytest.mark.parametrize("count", range(7))
+def test_up_to_five_coefficients(count):
+    """k1, k2, p1, p2, k3; each within a million."""
+    given = tuple(0.01 * (i + 1) for i in range(count))
+    if count > 5:
+        with pytest.raises(ValueError, match="at most 5 items"):
+            Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
+        return
+    lens = Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
+    assert lens.coefficients.tolist() == [*given, *[0.0] * (5 - count)]
+    for bad in (1.1e6, -1.1e6, float("nan")):
+        with pytest.raises(ValueError, match="distortion"):
+            Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(bad,))
+    assert Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(1e6, -1e6)).distortion == (1e6, -1e6)
+
+
+def test_room():
+    """Window, four scales and a pixel from the border: 8 px for a window of 3 and a scale of 1."""
+    places = np.array([[8.0, 8.0], [7.9, 50.0], [50.0, 7.9], [111.0, 91.0], [111.1, 50.0], [50.0, 91.1]])
+    assert _room(places, OPTICS).tolist() == [True, False, False, True, False, False]
+
+
+def test_bent_stations():
+    """On the bent side, and normals across it: each next station lies along the tangent."""
+    caliper = edge_calipers(polygon_layout(CORNERS, OPTICS), 4.0, 0.0)[0]
+    t, place, toward = _bent(caliper, LENS)
+    assert LENS.straighten(place) == pytest.approx(caliper.at(t, np.zeros(1)), abs=1e-6)
+    assert np.linalg.norm(toward, axis=1) == pytest.approx(np.ones(len(t)))
+    chord = place[2:] - place[:-2]
+    assert np.abs((chord * toward[1:-1]).sum(1)).max() < 1e-3
+    turned = np.array([-caliper.direction[1], caliper.direction[0]])
+    assert (toward @ turned > 0.9).all()

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.imaging.projection import depth, direction, facing, frame, project
+from planner.imaging.projection import depth, direction, facing, frame, from_axis, project
+from tests.oracle import axes as axes_of
 
 
 @pytest.mark.parametrize("pose", [(0, 0), (0, 130), (30, 90), (90, 200), (180, 45), (1e-9, 12)])
@@ -35,3 +36,15 @@ def test_depth_and_facing(task1):
     seen = facing(task1.solid, 100 * direction(pose))
     names = ("top", "bottom", "front", "back", "left", "right")
     assert [name for name, s in zip(names, seen, strict=True) if s] == ["top", "back"]
+
+
+@pytest.mark.parametrize("behind", [0.0, 0.5, 0.999, 30.0])
+def test_beside_and_behind_the_sensor_is_nan(behind, task1):
+    """Just before it is seen; in its plane, or behind it, not."""
+    sensor, camera = np.array([30.0, 135.0]), task1.camera
+    out = axes_of(sensor)[0]
+    eye = np.array(camera.look_at) + camera.distance * out
+    points = np.array([eye + behind * out, eye - 0.5 * out])
+    points[0] += 1e-9 * (behind == 0) * out
+    assert np.isnan(from_axis(points, sensor, camera)).tolist() == [[True, True], [False, False]]
+    assert project(points, sensor, camera)[0] == pytest.approx([np.nan, np.nan], nan_ok=True)

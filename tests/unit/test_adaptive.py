@@ -1,0 +1,91 @@
+"""Which fine pixels are rendered again, by distances of pixels from edges and circles that a pinhole shows."""
+
+import numpy as np
+import pytest
+
+import scenes
+from planner.features.projected_edges import circles
+from render.adaptive import crossed, near_edges
+from render.large import near_required
+from scenes import Picture, Pose
+from tests.oracle import pinhole
+
+
+def segments(scene, sensor):
+    """Ends (k, 2, 2) of required edges' images, and of the pieces of required circles', px."""
+    solid, task = scene.solid, scene.task
+    names = dict.fromkeys(name for corner in (task.start, task.end) for name in getattr(corner, "edges", ()))
+    rows = [solid.vertices[list(solid.edge(name).ends)] for name in names]
+    return [pinhole(row - np.array(scene.camera.look_at), sensor, scene.camera) for row in rows]
+
+
+@pytest.mark.parametrize("supersample", [1, 3])
+def test_near_edges(supersample, task1):
+    """All pixels no farther than window, four smoothing scales and one pixel from a required edge."""
+    sensor, camera, locator = (30.0, 135.0), task1.camera, task1.locator
+    crop = np.s_[20 * supersample : 200 * supersample, 30 * supersample : 250 * supersample]
+    picture = Picture.of(task1, Pose(*sensor), Pose(15, 315))
+    found = near_edges(picture, crop, supersample)
+    y, x = np.mgrid[20:200, 30:250]
+    away = np.full(y.shape, np.inf)
+    for start, stop in segments(task1, sensor):
+        along = stop - start
+        t = np.clip(((x - start[0]) * along[0] + (y - start[1]) * along[1]) / (along @ along), 0, 1)
+        away = np.minimum(away, np.hypot(x - start[0] - t * along[0], y - start[1] - t * along[1]))
+    reach = locator.window_px + 4 * locator.scale_px + 1
+    sure = np.abs(away - reach) > 1e-6
+    assert found.shape == (180 * supersample, 220 * supersample)
+    assert (found == (away <= reach).repeat(supersample, 0).repeat(supersample, 1))[
+        sure.repeat(supersample, 0).repeat(supersample, 1)
+    ].all()
+    assert 0.01 < found.mean() < 0.5
+    assert camera.width >= 250
+
+
+def test_near_circles():
+    """The upper rim of a plate's bore: no pixel within the reach of it is left out, none beyond is taken."""
+    plate = scenes.load("plate")
+    sensor, camera, locator = (30.0, 135.0), plate.camera, plate.locator
+    picture = Picture.of(plate, Pose(*sensor), Pose(15, 200))
+    found = near_edges(picture, (slice(0, camera.height), slice(0, camera.width)), 1)
+    reach = locator.window_px + 4 * locator.scale_px + 1
+    t = np.linspace(0, 2 * np.pi, 4000)
+    taken = 0
+    for name in circles(plate):
+        circle = plate.solid.circle(name)
+        ring = circle.centre + circle.radius * np.column_stack([np.cos(t), np.sin(t), 0 * t])
+        places = pinhole(ring - np.array(camera.look_at), sensor, camera)
+        low, high = np.floor(places.min(0) - reach - 2).astype(int), np.ceil(places.max(0) + reach + 2).astype(int)
+        y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
+        away = np.min([np.hypot(x - px, y - py) for px, py in places[::20]], axis=0)
+        inside = found[low[1] : high[1], low[0] : high[0]]
+        assert inside[away < reach - 0.2].all()
+        taken += 1
+    assert taken
+
+
+def test_crossed_with_surroundings():
+    """A step between two columns marks both, and within a reach of 2 two more on each side; not a faint step."""
+    fine = np.zeros((9, 12))
+    fine[:, 6:] = 10.0
+    assert np.flatnonzero(crossed(fine)[4]).tolist() == [5, 6]
+    assert np.flatnonzero(crossed(fine, 2)[4]).tolist() == [3, 4, 5, 6, 7, 8]
+    assert not crossed(fine, step=1.0).any()
+    assert crossed(fine, step=0.99).any()
+    assert not crossed(np.zeros((3, 3))).any()
+
+
+@pytest.mark.parametrize(("top", "left", "height", "width", "k"), [(0, 0, 240, 256, 1), (30, 90, 110, 70, 3)])
+def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k, task1):
+    """With the blur's six standard deviations more, a square each way, around what of the edges the crop shows."""
+    sensor, camera, locator = (30.0, 135.0), task1.camera, task1.locator
+    crop = slice(k * top, k * (top + height)), slice(k * left, k * (left + width))
+    found = near_required(Picture.of(task1, Pose(*sensor), Pose(15, 315)), crop, k)
+    reach = int(np.ceil(locator.window_px + 4 * locator.scale_px + 6 * camera.blur_px + 1))
+    expected = np.zeros((height, width), bool)
+    for start, stop in segments(task1, sensor):
+        for x, y in np.rint(start - [left, top] + np.linspace(0, 1, 4000)[:, None] * (stop - start)).astype(int):
+            if 0 <= x < width and 0 <= y < height:
+                expected[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1] = True
+    assert (found != expected).mean() < 4e-3  # at corners of the line of pixels
+    assert 0.1 < found.mean() < 0.9

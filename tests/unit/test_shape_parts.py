@@ -1,0 +1,76 @@
+"""Parts of the search for a shape: errors at the ends of lines, and what is reported of lines and of nothing."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import scenes
+from measure import status
+from measure.features.arranged import _nothing, line_rows
+from measure.features.layout import layout_of
+from measure.features.shape import _end_errors
+from scenes import Picture, Pose
+
+
+def test_errors_at_both_ends(rng):
+    """Of level and level + slope * length, by the rows that make them from (level, slope) of two edges."""
+    lengths = np.array([40.0, 7.0])
+    roots = rng.normal(size=(3, 4, 4)) * [1, 0.1, 1, 0.1]
+    covariance = roots.swapaxes(-1, -2) @ roots
+    found = _end_errors(covariance, lengths)
+    for e, length in enumerate(lengths):
+        for end, place in enumerate((0.0, length)):
+            row = np.zeros(4)
+            row[2 * e : 2 * e + 2] = 1, place
+            assert found[:, e, end] == pytest.approx(np.sqrt(row @ covariance @ row))
+
+
+def test_rows_of_lines(rng):
+    """Displacement at the first end and rotation, by moving the vertices that end the lines."""
+    vertices, required = rng.uniform(0, 50, (5, 2)), np.array([[0, 3], [3, 1]])
+    tool = SimpleNamespace(
+        arrangement=SimpleNamespace(required=required),
+        index=lambda which: (2 * np.asarray(which)[:, None] + [0, 1]).ravel(),
+    )
+
+    def lines(vertices):
+        """Distances of a line at its first end along a fixed normal, and its angle."""
+        values = []
+        for first, last in required:
+            along = true[last] - true[first]
+            normal = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            way = vertices[last] - vertices[first]
+            values += [normal @ vertices[first], np.arctan2(way[1], way[0])]
+        return np.array(values)
+
+    true = vertices.copy()
+    centre = SimpleNamespace(state=SimpleNamespace(vertices=vertices), covariance=np.zeros((12, 12)))
+    rows = line_rows(tool, centre)
+    assert rows.shape == (4, 12)
+    for i in range(12):
+        step = 1e-6 * (np.arange(10) == i).reshape(5, 2)
+        assert rows[:, i] == pytest.approx((lines(true + step) - lines(true - step)) / 2e-6, abs=1e-8)
+
+
+def test_nothing_is_reported_of_an_edge_that_is_not_seen(task1):
+    """Seen from below, the required edges of the top are hidden: NaN of every number, not_visible of the images."""
+    layout = layout_of(Picture.of(task1, Pose(100.0, 40.0), Pose(15, 315)))
+    shape = _nothing(3, layout)
+    edges, corners = len(layout.names), len(layout.corners)
+    assert not layout.visible.all()
+    assert shape.corners.shape == (3, corners, 2)
+    assert shape.covariance.shape == (3, 2 * corners, 2 * corners)
+    assert shape.normals.shape == shape.points.shape == (3, edges, 2)
+    assert shape.lines.shape == (3, 2 * edges, 2 * edges)
+    assert all(np.isnan(getattr(shape, name)).all() for name in ("corners", "covariance", "normals", "points", "lines"))
+    assert np.isnan(shape.p_value).all()
+    assert shape.status.tolist() == shape.whole.tolist() == [status.NOT_VISIBLE] * 3
+    assert (shape.edge_status == np.where(layout.visible, status.OK, status.NOT_VISIBLE)).all()
+    assert not shape.used.any()
+    assert shape.edge_contrast.shape == shape.rejected.shape == (3, edges)
+
+
+def test_scenes_have_no_such_edge_by_default(task1):
+    layout = layout_of(Picture.of(scenes.load("task1"), Pose(30, 135), Pose(15, 315)))
+    assert layout.visible.all()
