@@ -24,7 +24,9 @@ _DEGREE = 4  # of the polynomial that a known shading is told by
 _WIDE, _NARROW = 6.0, 2.0  # px: half widths of a face from which its shading has degree 4 and 2 across it, else 1
 _SQUARE = np.cos(np.pi * np.arange(9) / 8)  # places that tell a polynomial of degree 4 well
 _GRID = np.linspace(0.02, 0.98, 7)
-_CURVED = 60.0  # px: faces larger than this may shade quadratically where the light is not known; it costs a tenth there
+_CURVED = (
+    60.0  # px: faces larger than this may shade quadratically where the light is not known; it costs a tenth there
+)
 _OUTSIDE = 2.0  # reaches from the middle, beyond which a level is held: it counts for nothing there
 _FAINT = 1e-6  # of the brightest signal: a face below is dark
 

@@ -20,12 +20,12 @@ def calibrated(pictures: Pictures) -> Errors:
 
     Edge points lie densely along the trimmed edge; their errors have variance kappa^2 s_n^2 / C^2, s_n^2 the mean of
     both sides' noise, and correlation exp(-d^2 / (4 s^2)). With f(t) the weight that the least-squares line gives to an
-    error at t in A d + B theta, the variance is the double integral of f f' sigma sigma' correlation: to second order
-    2 sqrt(pi) s (integral of g^2 - s^2 integral of g'^2) - 2 s^2 (g^2 at both ends), g = f sigma; on an edge of less
-    than 10 s the double integral itself. Where the contrast changes by more than a factor 2 along an edge (gloss, or
-    another part of the object behind it), points below `MIN_CONTRAST` are dropped and the first order alone is taken.
-    Infinite where an edge has too little contrast or length to be measured. Errors are found where the lens records
-    the edge; its local magnification takes them to ideal px.
+    error at t in A d + B theta, the variance is the double integral of f f' sigma sigma' correlation:
+    2 sqrt(pi) s integral of g^2 - 2 s^2 (g^2 at both ends) + 8/3 s^4 g'^2, g = f sigma, exact for a linear g on a long
+    edge; on an edge of less than 10 s the double integral itself. Where the contrast changes by more than a factor 2
+    along an edge (gloss, or another part of the object behind it), points below `MIN_CONTRAST` are dropped and the
+    first order alone is taken. Infinite where an edge has too little contrast or length to be measured. Errors are
+    found where the lens records the edge; its local magnification takes them to ideal px.
     """
     scene, scale = pictures.scene, pictures.scene.locator.scale_px
     along = Along.of(pictures, trimmed=True)
@@ -39,7 +39,7 @@ def calibrated(pictures: Pictures) -> Errors:
     def line_variance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             weight = line_weight(nodes, a, b)
-            variance = (second_order(nodes, weight, line_slope(nodes, a, b), scale) * per_point).sum(-1)
+            variance = (long_edge(nodes, weight, line_slope(nodes, a, b), scale) * per_point).sum(-1)
             short = np.broadcast_to(nodes.length[..., 0] < SHORT * scale, variance.shape)
             if short.any():
                 variance[short] = _double_integral(*_picked(nodes, weight * np.sqrt(per_point), short), scale)
@@ -71,15 +71,16 @@ def line_slope(nodes: Nodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return 12 * (b[..., None] - a[..., None] * nodes.middle) / nodes.length**3
 
 
-def second_order(nodes: Nodes, weight: np.ndarray, slope: np.ndarray, scale: float) -> np.ndarray:
-    """Coefficients, (..., E, n), with which the points' variances add up to the line's.
+def long_edge(nodes: Nodes, weight: np.ndarray, slope: np.ndarray, scale: float) -> np.ndarray:
+    """Coefficients, (..., E, n), with which the points' variances add up to a long edge's line's.
 
     The smoothing scale is that of recorded px: along the edge it spans scale / along ideal px.
     """
     inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
     ends = np.array([1.0] + [0.0] * len(NODE_WEIGHTS) + [1.0])
     span = scale / nodes.along
-    return 2 * np.sqrt(np.pi) * span * inside * (weight**2 - (span * slope) ** 2) - 2 * span**2 * ends * weight**2
+    tilted = 8 / 3 * span**4 * slope**2 / nodes.length
+    return inside * (2 * np.sqrt(np.pi) * span * weight**2 + tilted) - 2 * span**2 * ends * weight**2
 
 
 def _picked(nodes: Nodes, g: np.ndarray, which: np.ndarray):

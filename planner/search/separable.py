@@ -21,7 +21,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import facing
 from planner.imaging.sensor import headroom, shot_noise
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes
-from planner.models.calibrated import SHORT, line_slope, line_weight, point_variance, second_order
+from planner.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
 from planner.models.paper import PAPER_KAPPA2, PAPER_POINTS
 from planner.search.aim import Aim
 from scenes import Scene
@@ -207,7 +207,7 @@ def _calibrated(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndar
 def _coefficients(nodes: Nodes, a: np.ndarray, b: np.ndarray, per_point, scale: float, good: np.ndarray) -> np.ndarray:
     """Those of r^6 for A d + B theta of each edge at unit noise, shape (S, E, 1 + _DEGREE)."""
     weight, slope = (make(nodes, a, b) for make in (line_weight, line_slope))
-    factor = second_order(nodes, weight, slope, scale) * per_point
+    factor = long_edge(nodes, weight, slope, scale) * per_point
     extra = np.zeros_like(nodes.length)
     short = good & np.isfinite(nodes.length[..., 0]).all(-1) & (nodes.length[..., 0] < SHORT * scale).any(-1)
     inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
