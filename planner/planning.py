@@ -17,6 +17,7 @@ from planner.search.candidates import Candidate, candidates, edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.refinement import refine
+from planner.search.trusted import trusted, untrusted
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, Task
 
@@ -57,6 +58,9 @@ class Plan:
         Pairs covered by the exhaustive search and how many were evaluated one by one.
     candidates : tuple of Candidate
         Up to ten clearly different settings, the best first; sensors or lights at least 15 degrees apart.
+    set_aside : tuple of Candidate
+        Those of less variance than the plan's own that were not taken, for a close look at them says that more of the
+        measurands cannot be trusted there (`clutter`).
     """
 
     scene: Scene
@@ -78,6 +82,7 @@ class Plan:
     pairs: int
     evaluated: int
     candidates: tuple[Candidate, ...]
+    set_aside: tuple[Candidate, ...]
 
     @property
     def poses(self) -> tuple[Pose, Pose]:
@@ -251,19 +256,25 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
     option, result = options[best], results[best]
     scene, found, partial = option.scene, result.found, result.partial
     sensor, light, variance = result.sensor, result.light, result.variance
-    choice = candidates(options, results, aim)
+    choice, how = candidates(options, results, aim), (option.model, aim)
+    chosen = trusted(scene, (sensor, light), result.variance, choice, option.model)
+    if chosen.set_aside:
+        sensor, light = chosen.sensor, chosen.light
     if refined and option.free:
         starts = [(sensor, light)]
-        if found is None or not has_bound(scene, option.model):
+        if not chosen.set_aside and (found is None or not has_bound(scene, option.model)):
             others = [c for c in choice[1:3] if c.edges == edges_of(scene)]
             starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
-        how = option.model, aim, option.step_deg, option.constraints
-        descents = [refine(scene, *at, *how, sizes=(0.7,)) for at in starts]
+        limits = option.step_deg, option.constraints
+        descents = [refine(scene, *at, *how, *limits, sizes=(0.7,)) for at in starts]
         sensor, light, _ = min(descents, key=lambda descent: descent[2])
-        sensor, light, variance = refine(scene, sensor, light, *how, sizes=(0.1,))
+        sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,))
+        if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
+            sensor, light = chosen.sensor, chosen.light
     on_grid = result.variance
-    if not scene.solid.is_convex:  # the search glances at pictures; what is told of the best is from a close look
-        how = option.model, aim
+    if (
+        not scene.solid.is_convex or chosen.set_aside
+    ):  # the search glances at pictures; what is told is from a close look
         variance = _closely(scene, sensor, light, *how)
         on_grid = _closely(scene, result.sensor, result.light, *how)
     prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
@@ -287,6 +298,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         pairs=sum(r.found.pairs for r in results if r.found),
         evaluated=sum(r.found.evaluated for r in results if r.found),
         candidates=choice,
+        set_aside=chosen.set_aside,
     )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.n
     spokes = np.cos(turned)[..., None] * one + np.sin(turned)[..., None] * two
     face_at = points + face_step[..., :1] * along + face_step[..., 1:] * radial
     wall_at = circle.centre + circle.radius * spokes - wall_step[..., 1:] * circle.axis
-    levels = _sides(pictures, circle, points, radial, True)
+    levels = _sides_at(pictures, circle, angle, True)
     slopes = []
     for level, at, facing in ((levels[..., 0, :], face_at, circle.axis), (levels[..., 1, :], wall_at, -sense * spokes)):
         there = signal(pictures, at, np.broadcast_to(facing, at.shape), 1)
@@ -115,8 +115,7 @@ def contrast_along(
     pictures: Pictures, circle: Circle, angle: np.ndarray, *, fall_off: bool = True
 ) -> tuple[np.ndarray, np.ndarray | float]:
     """Squared contrast at angles of a rim, 0 where it is hidden, and the noise's variance there."""
-    radial = radials(circle, angle)
-    sides = _sides(pictures, circle, circle.centre + circle.radius * radial, radial, fall_off)
+    sides = _sides_at(pictures, circle, angle, fall_off)
     if not fall_off:
         return (sides[..., 0, :] - sides[..., 1, :]) ** 2, pictures.scene.noise.variance
     return of_sides(pictures.scene, sides)
@@ -210,6 +209,14 @@ def _narrowest(solid: Solid, circle: Circle) -> float:
     """Radius of the widest circle free of the mesh's facets, over the circle's."""
     middles = solid.vertices[[solid.edge(name).ends for name in circle.edges]].mean(1)
     return float(np.linalg.norm(middles - circle.centre, axis=1).min() / circle.radius)
+
+
+def _sides_at(pictures: Pictures, circle: Circle, angle: np.ndarray, fall_off: bool) -> np.ndarray:
+    """Signals of both sides at angles of a rim, as `_sides` gives them; made once."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    key = "sides", circle.name, angle.tobytes(), fall_off
+    return pictures.once(key, lambda: _sides(pictures, circle, points, radial, fall_off))
 
 
 def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:

@@ -10,6 +10,8 @@ import numpy as np
 from scenes import Solid
 
 _CHUNK = 50_000  # ray-triangle pairs at a time
+_BUNDLE = 256  # rays for which triangles that none of them comes near are left out together
+_ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 
 
@@ -36,6 +38,16 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
     shape = origins.shape[:-1]
     origins, vectors = origins.reshape(-1, 3), vectors.reshape(-1, 3)
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    for at in range(0, len(origins), _BUNDLE):
+        bundle = slice(at, at + _BUNDLE)
+        near = plates.some(_may_meet(plates, origins[bundle], vectors[bundle]))
+        face[bundle], t[bundle] = _first(near, origins[bundle], vectors[bundle])
+    return face.reshape(shape), t.reshape(shape)
+
+
+def _first(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Face and t of what rays (n, 3) meet first, as `first_face` gives them."""
+    face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
     size = max(1, _CHUNK // max(len(plates.faces), 1))
     for at in range(0, len(origins), size):
         part = slice(at, at + size)
@@ -45,7 +57,28 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
         which = ts.argmin(1)
         t[part] = ts[np.arange(len(ts)), which]
         face[part] = np.where(np.isfinite(t[part]), faces[which], -1)
-    return face.reshape(shape), t.reshape(shape)
+    return face, t
+
+
+def _may_meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Triangles that a bundle of rays (n, 3) comes near: within the box across their mean direction that they fill from
+    the nearest to the farthest triangle, bool (T,). All of them where the rays do not run one way."""
+    every = np.ones(len(plates.faces), bool)
+    toward = vectors.sum(0)
+    if not every.size or not np.isfinite(toward).all() or not toward.any():
+        return every
+    frame = np.linalg.qr(np.column_stack([toward, np.eye(3)]))[0][:, :3]
+    frame[:, 0] *= np.sign(frame[:, 0] @ toward)
+    corners, start, step = plates.corners @ frame, origins @ frame, vectors @ frame
+    if not (step[:, 0] > 0).all():
+        return every
+    depths = np.maximum([corners[..., 0].min(), corners[..., 0].max()], start[:, :1])  # (n, 2)
+    reached = start[:, None, 1:] + ((depths - start[:, :1]) / step[:, :1])[..., None] * step[:, None, 1:]
+    away = _ROUND * max(np.abs(corners).max(), np.abs(start).max())
+    low, high = reached.min((0, 1)) - away, reached.max((0, 1)) + away
+    across = corners[..., 1:]
+    beside = ((across.max(0) >= low) & (across.min(0) <= high)).all(-1)
+    return beside & (corners[..., 0].max(0) >= start[:, 0].min() - away)
 
 
 def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -62,9 +95,11 @@ def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.nd
 
 @dataclass(frozen=True, eq=False)
 class _Plates:
-    """T triangles: their face, its plane, and (x - corner) . dual, the coordinates of a place x along two sides."""
+    """T triangles: their face, corners (3, T, 3), plane, and (x - corner) . dual, coordinates of a place x along two
+    sides."""
 
     faces: np.ndarray
+    corners: np.ndarray
     normals: np.ndarray
     heights: np.ndarray
     duals: np.ndarray
@@ -72,8 +107,8 @@ class _Plates:
 
     def some(self, which: np.ndarray) -> _Plates:
         """Those of them."""
-        shifts = self.shifts[:, which]
-        return _Plates(self.faces[which], self.normals[which], self.heights[which], self.duals[:, which], shifts)
+        planes = self.normals[which], self.heights[which]
+        return _Plates(self.faces[which], self.corners[:, which], *planes, self.duals[:, which], self.shifts[:, which])
 
 
 @lru_cache(maxsize=16)
@@ -85,7 +120,8 @@ def _plates(solid: Solid) -> _Plates:
     duals = np.stack([gram[2][:, None] * one - gram[1][:, None] * two, gram[0][:, None] * two - gram[1][:, None] * one])
     duals = duals / size[:, None]
     shifts = np.einsum("kti,ti->kt", duals, corner)
-    return _Plates(solid.triangle_faces, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
+    corners = np.ascontiguousarray(triangles.swapaxes(0, 1))
+    return _Plates(solid.triangle_faces, corners, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
 
 
 def _meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

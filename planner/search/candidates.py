@@ -68,7 +68,8 @@ def candidates(options, results, aim: Aim, count: int = 10):
 
 def _candidate(option, sensor: np.ndarray, light: np.ndarray, aim: Aim) -> Candidate:
     poses = Pose(*map(float, sensor)), Pose(*map(float, light))
-    found = variance_model(option.model)(Pictures.of(option.scene, *(np.array(list(pose)) for pose in poses)))
+    sensors, lights = (np.array(list(pose)) for pose in poses)
+    found = variance_model(option.model)(Pictures(option.scene, sensors, (lights,)))
     worst = int(np.argmax(found.variances_object * aim.shares))
     return Candidate(
         *poses,

@@ -7,6 +7,7 @@ import os
 import re
 import tempfile
 import traceback
+from collections.abc import Iterator
 
 import typer
 
@@ -22,7 +23,11 @@ _NO_ENTRY = (
 
 
 def ending(error: BaseException) -> tuple[str, int]:
-    """What is said of an error, in one line, and the exit status."""
+    """What is said of an error, in one line, and the exit status.
+
+    An interruption counts as one also where a library that it met made another error of it.
+    """
+    error = next((each for each in _chain(error) if isinstance(each, Interrupted)), error)
     if isinstance(error, SystemExit):
         return "", error.code if isinstance(error.code, int) else 0
     if isinstance(error, InvalidInput):
@@ -41,6 +46,13 @@ def ending(error: BaseException) -> tuple[str, int]:
     if isinstance(error, KeyboardInterrupt | typer.Abort):
         return "stopped: interrupted", 130
     return _internal(error), 3
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """The error, what caused it, what caused that."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
 
 
 def _internal(error: BaseException) -> str:
