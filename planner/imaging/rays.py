@@ -10,7 +10,7 @@ import numpy as np
 from scenes import Solid
 
 _CHUNK = 50_000  # ray-triangle pairs at a time
-_BUNDLE = 256  # rays for which triangles that none of them comes near are left out together
+_BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
 _ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 
