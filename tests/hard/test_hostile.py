@@ -28,7 +28,9 @@ from scenes.parts import mesh
 from validation import comparison, picture_file
 from validation.batch import campaign
 from validation.batch.stages import Stages
+from validation.batch.stopped import Interrupted
 from validation.batch.store import RunFile
+from validation.cli.ending import ending
 from validation.report import export
 
 pytestmark = pytest.mark.render
@@ -135,6 +137,13 @@ def test_an_error_of_the_program_is_one_line_a_log_and_status_3(tmp_path):
     (log,) = tmp_path.glob("ice-*.log")
     assert line == f"internal error: ZeroDivisionError: division by zero (traceback in {log})\n"
     assert "Traceback (most recent call last)" in log.read_text()
+
+
+def test_an_interruption_that_a_library_turned_into_another_error_counts():
+    """As compiled modules do that are interrupted while they are loaded."""
+    error = ImportError("initialization failed")
+    error.__cause__ = Interrupted("terminated", 143)
+    assert ending(error) == ("stopped: terminated", 143)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

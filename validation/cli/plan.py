@@ -238,6 +238,7 @@ def _facts(
         "pairs": found.pairs,
         "evaluated": found.evaluated,
         "candidates": [_with_poses(candidate) for candidate in found.candidates],
+        "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
         **_checked(checked),
         "robust": None if safe is None else _with_poses(safe),
         "pictures": [str(path) for path in pictures],

@@ -39,8 +39,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}\n"
         f"  standard deviation {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]},"
         f" {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]} in the image\n"
-        f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one\n"
-        f"  Guarantee: {found.guarantee}."
+        + _searched(found, seconds)
     )
 
 
@@ -57,10 +56,20 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
         ratio = "" if each.ratio is None else f", {each.ratio:.3g} of +-{each.tolerance.half:g}"
         sigma = f"{each.variance_object**0.5:.3g} {each.unit}"
         lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{ratio}, {each.status}")
-    lines += [
+    return "\n".join([*lines, _searched(found, seconds)])
+
+
+def _searched(found: planner.Plan, seconds: float) -> str:
+    lines = [
         f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if found.set_aside:
+        many = len(found.set_aside)
+        lines.append(
+            f"  {many} better setting{'s' * (many > 1)} set aside, {found.set_aside[0].variance / found.variance:.3g}"
+            " of what is minimised: there more of what is measured is clutter."
+        )
     return "\n".join(lines)
 
 

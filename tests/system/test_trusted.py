@@ -1,0 +1,48 @@
+"""A plan takes the best setting in which everything can be trusted, and says which better ones it set aside."""
+
+import numpy as np
+import pytest
+
+import planner
+from planner.search.trusted import DEAREST, trusted
+from tests.proofs.parts import make, scene_of
+from validation.report.plan_table import report
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """A plate with two holes; straight above its middle row the far side faces lie along the edges."""
+    return scene_of(make(np.random.default_rng(1), tmp_path_factory.mktemp("part"), 0))[0]
+
+
+@pytest.fixture(scope="module")
+def found(plate):
+    return planner.plan(plate, step_deg=30, refined=False)
+
+
+def test_what_is_set_aside_is_better_and_not_to_be_trusted(plate, found, capsys):
+    assert found.prediction.status == "ok"
+    assert found.set_aside
+    for each in found.set_aside:
+        assert each.variance < found.variance < DEAREST * each.variance
+        assert planner.predict(plate, each.sensor, each.light).status != "ok"
+    assert tuple(found.grid_sensor) == tuple(found.set_aside[0].sensor)
+    from rich.console import Console
+
+    Console(width=200).print(report(found, None, None, 1.0))
+    assert "set aside" in capsys.readouterr().out
+
+
+def test_nothing_is_set_aside_for_what_costs_too_much(plate, found):
+    best = tuple(np.array(list(pose)) for pose in (found.grid_sensor, found.grid_light))
+    taken = trusted(plate, best, found.grid_variance / (2 * DEAREST), found.candidates, found.model)
+    assert not taken.set_aside
+    assert taken.untrusted > 0
+    assert (taken.sensor == best[0]).all()
+
+
+def test_a_trusted_best_is_taken_as_it_is(task1):
+    found = planner.plan(task1, step_deg=10, refined=False)
+    assert found.prediction.status == "ok"
+    assert found.set_aside == ()
+    assert (found.sensor, found.light) == (found.grid_sensor, found.grid_light)
