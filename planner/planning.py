@@ -19,7 +19,7 @@ from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.refinement import refine
 from planner.search.trusted import trusted, untrusted
 from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Pose, Scene, Task
+from scenes import InvalidInput, Picture, Pose, Scene, Task
 
 Search = Literal["exhaustive", "alternating"]
 COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
@@ -257,7 +257,8 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
     scene, found, partial = option.scene, result.found, result.partial
     sensor, light, variance = result.sensor, result.light, result.variance
     choice, how = candidates(options, results, aim), (option.model, aim)
-    chosen = trusted(scene, (sensor, light), result.variance, choice, option.model)
+    on_grid = variance if scene.solid.is_convex else _closely(scene, sensor, light, *how)
+    chosen = trusted(scene, (sensor, light), on_grid, choice, option.model)
     if chosen.set_aside:
         sensor, light = chosen.sensor, chosen.light
     if refined and option.free:
@@ -271,12 +272,8 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,))
         if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
             sensor, light = chosen.sensor, chosen.light
-    on_grid = result.variance
-    if (
-        not scene.solid.is_convex or chosen.set_aside
-    ):  # the search glances at pictures; what is told is from a close look
+    if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look
         variance = _closely(scene, sensor, light, *how)
-        on_grid = _closely(scene, result.sensor, result.light, *how)
     prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
     return Plan(
         scene=scene,
@@ -304,7 +301,8 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
 
 def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:
     """What is minimised, of one picture looked at closely."""
-    return float(minimised(variance_model(model)(Pictures.of(scene, sensor, light)), aim))
+    picture = Picture.of(scene, tuple(map(float, sensor)), tuple(map(float, light)))
+    return float(minimised(variance_model(model)(Pictures.of(picture)), aim))
 
 
 def _guarantee(option: _Option, found: Found | None) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -23,27 +22,24 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     scene = pictures.scene
     if not pictures.closely or scene.solid.is_convex or not points.size:
         return 0.0
-    known = _known(scene, tuple(tuple(map(float, at.reshape(-1, 3)[0])) for at in pictures.lights_at))
+    lights_at = tuple(tuple(map(float, at.reshape(-1, 3)[0])) for at in pictures.lights_at)
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
-    found = np.zeros(shape) if known.faces is None else known.faces.at(points, faces)
-    for bore, told in known.walls:
+    lent = _of_faces(scene, lights_at)
+    found = np.zeros(shape) if lent is None else lent.at(points, faces)
+    for bore in bores(scene.solid):
         inside = np.isin(faces, bore.faces)
         if inside.any():
-            found[inside] = told.ev(*place_in(bore, points[inside]))
+            found[inside] = _of_wall(scene, lights_at, bore).ev(*place_in(bore, points[inside]))
     return scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None) * found
 
 
-@dataclass(frozen=True, eq=False)
-class _Light:
-    """Light between plane faces and in bores, of one scene under its lights."""
-
-    faces: Exchanged | None
-    walls: tuple[tuple[Bore, RectBivariateSpline], ...]
+def _of_faces(scene: Scene, lights_at: tuple[tuple[float, ...], ...]) -> Exchanged | None:
+    """Light between plane faces."""
+    return exchanged(scene, lights_at, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
 
 
-@lru_cache(maxsize=32)
-def _known(scene: Scene, lights_at: tuple[tuple[float, ...], ...]) -> _Light:
-    holes = bores(scene.solid)
-    faces = exchanged(scene, lights_at, tuple(sorted({face for bore in holes for face in bore.faces})))
-    return _Light(faces, tuple((bore, light_in_bore(scene, np.array(lights_at), bore, faces)) for bore in holes))
+@lru_cache(maxsize=64)
+def _of_wall(scene: Scene, lights_at: tuple[tuple[float, ...], ...], bore: Bore) -> RectBivariateSpline:
+    """Light that a bore's wall has."""
+    return light_in_bore(scene, np.array(lights_at), bore, _of_faces(scene, lights_at))

@@ -8,13 +8,13 @@ difference of the angles alone, so that a Fourier transform around the axis leav
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from planner.features.seen import plane_axes
-from planner.imaging.exchange import Exchanged, received
+from planner.imaging.exchange import Exchange, Exchanged, factors_through
 from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
@@ -66,8 +66,9 @@ def light_in_bore(scene: Scene, lights_at: np.ndarray, bore: Bore, others: Excha
     """
     white = diffuse(scene.material)
     form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
-    depth = (np.arange(_DEEP) + 0.5) / _DEEP
-    outside = [_from_outside(bore, at * bore.length, others) for at in (depth, nodes)]
+    outside = 0.0, 0.0
+    if others is not None:
+        outside = [(each @ others.sent).reshape(_AROUND, -1) for each in _from_outside(bore, others.exchange)]
     direct = np.fft.fft(white * (_direct(scene, lights_at, bore) + outside[0]), axis=0)
     whole = np.linalg.solve(np.eye(_DEEP) - white * form, direct[..., None])
     found = np.fft.ifft((gather @ whole)[..., 0], axis=0).real + outside[1]
@@ -104,13 +105,14 @@ def _direct(scene: Scene, lights_at: np.ndarray, bore: Bore) -> np.ndarray:
     return found
 
 
-def _from_outside(bore: Bore, depth: np.ndarray, others: Exchanged | None) -> np.ndarray:
-    """What arrives at some depths of the wall through its openings, (around, depths)."""
-    points, normals = _on_wall(bore, depth)
-    if others is None:
-        return np.zeros(points.shape[:-1])
-    points, normals = points.reshape(-1, 3), normals.reshape(-1, 3)
-    return received(others, points, normals, lambda ends: _through(bore, points, ends)).reshape(_AROUND, -1)
+@lru_cache(maxsize=16)
+def _from_outside(bore: Bore, exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
+    """Form factors through the openings from the wall's patches and from its nodes to patches outside, (n, p) each."""
+    found = []
+    for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
+        points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
+        found.append(factors_through(exchange, points, normals, partial(_through, bore, points)))
+    return found[0], found[1]
 
 
 def _through(bore: Bore, points: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -247,12 +247,12 @@ def _direct(scene: Scene, patches: Patches, lights_at: np.ndarray) -> np.ndarray
     return found.mean(0)
 
 
-def received(
-    exchange: Exchanged, points: np.ndarray, normals: np.ndarray, free: Callable[[np.ndarray], np.ndarray]
+def factors_through(
+    exchange: Exchange, points: np.ndarray, normals: np.ndarray, free: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """What arrives at points (n, 3) of unit normals (n, 3) from the patches, (n,).
+    """Form factors from points (n, 3) of unit normals (n, 3) to the patches, (n, p).
 
     ``free`` says which ways to their middles (p, 3) are, bool (n, p).
     """
-    patches = exchange.exchange.patches
-    return np.where(free(patches.points), form_factors(points, normals, patches), 0.0) @ exchange.sent
+    patches = exchange.patches
+    return np.where(free(patches.points), form_factors(points, normals, patches), 0.0)

@@ -37,7 +37,7 @@ MOST = 0.3  # standard deviations of the measurand: the largest bias of what is 
 _NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
 _FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length: where it is asked where its light comes from
-_MOSTLY, _FELT = 0.5, 0.05  # parts of a side's light, and of the contrast
+_MOSTLY, _FELT, _CHANGES = 0.5, 0.05, 0.1  # parts of a side's light, and of the contrast, twice
 _JUMP = 0.2  # of the contrast, that neighbouring places on an edge may differ by
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
@@ -60,7 +60,7 @@ class Bias:
     disturbed : ndarray of bool, shape (..., E)
         Edges of which neither bias nor variance are to be trusted: somewhere along them the crossing is far off, or
         flatter or steeper than a lone step's, for errors by noise are divided by its slope; or the contrast jumps; or
-        an obstacle is near; or a side has most of its light from other faces.
+        an obstacle is near; or a side's light from other faces is much or changes much.
     """
 
     values: np.ndarray
@@ -135,13 +135,17 @@ def _bias(pictures: Pictures) -> Bias:
 
 
 def _by_other_faces(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
-    """Edges with a side that has most of its light from other faces, bool (N, E): its slope is known but roughly."""
+    """Edges whose light from other faces is known too roughly for a bias, bool (N, E).
+
+    A side has most of its light from there, or it changes much along the edge, as it does beside a corner.
+    """
     points = edge_points(pictures.scene.solid, names, _LOOKED)
     glanced = Pictures(pictures.scene, pictures.sensors, pictures.lights)
     whole, direct = (side_signals(each, names, points) for each in (pictures, glanced))
     lent = whole - direct
     contrast = np.abs(whole[..., 1, :] - whole[..., 0, :])[..., None, :]
-    return ((lent > _MOSTLY * whole) & (lent > _FELT * contrast)).any((-1, -2))
+    mostly = ((lent > _MOSTLY * whole) & (lent > _FELT * contrast)).any((-1, -2))
+    return mostly | (np.ptp(lent, -1) > _CHANGES * contrast.mean(-1)).any(-1)
 
 
 def _nothing(count: int, known: Measurands) -> Bias:

@@ -11,7 +11,7 @@ from planner.imaging.projection import direction
 from planner.models import variance_model
 from planner.prediction import minimised
 from planner.search.aim import Aim
-from scenes import Pose, Scene
+from scenes import Picture, Pose, Scene
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
@@ -68,8 +68,7 @@ def candidates(options, results, aim: Aim, count: int = 10):
 
 def _candidate(option, sensor: np.ndarray, light: np.ndarray, aim: Aim) -> Candidate:
     poses = Pose(*map(float, sensor)), Pose(*map(float, light))
-    sensors, lights = (np.array(list(pose)) for pose in poses)
-    found = variance_model(option.model)(Pictures(option.scene, sensors, (lights,)))
+    found = variance_model(option.model)(Pictures.of(Picture.of(option.scene, *poses)))
     worst = int(np.argmax(found.variances_object * aim.shares))
     return Candidate(
         *poses,

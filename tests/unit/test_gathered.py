@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from measure.measurands import _gathered
+from measure import measurands
 from render import series
 from scenes import Jitter, Noise, Pose
 
 
 @pytest.mark.parametrize("lead", [(2,), (), (2, 1)])
-def test_only_what_is_measured_has_a_value(lead, task1, rng):
+def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     """NaN beside it, and infinite variances; covariances only between what both are measured."""
     images, quantity = int(np.prod(lead)), task1.quantities[0]
     quantities = (quantity, replace(quantity, nominal=7.5), quantity)
@@ -25,7 +25,10 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng):
     found = SimpleNamespace(
         known=known, status=status, image=image, plane=plane, shape=SimpleNamespace(p_value=p_value)
     )
-    told = _gathered(found, task1, lead)
+    first = object()
+    monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))
+    told = measurands._gathered(found, task1, lead)
+    assert told.first == (first, found, lead)
     assert told.units == ("cm",) * 3
     own = quantity.nominal if quantity.nominal is not None else 1.0
     assert told.nominal.tolist() == [own, 7.5, quantity.nominal if quantity.nominal is not None else 3.0]

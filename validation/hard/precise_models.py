@@ -168,8 +168,9 @@ def calibrated(scene, inputs: Inputs, adaptive: bool = True, objective: str = "i
         if used < 10 * scale:
             raise NotImplementedError("an edge shorter than 10 smoothing scales needs the double integral")
         slope2 = (12 * lever / used**3) ** 2 * point_variance
-        inside = integral(lambda t: g2(t) - scale**2 * slope2 / squared(t))
-        return 2 * mp.sqrt(mp.pi) * scale * inside - 2 * scale**2 * (g2(-used / 2) + g2(used / 2))
+        tilted = mpf(8) / 3 * scale**4 * integral(lambda t: slope2 / squared(t)) / used
+        ends = 2 * scale**2 * (g2(-used / 2) + g2(used / 2))
+        return 2 * mp.sqrt(mp.pi) * scale * integral(g2) - ends + tilted
 
     return _distance_variance(scene, inputs, offset_variance, objective)
 
