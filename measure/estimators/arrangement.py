@@ -276,6 +276,8 @@ class ArrangementEstimator:
         for _ in range(12):
             step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), point.score)
             size = float(step @ matrix @ step)
+            if size < _SETTLED**2 and damping == 0:
+                return point, True, 0.0
             there = self._point(used, self.model.moved(point.state, self._held_back(step)), point.before)
             if there.cost <= point.cost + _ROUNDING:
                 return there, size < _SETTLED**2, damping / 10 if damping > 1e-3 else 0.0

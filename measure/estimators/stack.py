@@ -74,8 +74,9 @@ def _around(tool, images, part, centre, collected, number, first) -> np.ndarray:
     seen = [expansion.see(tool.taken(images[batch], expansion.order)) for batch in batches]
     solved = expansion.solve(Seen(*map(np.concatenate, zip(*seen, strict=True))))
     good, settled = _good(tool, solved, centre), np.ones(part.size, bool)
-    if first:
-        good[0], settled[0], solved.steps[0] = True, centre.settled, 0.0
+    if first:  # the centre is its own, but for what is left of the last step
+        solved.steps[0] *= good[0] and centre.settled
+        good[0], settled[0] = True, centre.settled
     collected.add(part[good], tool.parameters(centre.state) + solved.steps[good], solved.squares[good])
     collected.owner[part[good]], collected.settled[part[good]] = number, settled[good]
     return part[good]
