@@ -8,7 +8,7 @@ import numpy as np
 
 from scenes.model import Model
 from scenes.parts.solid import Solid, block
-from scenes.ranges import Fraction, NotNegative, Positive
+from scenes.ranges import Fraction, Length, NotNegative, Positive
 
 
 class Floor(Model):
@@ -27,7 +27,7 @@ class Obstacle(Model):
 
     corner: tuple[float, float, float]
     """Its corner of least x, y and z [length]."""
-    size: tuple[Positive, Positive, Positive]
+    size: tuple[Length, Length, Length]
     """Along x, y and z [length]."""
 
     @property

@@ -105,7 +105,7 @@ def _direct(scene: Scene, lights_at: np.ndarray, bore: Bore) -> np.ndarray:
     return found
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def _from_outside(bore: Bore, exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
     """Form factors through the openings from the wall's patches and from its nodes to patches outside, (n, p) each."""
     found = []

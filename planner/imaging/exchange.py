@@ -23,6 +23,7 @@ _PATCHES = 160  # about, on all faces together
 _LEAST = 6  # of a face, each way
 _WITHIN = 0.01  # of the first cell's half
 _FINE = 4  # places in a patch, each way, where it is asked what light reaches
+_AT_ONCE = 256  # points whose form factors are made together
 _SMALL = 1e-3  # of the area of all such faces: smaller ones send nothing
 _FLAT = 1e-6  # of a cell's side: how far its corners may be below a horizon
 _LIFT = 1e-6  # of the object's size: between a patch and its own face
@@ -129,7 +130,7 @@ class Exchanged:
         return found
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def exchange_of(solid: Solid, without: tuple[int, ...]) -> Exchange | None:
     """Of the faces that are not on the convex hull, those ``without`` left out; None where fewer than two are."""
     areas = np.bincount(solid.triangle_faces, _areas(solid.triangles), len(solid.faces))
@@ -185,6 +186,14 @@ def form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> n
 
     By Lambert's contour integral over a patch' rectangle where all of it is over the point's horizon; else as a disc.
     """
+    parts = [
+        _form_factors(points[at : at + _AT_ONCE], normals[at : at + _AT_ONCE], patches)
+        for at in range(0, len(points), _AT_ONCE)
+    ]
+    return np.concatenate(parts) if parts else np.zeros((0, len(patches.points)))
+
+
+def _form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
     away = patches.points - points[:, None]
     distance2 = (away**2).sum(-1)
     here = np.einsum("npi,ni->np", away, normals)
@@ -216,7 +225,7 @@ def _seen_factors(solid: Solid, points: np.ndarray, normals: np.ndarray, patches
     return found
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def exchanged(scene: Scene, lights_at: tuple[tuple[float, ...], ...], without: tuple[int, ...]) -> Exchanged | None:
     """What the faces of a scene's object send to each other under lights at some places."""
     exchange = exchange_of(scene.solid, without)

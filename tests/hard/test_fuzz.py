@@ -26,6 +26,15 @@ def test_400_tries(tmp_path, capfd):
     assert fuzzing.peak_memory() < max(fuzzing.MOST_MEMORY, before + 1)
 
 
+@pytest.mark.parametrize("number", [7541, 12221, 13120])
+def test_what_20000_tries_once_found(number, tmp_path, capfd):
+    """A mesh none of whose edges is shared, twice, and an obstacle too small for its area to be a number."""
+    found = fuzzing.run(number + 1, seed=1, folder=tmp_path, first=number)
+    capfd.readouterr()
+    assert not found.failures
+    assert sum(found.outcomes.values()) == 1
+
+
 @pytest.mark.parametrize("broken", [lambda *_: 1 / 0, lambda *_: (_ for _ in ()).throw(MemoryError("much"))])
 def test_a_traceback_would_be_found(broken, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(scenes, "load", broken)

@@ -11,6 +11,7 @@ import numpy as np
 import measure
 import planner
 import scenes
+from measure import status
 from scenes.load import BUNDLED
 from tests.hard.fuzzing.mutations import HOSTILE, keys, spoilt, stored
 from validation import picture_file
@@ -71,7 +72,7 @@ def image(rng: np.random.Generator, folder: Path) -> str:
         measure.measure_quadrilateral(picture)
     estimator = str(rng.choice(measure.ESTIMATORS))
     found = measure.distance(picture, scenes.load("task1"), (30, 135), estimator=estimator)
-    good = np.isin(found.status, ("ok", "clutter"))
+    good = np.isin(found.status, status.MEASURED)
     if not (np.isfinite(found.value_px) == good).all() or not (found.variance_px2 > 0).all():
         raise AssertionError(f"value {found.value_px}, variance {found.variance_px2}, status {found.status}")
     return "measured"
