@@ -85,8 +85,8 @@ class _Shape:
 
     @classmethod
     def of(cls, vertices, chains, normals, areas) -> _Shape:
-        ends = np.array([chain[0] for chain in chains], int).reshape(-1, 2)
-        faces = np.array([chain[1] for chain in chains], int).reshape(-1, 2)
+        ends = np.array([chain[0] for chain in chains]).reshape(-1, 2)
+        faces = np.array([chain[1] for chain in chains]).reshape(-1, 2)
         along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
         length = np.linalg.norm(along, axis=1)
         one, two = normals[faces[:, 0]], normals[faces[:, 1]]

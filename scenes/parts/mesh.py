@@ -116,6 +116,8 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     if group.max() >= MOST_FACES:
         raise InvalidInput(f"object.file must have at most {MOST_FACES} plane faces, got {group.max() + 1}")
     chains = _straight_chains(mesh.vertices, _pieces(mesh, group))
+    if not chains:  # nearly flat: all its triangles count as coplanar
+        raise InvalidInput("object.file must have faces that meet at an angle, got triangles that are all coplanar")
     normals, areas = _normals(mesh, group)
     loops = _loops(mesh, group, chains, normals)
     circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))

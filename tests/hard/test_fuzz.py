@@ -28,7 +28,7 @@ def test_400_tries(tmp_path, capfd):
 
 @pytest.mark.parametrize("number", [7541, 12221, 13120])
 def test_what_20000_tries_once_found(number, tmp_path, capfd):
-    """A mesh none of whose edges is shared, twice, and an obstacle too small for its area to be a number."""
+    """A mesh whose triangles all count as coplanar, twice, and an obstacle too small for its area to be a number."""
     found = fuzzing.run(number + 1, seed=1, folder=tmp_path, first=number)
     capfd.readouterr()
     assert not found.failures
