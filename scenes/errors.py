@@ -62,9 +62,9 @@ def one_line(text: str, most: int = _MOST) -> str:
 def describe(error: ValidationError) -> str:
     """First problem of a pydantic report as one line "key must be ..., got ..."."""
     problem = error.errors(include_url=False)[0]
-    if problem["type"] == "value_error" and " must be " in str(problem["ctx"]["error"]):
+    if problem["type"] == "value_error" and " must " in str(problem["ctx"]["error"]):
         text = str(problem["ctx"]["error"])
-        return text if not problem["loc"] or "." in text.split(" must be ")[0] else f"{_key(problem['loc'])}: {text}"
+        return text if not problem["loc"] or "." in text.split(" must ")[0] else f"{_key(problem['loc'])}: {text}"
     return f"{_key(problem['loc'])} must be {_requirement(problem)}, got {_shown(problem)}"
 
 
