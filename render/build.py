@@ -13,6 +13,7 @@ from planner.imaging.projection import frame
 from planner.imaging.reflectance import Index, diffuse
 from render import bsdf, lights
 from render.meshes import mesh
+from render.parts import Part
 from render.rays import SURFACES
 from render.texture import Face, faces, shapes
 from scenes import Floor, Picture, Scene, Solid
@@ -25,8 +26,7 @@ CUSTOM = {"specular_lobe", "polarisation", "analyser", "wavelength"}
 
 def description(
     mitsuba: Any,
-    picture: Picture,
-    active: frozenset[str],
+    part: Part,
     size: tuple[int, int],
     crop: tuple[slice, slice],
     samples: int,
@@ -36,8 +36,8 @@ def description(
 
     Parameters
     ----------
-    active : frozenset of str
-        Names of effects; a scene's part whose effect is not named must already be neutral.
+    part : Part
+        A picture with one light and names of effects; what of the scene has none of them must already be neutral.
     size : tuple of int
         Fine pixels of the whole frame, (width, height).
     crop : tuple of slice
@@ -47,26 +47,25 @@ def description(
     textures : tuple of tuple of Face, optional
         Of `textured`, to be used instead of the surface's own reflectance.
     """
-    scene = picture.scene
+    picture, active, scene = part.picture, part.active, part.picture.scene
     integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
     if "interreflection" in active:
         integrator = {"type": "path", "max_depth": SURFACES + 1, "rr_depth": 99}
     parts = {
         "type": "scene",
-        "integrator": {**integrator, "hide_emitters": True, "block_size": _BLOCK},
+        "integrator": {**integrator, "hide_emitters": not part.silhouette, "block_size": _BLOCK},
         "sensor": view(mitsuba, picture, active, size, crop, samples),
-        **lights.description(mitsuba, picture, active),
+        **(lights.seen if part.silhouette else lights.description)(mitsuba, picture),
     }
     if textures is None:
-        surface = _surface(mitsuba, picture, active)
+        surface = lights.BLACK if part.silhouette else _surface(mitsuba, picture, active)
         made = [mesh(mitsuba, solid.triangles, surface) for solid in _solids(scene, active)]
     else:
         made = [shape for faces in textures for shape in shapes(mitsuba, faces)]
     parts.update((f"part{i}", shape) for i, shape in enumerate(made))
     if "floor" in active:
-        parts["floor"] = _floor(
-            mitsuba, scene.floor or Floor(reflectance=0.0, height=_lowest(scene)), "analyser" in active
-        )
+        floor = scene.floor or Floor(reflectance=0.0, height=_lowest(scene))
+        parts["floor"] = _floor(mitsuba, floor, 0.0 if part.silhouette else 0.5 if "analyser" in active else 1.0)
     return parts
 
 
@@ -79,10 +78,10 @@ def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
 def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...], ...] | None:
     """Each solid's surface with the paper's reflectance as textures; None where it has no such form (`render.texture`).
 
-    Light between surfaces, several lights, and light or an aperture of some size need the reflectance for more than one
+    Light between surfaces, and light or an aperture of some size need the reflectance for more than one
     direction.
     """
-    if active & MANY_WAYS or len(picture.scene.lights) > 1:
+    if active & MANY_WAYS:
         return None
     found = []
     for solid in _solids(picture.scene, active):
@@ -153,9 +152,9 @@ def view(mitsuba, picture: Picture, active, size, crop, samples: int) -> dict:
     }
 
 
-def _floor(mitsuba, floor: Floor, analysed: bool) -> dict:
+def _floor(mitsuba, floor: Floor, passed: float) -> dict:
     """The floor; an analyser passes half of what it reflects."""
-    transform, reflectance = mitsuba.ScalarTransform4f(), floor.reflectance * (0.5 if analysed else 1.0)
+    transform, reflectance = mitsuba.ScalarTransform4f(), floor.reflectance * passed
     return {
         "type": "rectangle",
         "to_world": transform.translate([0, 0, floor.height]).scale(floor.half_side),

@@ -7,13 +7,19 @@ from typing import Any
 import numpy as np
 
 
-def mesh(mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None) -> Any:
+def mesh(
+    mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None, emitter: dict | None = None
+) -> Any:
     """Triangles, shape (T, 3, 3), and where their corners lie in a texture, shape (T, 3, 2), if they have one.
+
+    With an ``emitter`` their outside shines.
 
     Without vertex normals Mitsuba shades each triangle by its own plane: exactly flat.
     """
     properties = mitsuba.Properties()
     properties["bsdf"] = mitsuba.load_dict(bsdf)
+    if emitter is not None:
+        properties["emitter"] = mitsuba.load_dict(emitter)
     corners = triangles.reshape(-1, 3)
     sizes = {"vertex_count": len(corners), "face_count": len(triangles)}
     shape = mitsuba.Mesh("solid", **sizes, props=properties, has_vertex_texcoords=texels is not None)

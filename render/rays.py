@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-_AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
+AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
 LARGE_AT_ONCE = 1 << 22  # the same beside a large image
 SURFACES = 16  # that light may meet; in a bore four radii deep, of reflectance 0.9, 0.3 % of what is sent on is left
 _DIMENSIONS = 4  # of a reflection: where on the light, which way to the next surface
@@ -39,6 +39,8 @@ class Rays:
     seed : int
     at_once : int
         Rays in one call, which bounds the memory.
+    shown : bool
+        Whether a light itself is seen, and nothing else.
     """
 
     mitsuba: Any
@@ -46,7 +48,8 @@ class Rays:
     most: int
     bounces: int
     seed: int
-    at_once: int = _AT_ONCE
+    at_once: int = AT_ONCE
+    shown: bool = False
 
     def radiance(
         self, scene: Any, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int], samples: int
@@ -103,6 +106,8 @@ class Rays:
         mi, context = self.mitsuba, self.mitsuba.BSDFContext()
         total, passed = dr.zeros(mi.Float, dr.width(point)), mi.Float(1.0)
         hit = scene.ray_intersect(ray)
+        if self.shown:
+            return hit.emitter(scene).eval(hit)[0]
         for bounce in range(self.bounces + 1):
             alive, column = hit.is_valid(), 2 + _DIMENSIONS * bounce
             surface = hit.bsdf(ray)

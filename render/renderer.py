@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from planner.imaging.appearance import is_plain
+from planner.imaging.backlight import backlights
 from planner.imaging.lens import confusion, recorded
 from planner.imaging.projection import depth, project_ideal
 from render import variant as variants
@@ -17,9 +19,10 @@ from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.large import Renders, fine_pixels, is_large
 from render.mosaic import mosaic, refine_tiles
 from render.optics import blur_and_bin
+from render.parts import Part, parts, within_cone
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
-from render.rays import LARGE_AT_ONCE, SURFACES, Rays
+from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
 from scenes import InvalidInput, Picture, Scene
 
 
@@ -110,17 +113,21 @@ def image(
     if levels[rows, columns].size:
         check_precision(camera)
         crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
-        fine = _fine(picture, chosen.active, crop, quality, variant or variants.choose())
-        levels[rows, columns] += blur_and_bin(fine, camera, k, (crop[1].start, crop[0].start))
+        which, start = variant or variants.choose(), (crop[1].start, crop[0].start)
+        for part in parts(picture, chosen.active):
+            fine = _fine(part, crop, quality, which)
+            if part.silhouette:
+                fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
+            levels[rows, columns] += blur_and_bin(fine, camera, k, start)
     return levels
 
 
 def window(picture: Picture) -> tuple[slice, slice]:
-    """Rows and columns of the image that have to be rendered: all with a floor, else what object and blur can reach."""
+    """Rows and columns of the image that have to be rendered: what object and blur can reach, all with a background."""
     scene, camera = picture.scene, picture.scene.camera
     corners = project_ideal(scene.bodies.vertices, np.array(list(picture.sensor)), camera)
     corners = np.concatenate([corners, recorded(corners, camera)])
-    if np.isnan(corners).any() or scene.floor is not None:
+    if np.isnan(corners).any() or scene.floor is not None or backlights(scene):
         return slice(0, camera.height), slice(0, camera.width)
     margin = 2 + 6 * camera.blur_px + _defocus(picture)
     low, high = np.floor(corners.min(0) - margin), np.ceil(corners.max(0) + margin + 1)
@@ -130,6 +137,11 @@ def window(picture: Picture) -> tuple[slice, slice]:
     return slice(top, bottom), slice(left, right)
 
 
+def _even(part: Part) -> bool:
+    """Whether no place sees less of a light of some size than its horizon leaves: one convex body before darkness."""
+    return part.active & MANY_WAYS == {"light_size"} and is_plain(part.picture.scene) and not part.silhouette
+
+
 def _defocus(picture: Picture) -> float:
     """Radius of the largest circle of confusion, px."""
     camera = picture.scene.camera
@@ -137,12 +149,16 @@ def _defocus(picture: Picture) -> float:
     return float(confusion(camera, np.maximum(away, 1e-3 * camera.distance)).max())
 
 
-def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.ndarray:
+def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
     """Image of fine pixels, before lens and pixel aperture."""
+    picture, active = part.picture, part.active
     camera = picture.scene.camera
     mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
     size, sharp = (camera.width * k, camera.height * k), active - MANY_WAYS
-    textures = textured(picture, sharp) if scalar and active & CUSTOM else None
+    even = _even(part)
+    textures = textured(picture, sharp) if even or (scalar and active & CUSTOM and not part.silhouette) else None
+    if textures is not None and even:
+        active = sharp
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
     many = quality.edge_samples or (16 if interpreted else 64 if scalar and textures is None else 256)
     samples = quality.samples or (1 if scalar else 4)
@@ -150,12 +166,13 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
     few = quality.random_samples or 16
     bounces = SURFACES - 1 if "interreflection" in active else 0
     large = is_large(crop, k, sharp != active)
-    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, *((LARGE_AT_ONCE,) if large else ()))
+    at_once = LARGE_AT_ONCE if large else AT_ONCE
+    rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, at_once, part.silhouette)
 
     def load(active, samples, textures=None, divided=1):
         film = tuple(n // divided for n in size), tuple(slice(p.start // divided, p.stop // divided) for p in crop)
-        parts = description(mitsuba, picture, active, *film, samples, textures)
-        return mitsuba.load_dict(parts, parallel=False)
+        made = description(mitsuba, part.reduced(active), *film, samples, textures)
+        return mitsuba.load_dict(made, parallel=False)
 
     def rendered(loaded) -> np.ndarray:
         return np.array(mitsuba.render(loaded, seed=quality.seed), dtype=float)[:, :, 0]

@@ -2,7 +2,8 @@
 
 From one place, under a light at one place, how bright a face is depends on the place in its plane alone. So in a scalar
 variant, which would run `render.bsdf` as interpreted Python ray by ray, a face that is lit and seen becomes a diffuse
-one whose reflectance is a table of brightness over N.L: cosine, fall-off and shadows stay the renderer's own.
+one whose reflectance is a table of brightness over N.L: cosine, fall-off and shadows stay the renderer's own. So does,
+in any variant, a plane face that sees all of a light of some size, lit by a point in the light's middle.
 
 A table is interpolated linearly. Every other of its nodes alone would miss the nodes between by less than 1e-4 of the
 table's largest value anywhere, and by less than 4e-5 on average over any part of an eighth by an eighth of it. What is
@@ -23,7 +24,7 @@ from planner.imaging.appearance import signal
 from planner.imaging.irradiance import beam
 from planner.imaging.pictures import Pictures
 from render.meshes import mesh
-from scenes import Picture, Solid
+from scenes import Picture, Scene, Solid, as_point
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -55,7 +56,7 @@ class Face:
 
 
 def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
-    """The solid's surface in parts, or None where a table would need too many nodes.
+    """The solid's surface in parts, or None where a table would need too many nodes or a face sees part of a light.
 
     Faces that are dark or turned away share one part, of brightness 0.
 
@@ -63,14 +64,16 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     ----------
     solid : Solid
     picture : Picture
-        Of one light; its parts that are not simulated are neutral.
+        Of one light, which is rendered as a point in its middle; parts that are not simulated are neutral.
     """
     found, dark = [], np.ones(len(solid.triangles), bool)
     pictures = Pictures.of(picture)
-    places = pictures.lights_at[0], pictures.sensor_at
-    heights = [solid.normals @ place - solid.offsets for place in places]
-    distances = [np.linalg.norm(place) for place in places]
-    for index in np.flatnonzero((heights[0] > _GRAZING * distances[0]) & (heights[1] > _GRAZING * distances[1])):
+    above = np.array([_over(solid, emitter.at) for emitter in pictures.emitters]).reshape(-1, len(solid.normals))
+    lit = above.all(0) & _over(solid, pictures.lights_at[0])
+    seen = _over(solid, pictures.sensor_at)
+    if (above.any(0) & ~lit & seen).any():
+        return None  # a horizon crosses the light
+    for index in np.flatnonzero(lit & seen):
         of_face = solid.triangle_faces == index
         made = _face(solid.triangles[of_face], solid.normals[index], pictures)
         if made is None:
@@ -79,6 +82,11 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
         dark &= ~of_face
     rest = solid.triangles[dark]
     return (*found, Face(rest, np.zeros((*rest.shape[:2], 2)), np.zeros((2, 2))))
+
+
+def _over(solid: Solid, place: np.ndarray) -> np.ndarray:
+    """Which faces a place is over by more than rounding, bool (F,)."""
+    return solid.normals @ place - solid.offsets > _GRAZING * np.linalg.norm(place)
 
 
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
@@ -156,14 +164,20 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndar
     Parameters
     ----------
     pictures : Pictures
-        Of one picture with one light.
+        Of one picture with one light; N.L is that of its middle.
     normal : ndarray, shape (3,)
     points : ndarray, shape (..., 3)
         cm.
     """
-    scene, arriving = pictures.scene, beam(pictures.scene.lights[0], pictures.lights_at[0], points)
+    scene = pictures.scene
+    arriving = beam(pictures.with_scene(pointed(scene)).emitters[0], points)
     white = scene.camera.exposure * arriving.strength * (arriving.to_light @ normal)
     return signal(pictures, points, normal, points.ndim - 1) / white
+
+
+def pointed(scene: Scene) -> Scene:
+    """The scene with its one light as a point in its middle."""
+    return scene.model_copy(update={"light": as_point(scene.lights[0]), "several_lights": ()})
 
 
 def _towards(place: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from scenes.camera import Camera
 from scenes.errors import InvalidInput
 from scenes.lens import Lens
-from scenes.lights import Light
+from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
 from scenes.materials import Material
 from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
@@ -11,14 +11,15 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Circle, Edge, Solid, block
-from scenes.picture import Picture
-from scenes.pose import Pose
+from scenes.picture import Picture, mounted
+from scenes.pose import Pose, several
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens",
-    "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene",
-    "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
+    "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
+    "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh",
+    "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "Task",
+    "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "several",
 ]  # fmt: skip

@@ -34,7 +34,19 @@ _KINDS = {
 }
 
 
-_TAGS = ("block", "mesh", "corner", "centre", "side")  # alternatives of the model, no keys of the file
+_TAGS = (
+    "block",
+    "mesh",
+    "corner",
+    "centre",
+    "side",
+    "point",
+    "disc",
+    "bar",
+    "ring",
+    "dome",
+    "backlight",
+)  # alternatives of the model, no keys of the file
 
 
 _MOST = 600  # characters of a message: enough for a path, a key and what was given

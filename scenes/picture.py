@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from scenes.errors import InvalidInput
-from scenes.pose import Pose
+from scenes.lights import Backlight, Luminaire
+from scenes.pose import Pose, several
 from scenes.scene import Scene
 
 
@@ -23,7 +21,8 @@ class Picture:
     scene : Scene
     sensor : Pose
     lights : tuple of Pose
-        One for each of the scene's lights; none where it is not known where they stand.
+        One for each of the scene's lights, also of those that are not free; none where it is not known where they
+        stand.
 
     Examples
     --------
@@ -46,8 +45,8 @@ class Picture:
             A picture is returned as it is.
         sensor : Pose or pair of float
             Polar angle and azimuth, degrees.
-        lights : Pose, pair of float, or one for each light, optional
-            None where it is not known where the lights stand.
+        lights : Pose, pair of float, or one for each free light, optional
+            None where it is not known where the lights stand; where none is free it is always known.
 
         Raises
         ------
@@ -58,10 +57,13 @@ class Picture:
             return scene
         if not isinstance(scene, Scene):
             raise InvalidInput(f"scene must be a Scene or a Picture, got {type(scene).__name__}")
-        poses = () if lights is None else tuple(scene.check_pose("light", pose) for pose in several(lights))
-        if lights is not None and len(poses) != len(scene.lights):
-            raise InvalidInput(f"light must be {len(scene.lights)} pose(s), one for each light, got {len(poses)}")
-        return cls(scene, scene.check_pose("sensor", sensor), poses)
+        sensor = scene.check_pose("sensor", sensor)
+        if lights is None and scene.free:
+            return cls(scene, sensor)
+        poses = several(() if lights is None else lights)
+        if len(poses) == len(scene.lights):
+            poses = tuple(poses[i] for i in scene.free)  # those of another picture, complete
+        return cls(scene, sensor, _complete(scene, sensor, scene.check_lights(poses)))
 
     @property
     def light(self) -> Pose | None:
@@ -88,13 +90,16 @@ class Picture:
         return hash((self.scene, self.sensor, self.lights))
 
 
-def several(lights: Any) -> tuple[Any, ...]:
-    """A pose, a pair of numbers, or a list of either, as a tuple."""
-    if isinstance(lights, Pose):
-        return (lights,)
-    try:
-        parts = tuple(lights)
-    except TypeError:
-        return (lights,)
-    nested = all(isinstance(part, Pose) or (isinstance(part, Iterable) and not isinstance(part, str)) for part in parts)
-    return parts if parts and nested and not isinstance(lights, np.ndarray) else (lights,)
+def _complete(scene: Scene, sensor: Pose, free: tuple[Pose, ...]) -> tuple[Pose, ...]:
+    """Poses of all lights from those of the free ones."""
+    given = iter(free)
+    return tuple(next(given) if light.mount == "free" else mounted(light, sensor) for light in scene.lights)
+
+
+def mounted(light: Luminaire, sensor: Pose) -> Pose:
+    """Where a light stands that is not free: at its own pose, at the sensor's, or opposite the sensor."""
+    if light.mount == "fixed":
+        return light.pose
+    if isinstance(light, Backlight):
+        return Pose(180.0 - sensor.polar_deg, (sensor.azimuth_deg + 180.0) % 360.0)
+    return sensor

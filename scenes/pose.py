@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -64,3 +65,15 @@ class Pose:
 
 
 PoseField = Annotated[Pose, BeforeValidator(Pose.of, json_schema_input_type=tuple[float, float]), PlainSerializer(list)]
+
+
+def several(lights: Any) -> tuple[Any, ...]:
+    """A pose, a pair of numbers, or a list of either, as a tuple."""
+    if isinstance(lights, Pose):
+        return (lights,)
+    try:
+        parts = tuple(lights)
+    except TypeError:
+        return (lights,)
+    nested = all(isinstance(part, Pose) or (isinstance(part, Iterable) and not isinstance(part, str)) for part in parts)
+    return parts if nested else (lights,)

@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.camera import Camera
 from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
-from scenes.lights import Light
+from scenes.lights import AnyLight
 from scenes.materials import Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
 from scenes.model import FileName, Model, Title
@@ -24,11 +24,13 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
-from scenes.pose import Pose, PoseField
+from scenes.pose import Pose, PoseField, several
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
+
+MOST_LIGHTS = 16
 
 
 def _tag_of_object(value: Any) -> str:
@@ -43,17 +45,39 @@ def _bodies(measured: Solid, obstacles: tuple[Obstacle, ...]) -> Solid:
     return assembled(measured, *(obstacle.solid for obstacle in obstacles))
 
 
+def _poses(value: Any) -> Pose | tuple[Pose, ...]:
+    """One pose, or one for each of several lights."""
+    found = tuple(Pose.of(each) for each in several(value))
+    return found[0] if len(found) == 1 else found
+
+
+def _pairs(value: Pose | tuple[Pose, ...]) -> list[Any]:
+    return list(value) if isinstance(value, Pose) else [list(each) for each in value]
+
+
+LightPoses = Annotated[
+    Pose | tuple[Pose, ...],
+    BeforeValidator(_poses, json_schema_input_type=tuple[float, float] | list[tuple[float, float]]),
+    PlainSerializer(_pairs),
+]
+
+
 class Setting(Model):
     """One pair of sensor and light, with what the paper printed for it."""
 
     sensor: PoseField
     """Polar angle (0 to 180) and azimuth [degrees]."""
-    light: PoseField
-    """The same of the light [degrees]."""
+    light: LightPoses = ()
+    """The same of the light that is free, or a list of such pairs, one for each light that is [degrees]."""
     paper_ice: Positive | None = None
     """The paper's predicted variance [px^2]."""
     paper_real: tuple[Positive, Positive] | None = None
     """The paper's measured variances, for both thresholds [px^2]."""
+
+    @property
+    def lights(self) -> tuple[Pose, ...]:
+        """Poses of the lights that are free."""
+        return several(self.light)
 
 
 class Scene(Model):
@@ -67,6 +91,8 @@ class Scene(Model):
         into `scenes.InvalidInput`.
     """
 
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True, serialize_by_alias=True)
+
     name: FileName
     """The file's name where not given."""
     units: Unit = "cm"
@@ -79,8 +105,10 @@ class Scene(Model):
     """Of the object and the obstacles."""
     camera: Camera
     """The camera."""
-    light: Light
-    """The light."""
+    light: AnyLight | None = None
+    """The light, where there is one."""
+    several_lights: tuple[AnyLight, ...] = Field((), alias="lights")
+    """All lights, where there are several; each of a kind of its own."""
     noise: Noise
     """The sensor's noise."""
     task: Task | None = None
@@ -116,19 +144,26 @@ class Scene(Model):
         return _bodies(self.solid, self.obstacles)
 
     @property
-    def lights(self) -> tuple[Light, ...]:
+    def lights(self) -> tuple[AnyLight, ...]:
         """All lights."""
-        return (self.light,)
+        return self.several_lights or (() if self.light is None else (self.light,))
 
-    def position(self, role: Literal["sensor", "light"], pose: Pose) -> np.ndarray:
-        """Where the sensor or the light stands, shape (3,): on a sphere around the reference point."""
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Which of the lights are free: those that a setting gives poses for."""
+        return tuple(i for i, light in enumerate(self.lights) if light.mount == "free")
+
+    def position(self, role: Literal["sensor", "light"], pose: Pose, which: int = 0) -> np.ndarray:
+        """Where the sensor or a light stands, shape (3,): on a sphere around the reference point."""
         polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
         direction = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
-        radius = (self.camera if role == "sensor" else self.light).distance
-        return np.array(self.camera.look_at) + radius * np.array(direction)
+        return np.array(self.camera.look_at) + self._distance(role, which) * np.array(direction)
 
-    def check_pose(self, role: Literal["sensor", "light"], pose: Any, key: str | None = None) -> Pose:
-        """The pose, once it is known to stand outside the object.
+    def _distance(self, role: Literal["sensor", "light"], which: int) -> float:
+        return (self.camera if role == "sensor" else self.lights[which]).distance
+
+    def check_pose(self, role: Literal["sensor", "light"], pose: Any, key: str | None = None, which: int = 0) -> Pose:
+        """The pose, once it is known to stand outside the object; ``which`` of the lights.
 
         Raises
         ------
@@ -139,10 +174,11 @@ class Scene(Model):
             pose = Pose.of(pose)
         except InvalidInput as error:
             raise InvalidInput(f"{key or role}: {error}") from None
-        if self.solid.height_above(self.position(role, pose)) <= 1e-6 * self.solid.extent:
-            radius = (self.camera if role == "sensor" else self.light).distance
+        at = self.position(role, pose, which)
+        if self.solid.height_above(at) <= 1e-6 * self.solid.extent:
+            radius = self._distance(role, which)
             raise InvalidInput(f"{key or role} must be outside the object, got {pose} at {radius:g} {self.units}")
-        if self.floor is not None and self.position(role, pose)[2] <= self.floor.height:
+        if self.floor is not None and at[2] <= self.floor.height:
             raise InvalidInput(f"{key or role} must be above the floor, got {pose}")
         return pose
 
@@ -175,10 +211,34 @@ class Scene(Model):
         check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
         self._check_measurands()
         self._check_surroundings()
+        self._check_lights()
         for i, setting in enumerate(self.settings):
-            for role in ("sensor", "light"):
-                self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")
+            self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
+            self.check_lights(setting.lights, f"settings[{i}].light")
         return self
+
+    def check_lights(self, poses: tuple[Any, ...], key: str = "light") -> tuple[Pose, ...]:
+        """Poses of all free lights, once they are known to stand outside the object.
+
+        Raises
+        ------
+        InvalidInput
+            If there are not as many as free lights, or one of them is no pose or lies in or on the object.
+        """
+        if len(poses) != len(self.free):
+            raise InvalidInput(f"{key} must be {len(self.free)} pose(s), one for each free light, got {len(poses)}")
+        keys = [f"{key}[{i}]" if len(poses) > 1 else key for i in range(len(poses))]
+        return tuple(self.check_pose("light", *each) for each in zip(poses, keys, self.free, strict=True))
+
+    def _check_lights(self) -> None:
+        """Either ``light`` or ``lights``; those that are fixed stand clear of the object."""
+        if (self.light is None) == (not self.several_lights):
+            raise ValueError(f"light or lights must be given, not both, got {'both' if self.light else 'none'}")
+        if len(self.lights) > MOST_LIGHTS:
+            raise ValueError(f"lights must be at most {MOST_LIGHTS}, got {len(self.lights)}")
+        for i, light in enumerate(self.lights):
+            if light.pose is not None and light.kind != "backlight":
+                self.check_pose("light", light.pose, f"lights[{i}].pose" if self.several_lights else "light.pose", i)
 
     def _check_measurands(self) -> None:
         """Either ``task`` or ``measurands``, of features that the object has."""
@@ -215,11 +275,9 @@ class Scene(Model):
             )
 
     def _check_surroundings(self) -> None:
-        """Floor below the object, a light that does not reach the object."""
+        """Floor below the object."""
         low = float(self.solid.vertices[:, 2].min())
         if self.floor is not None and self.floor.height > low:
             raise ValueError(
                 f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
             )
-        if self.light.radius >= self.light.distance / 2:
-            raise ValueError(f"light.radius must be less than half of light.distance, got {self.light.radius:g}")

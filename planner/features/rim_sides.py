@@ -224,7 +224,7 @@ def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.n
     bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
     wall = -radial if circle.hole else radial
     probe = _probe(pictures, circle, points)
-    lit = tuple(_free(bodies, probe, at[..., None, :]) for at in pictures.lights_at)
+    lit = tuple(_free(bodies, probe, emitter.at[..., None, :]) for emitter in pictures.emitters)
     sides = []
     for normal in (np.broadcast_to(circle.axis, points.shape), wall):
         turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0

@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.imaging import sensor
+from planner.imaging.backlight import backlights, backlit
 from planner.imaging.between import light_between
-from planner.imaging.irradiance import bands, beam, electric_field, squared_distance
+from planner.imaging.emitters import is_point
+from planner.imaging.irradiance import bands, beam, electric_field, squared_distance, widened
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, facing, frame
 from planner.imaging.rays import first_face, reaches
@@ -38,12 +40,17 @@ class EdgeContrast(NamedTuple):
 
 def is_plain(scene: Scene) -> bool:
     """Whether there is one convex body before darkness: nothing hides, shades, or is seen behind an edge."""
-    return scene.bodies.is_convex and (scene.floor is None or scene.floor.reflectance == 0)
+    return scene.bodies.is_convex and not has_background(scene)
+
+
+def has_background(scene: Scene) -> bool:
+    """Whether anything but darkness may be seen behind the bodies."""
+    return (scene.floor is not None and scene.floor.reflectance > 0) or bool(backlights(scene))
 
 
 def is_separable(scene: Scene) -> bool:
-    """Whether a face's signal is a number times 1 / r^3, r the distance from the light: plain, diffuse, one light."""
-    return is_plain(scene) and scene.material.is_diffuse and len(scene.lights) == 1
+    """Whether a face's signal is a number times 1 / r^3, r the distance from the light: plain, diffuse, one point."""
+    return is_plain(scene) and scene.material.is_diffuse and is_point(scene.lights)
 
 
 def signal(
@@ -67,20 +74,20 @@ def signal(
     axes : int
         How many axes the points have of their own.
     lit : tuple of ndarray of bool, optional
-        For each light where it reaches the points; everywhere when not given.
+        For each emitter where it reaches the points; everywhere when not given.
     material : Material, optional
         The object's when not given.
     fall_off : bool
         Whether irradiance falls with the squared distance from the light, as it does; eq. 1 has no such term.
     """
     scene, material = pictures.scene, material or pictures.scene.material
-    to_sensor = _unit(_widened(pictures.sensor_at, axes) - points)
+    to_sensor = _unit(widened(pictures.sensor_at, axes) - points)
     analyser, total = analyser_axis(scene, pictures.sensors), 0.0
-    for i, (light, light_at) in enumerate(zip(scene.lights, pictures.lights_at, strict=True)):
-        arriving = beam(light, _widened(light_at, axes), points, fall_off=fall_off)
-        fields = polarisation_axis(scene, i, light_at), analyser
-        across = (None if axis is None else _widened(axis, axes) for axis in fields)
-        value = reflected(material, bands(scene, light), normals, arriving.to_light, to_sensor, *across)
+    for i, emitter in enumerate(pictures.emitters):
+        arriving = beam(emitter, points, axes, fall_off=fall_off)
+        fields = polarisation_axis(scene, emitter.which, pictures.lights_at[emitter.which]), analyser
+        across = (None if axis is None else widened(axis, axes) for axis in fields)
+        value = reflected(material, bands(scene, emitter.light), normals, arriving.to_light, to_sensor, *across)
         value = scene.camera.exposure * arriving.strength * value
         total = total + (value if lit is None else np.where(lit[i], value, 0.0))
     return total
@@ -182,7 +189,7 @@ def side_strengths(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
     On a plane, diffuse face N.(l - p) is the same for all its points p, so with r = |l - p| the signal is a constant
     over r^3: N.(l - p) / r for the cosine and 1 / r^2 for the fall-off.
     """
-    return _heights(pictures, names) * pictures.scene.light.distance**2
+    return _heights(pictures, names) * pictures.emitters[0].power
 
 
 def paper_step(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
@@ -213,7 +220,7 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
     fractions = (points - start) @ (stop - start) / ((stop - start) @ (stop - start))
     lit = tuple(
         turned(bodies, edge, at)[..., None] & seen(bodies, edge, at, fractions)[..., None, :]
-        for at in pictures.lights_at
+        for at in (emitter.at for emitter in pictures.emitters)
     )
     normals = bodies.normals[list(edge.faces)][:, None]
     level = signal(pictures, points[..., None, :, :], normals, 2, lit, fall_off=fall_off)
@@ -223,9 +230,9 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
     found = np.where(visible & looked_at, level, 0.0)
     outward = normals.sum((0, 1))
     for side, face in enumerate(edge.faces):
-        # past an outer face that is turned away there is nothing but the floor, for the ray leaves the convex hull
+        # past an outer face that is turned away there is nothing but the background, for the ray leaves the convex hull
         wanted = visible[..., 0, :] & ~looked_at[..., side, :]
-        if (scene.floor or not bodies.outer[face]) and wanted.any():
+        if (has_background(scene) or not bodies.outer[face]) and wanted.any():
             past = behind(pictures, points, wanted, edge.faces, outward, fall_off=fall_off)
             found[..., side, :] = np.where(wanted, past, found[..., side, :])
     return found
@@ -254,17 +261,20 @@ def behind(
         0 where the ray meets nothing, or what it meets is dark.
     """
     scene, bodies = pictures.scene, pictures.scene.bodies
-    vectors = points - _widened(pictures.sensor_at, 1)
+    vectors = points - widened(pictures.sensor_at, 1)
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
-    lit = tuple(_where(wanted & (face >= 0), hit, face, at, partial(reaches, bodies)) for at in pictures.lights_at)
+    lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
     found = signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off)
     found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     if scene.floor is not None and scene.floor.reflectance > 0:
         place, ahead = _on_floor(scene.floor, points, vectors, t)
         place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
-        found = np.where(ahead, on_floor, found)
+        found, t = np.where(ahead, on_floor, found), np.where(ahead, 0.0, t)
+    for which in backlights(scene):
+        shown = backlit(pictures, which, points, vectors, analyser_axis(scene, pictures.sensors))
+        found = np.where(np.isinf(t), found + shown, found)
     return np.where(wanted, found, 0.0)
 
 
@@ -283,7 +293,7 @@ def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, 
         blocker, t = first_face(bodies, light, points + lift - light, ())
         return (blocker < 0) | (t >= 1)
 
-    lit = tuple(_where(wanted, places, np.zeros(places.shape[:-1], int), at, free) for at in pictures.lights_at)
+    lit = tuple(_where(wanted, places, np.zeros(places.shape[:-1], int), e.at, free) for e in pictures.emitters)
     return signal(pictures, places, _UP, 1, lit, material=floor_material(scene.floor), fall_off=fall_off)
 
 
@@ -322,11 +332,6 @@ def _where(wanted, places, faces, light_at, test) -> np.ndarray:
     place, light = parts
     found[wanted] = test(place, np.broadcast_to(faces, shape)[wanted], light)
     return found
-
-
-def _widened(vectors: np.ndarray, axes: int) -> np.ndarray:
-    """(..., 3) with axes of size 1 before the last."""
-    return vectors.reshape(*vectors.shape[:-1], *(1,) * axes, 3)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

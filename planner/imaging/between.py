@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from planner.imaging.bore import Bore, bores, light_in_bore, place_in
+from planner.imaging.emitters import Emitter
 from planner.imaging.exchange import Exchanged, exchanged
 from planner.imaging.pictures import Pictures
 from planner.imaging.reflectance import diffuse
@@ -22,24 +23,30 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     scene = pictures.scene
     if not pictures.closely or scene.solid.is_convex or not points.size:
         return 0.0
-    lights_at = tuple(tuple(map(float, at.reshape(-1, 3)[0])) for at in pictures.lights_at)
+    emitters = tuple(_plain(emitter) for emitter in pictures.emitters)
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
-    lent = _of_faces(scene, lights_at)
+    lent = _of_faces(scene, emitters)
     found = np.zeros(shape) if lent is None else lent.at(points, faces)
     for bore in bores(scene.solid):
         inside = np.isin(faces, bore.faces)
         if inside.any():
-            found[inside] = _of_wall(scene, lights_at, bore).ev(*place_in(bore, points[inside]))
+            found[inside] = _of_wall(scene, emitters, bore).ev(*place_in(bore, points[inside]))
     return scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None) * found
 
 
-def _of_faces(scene: Scene, lights_at: tuple[tuple[float, ...], ...]) -> Exchanged | None:
+def _plain(emitter: Emitter) -> Emitter:
+    """The emitter of one picture as a record that can be compared."""
+    at, axis = (None if v is None else tuple(v.reshape(-1, 3)[0].tolist()) for v in (emitter.at, emitter.axis))
+    return emitter._replace(at=at, axis=axis)
+
+
+def _of_faces(scene: Scene, emitters: tuple[Emitter, ...]) -> Exchanged | None:
     """Light between plane faces."""
-    return exchanged(scene, lights_at, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
+    return exchanged(scene, emitters, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
 
 
 @lru_cache(maxsize=64)
-def _of_wall(scene: Scene, lights_at: tuple[tuple[float, ...], ...], bore: Bore) -> RectBivariateSpline:
+def _of_wall(scene: Scene, emitters: tuple[Emitter, ...], bore: Bore) -> RectBivariateSpline:
     """Light that a bore's wall has."""
-    return light_in_bore(scene, np.array(lights_at), bore, _of_faces(scene, lights_at))
+    return light_in_bore(scene, emitters, bore, _of_faces(scene, emitters))

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from planner.features.seen import plane_axes
+from planner.imaging.emitters import Emitter
 from planner.imaging.exchange import Exchange, Exchanged, factors_through
 from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
@@ -59,7 +60,9 @@ def _bore(solid: Solid, rim: Circle, length: float) -> Bore:
     return Bore(rim, length, tuple(sorted(faces)), float(np.linalg.norm(middles - rim.centre, axis=1).min()))
 
 
-def light_in_bore(scene: Scene, lights_at: np.ndarray, bore: Bore, others: Exchanged | None) -> RectBivariateSpline:
+def light_in_bore(
+    scene: Scene, emitters: tuple[Emitter, ...], bore: Bore, others: Exchanged | None
+) -> RectBivariateSpline:
     """Light that a wall has from itself and from the faces outside, over the angle and the depth below the rim.
 
     Irradiance in units of the signal of a white face. ``others`` sends what comes from outside.
@@ -69,7 +72,7 @@ def light_in_bore(scene: Scene, lights_at: np.ndarray, bore: Bore, others: Excha
     outside = 0.0, 0.0
     if others is not None:
         outside = [(each @ others.sent).reshape(_AROUND, -1) for each in _from_outside(bore, others.exchange)]
-    direct = np.fft.fft(white * (_direct(scene, lights_at, bore) + outside[0]), axis=0)
+    direct = np.fft.fft(white * (_direct(scene, emitters, bore) + outside[0]), axis=0)
     whole = np.linalg.solve(np.eye(_DEEP) - white * form, direct[..., None])
     found = np.fft.ifft((gather @ whole)[..., 0], axis=0).real + outside[1]
     around = np.concatenate([found[-3:], found, found[:4]])
@@ -93,13 +96,14 @@ def _on_wall(bore: Bore, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return points, np.broadcast_to(-radial, points.shape)
 
 
-def _direct(scene: Scene, lights_at: np.ndarray, bore: Bore) -> np.ndarray:
+def _direct(scene: Scene, emitters: tuple[Emitter, ...], bore: Bore) -> np.ndarray:
     """What arrives on the wall's patches from the lights, (around, deep)."""
     points, normals = _on_wall(bore, (np.arange(_DEEP) + 0.5) / _DEEP * bore.length)
     found = np.zeros(points.shape[:-1])
-    for light, at in zip(scene.lights, lights_at, strict=True):
+    for emitter in emitters:
+        at = np.array(emitter.at)
         blocker, t = first_face(scene.bodies, np.broadcast_to(at, points.shape), points - at, ())
-        arriving = beam(light, at, points)
+        arriving = beam(emitter, points)
         cosine = np.einsum("...i,...i->...", arriving.to_light, normals)
         found += np.where((blocker < 0) | (t >= 1), arriving.strength * np.maximum(cosine, 0), 0.0)
     return found

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
+from planner.imaging.emitters import Emitter
 from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
@@ -226,13 +227,13 @@ def _seen_factors(solid: Solid, points: np.ndarray, normals: np.ndarray, patches
 
 
 @lru_cache(maxsize=8)
-def exchanged(scene: Scene, lights_at: tuple[tuple[float, ...], ...], without: tuple[int, ...]) -> Exchanged | None:
-    """What the faces of a scene's object send to each other under lights at some places."""
+def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...]) -> Exchanged | None:
+    """What the faces of a scene's object send to each other under some emitters."""
     exchange = exchange_of(scene.solid, without)
     if exchange is None:
         return None
     white = diffuse(scene.material)
-    direct = _direct(scene, exchange.patches, np.array(lights_at))
+    direct = _direct(scene, exchange.patches, emitters)
     sent = np.linalg.solve(np.eye(direct.size) - white * exchange.between, white * direct)
     told = {
         sheet.face: RectBivariateSpline(sheet.u, sheet.v, (factors @ sent).reshape(sheet.u.size, sheet.v.size))
@@ -241,16 +242,17 @@ def exchanged(scene: Scene, lights_at: tuple[tuple[float, ...], ...], without: t
     return Exchanged(exchange, sent, told)
 
 
-def _direct(scene: Scene, patches: Patches, lights_at: np.ndarray) -> np.ndarray:
+def _direct(scene: Scene, patches: Patches, emitters: tuple[Emitter, ...]) -> np.ndarray:
     """What arrives on patches from the lights, (p,): the mean over places in their cells, for shadows cross them."""
     share = (np.arange(_FINE) + 0.5) / _FINE
     a, b = np.stack(np.meshgrid(share, share), -1).reshape(-1, 2).T[:, :, None, None]
     first, right, _, left = patches.corners
     points = patches.points + first + a * (right - first) + b * (left - first)  # (cells, p, 3)
     start, found = points + _LIFT * scene.solid.extent * patches.normals, 0.0
-    for light, at in zip(scene.lights, lights_at, strict=True):
+    for emitter in emitters:
+        at = np.array(emitter.at)
         blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, ())
-        arriving = beam(light, at, points)
+        arriving = beam(emitter, points)
         cosine = np.maximum(np.einsum("cpi,pi->cp", arriving.to_light, patches.normals), 0)
         found = found + np.where((blocker < 0) | (t >= 1), arriving.strength * cosine, 0.0)
     return found.mean(0)

@@ -1,6 +1,7 @@
 """The light that arrives at points of the scene: its direction, its strength, its polarisation, its wavelengths.
 
-A new kind of light needs a class in `scenes.lights`, its beams here, and its description in `render.lights`.
+A new kind of light needs a class in `scenes.lights`, its nodes in `planner.imaging.emitters`, and its description in
+`render.lights`.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.imaging.emitters import Emitter
 from planner.imaging.reflectance import Index
-from scenes import Light, Scene
+from scenes import Luminaire, Scene
 
 
 class Beam(NamedTuple):
@@ -28,11 +30,23 @@ class Beam(NamedTuple):
     strength: np.ndarray | float
 
 
-def beam(light: Light, light_at: np.ndarray, points: np.ndarray, *, fall_off: bool = True) -> Beam:
-    """What a light at ``light_at`` (..., 3) sends to points (..., 3), cm; with ``fall_off`` by the inverse square."""
-    away = light_at - points
+def beam(emitter: Emitter, points: np.ndarray, axes: int = 0, *, fall_off: bool = True) -> Beam:
+    """What an emitter sends to points (..., 3), cm; with ``fall_off`` by the inverse square.
+
+    ``axes`` is how many axes the points have of their own, behind those of the pictures.
+    """
+    away = widened(np.asarray(emitter.at), axes) - points
     distance = np.linalg.norm(away, axis=-1)
-    return Beam(away / distance[..., None], (light.distance / distance) ** 2 if fall_off else 1.0)
+    to_light = away / distance[..., None]
+    strength = emitter.power / (distance if fall_off else emitter.distance) ** 2
+    if emitter.axis is not None:
+        strength = strength * np.maximum(-(to_light * widened(np.asarray(emitter.axis), axes)).sum(-1), 0.0)
+    return Beam(to_light, strength)
+
+
+def widened(values: np.ndarray, axes: int) -> np.ndarray:
+    """Vectors (..., 3) with some axes of length 1 before the last."""
+    return values.reshape(*values.shape[:-1], *[1] * axes, values.shape[-1])
 
 
 def squared_distance(starts: np.ndarray, stops: np.ndarray, fractions: np.ndarray, light_at: np.ndarray) -> np.ndarray:
@@ -64,7 +78,7 @@ def electric_field(beam_axis: np.ndarray, angle_deg: float) -> np.ndarray:
     return np.cos(angle) * down + np.sin(angle) * right
 
 
-def bands(scene: Scene, light: Light | None = None) -> tuple[Index, ...]:
+def bands(scene: Scene, light: Luminaire | None = None) -> tuple[Index, ...]:
     """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the material's table.
 
     Shares add up to 1, so that the exposure keeps its meaning: the grey level of a white diffuse surface.
@@ -77,7 +91,7 @@ def bands(scene: Scene, light: Light | None = None) -> tuple[Index, ...]:
     width = np.gradient(wavelength) if len(wavelength) > 2 else np.ones(len(wavelength))
     width[[0, -1]] = np.diff(wavelength)[[0, -1]] / 2 if len(wavelength) > 2 else 1.0
     share = width.copy()
-    for curve in (scene.camera.transmission, scene.camera.responsivity, (light or scene.light).spectrum):
+    for curve in (scene.camera.transmission, scene.camera.responsivity, (light or scene.lights[0]).spectrum):
         if curve:
             share *= np.interp(wavelength, *np.array(curve).T)
     share /= share.sum()

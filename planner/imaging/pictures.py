@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from planner.imaging.emitters import Emitter, emitters
 from planner.imaging.projection import light_position, sensor_position
-from scenes import InvalidInput, Picture, Scene
+from scenes import Backlight, InvalidInput, Luminaire, Picture, Scene
 from scenes.arrays import poses
 
 T = TypeVar("T")
@@ -26,7 +27,7 @@ class Pictures:
     sensors : ndarray, shape (..., 2)
         Polar angle and azimuth, degrees.
     lights : tuple of ndarray, shape (..., 2)
-        For each of the scene's lights; broadcast against the sensors.
+        For each of the scene's lights, also of those that are not free; broadcast against the sensors.
     closely : bool
         Whether this is one picture to be looked at closely: with the light that surfaces send to each other, and along
         circles (`planner.features.rim_look`). Many pictures are glanced at, which takes a thousandth of the time.
@@ -40,14 +41,22 @@ class Pictures:
 
     @classmethod
     def of(cls, scene: Scene | Picture, sensors: Any = None, lights: Any = None) -> Pictures:
-        """From a picture, or from a scene, sensors (..., 2) and the poses of its light (..., 2) or of each light."""
+        """From a picture, or a scene, sensors (..., 2) and poses of its free light (..., 2) or a tuple of them."""
         if isinstance(scene, Picture):
             return _of_picture(scene)
         if not isinstance(scene, Scene):
             raise InvalidInput(f"scene must be a Scene or a Picture, got {type(scene).__name__}")
-        each = () if lights is None else lights if isinstance(lights, tuple) and len(scene.lights) > 1 else (lights,)
-        parts = poses(sensors, "sensors"), tuple(poses(some, "lights") for some in each)
-        return cls(scene, *parts, bool(parts[1]) and all(part.ndim == 1 for part in (parts[0], *parts[1])))
+        sensors = poses(sensors, "sensors")
+        if lights is None and scene.free:
+            return cls(scene, sensors)
+        each = lights if isinstance(lights, tuple) and len(scene.free) != 1 else () if lights is None else (lights,)
+        if len(each) == len(scene.lights):
+            each = tuple(each[i] for i in scene.free)
+        if len(each) != len(scene.free):
+            raise InvalidInput(f"lights must be {len(scene.free)} arrays, one for each free light, got {len(each)}")
+        free = iter([poses(some, "lights") for some in each])
+        parts = tuple(next(free) if light.mount == "free" else _mounted(light, sensors) for light in scene.lights)
+        return cls(scene, sensors, parts, all(part.ndim == 1 for part in (sensors, *parts)))
 
     def with_scene(self, scene: Scene) -> Pictures:
         """The same poses in another scene."""
@@ -60,8 +69,13 @@ class Pictures:
 
     @property
     def lights_at(self) -> tuple[np.ndarray, ...]:
-        """Where each light stands, cm, shape (..., 3)."""
+        """Where each light's middle is, cm, shape (..., 3)."""
         return self.once("lights_at", self._lights_at)
+
+    @property
+    def emitters(self) -> tuple[Emitter, ...]:
+        """The points that shine: of each light one, or as many as its size calls for."""
+        return self.once("emitters", lambda: emitters(self.scene, self.lights, closely=self.closely))
 
     def _lights_at(self) -> tuple[np.ndarray, ...]:
         lit = zip(self.scene.lights, self.lights, strict=True)
@@ -72,6 +86,15 @@ class Pictures:
         if key not in self._known:
             self._known[key] = make()
         return self._known[key]
+
+
+def _mounted(light: Luminaire, sensors: np.ndarray) -> np.ndarray:
+    """Poses of a light that is not free, as `scenes.mounted` says of one."""
+    if light.mount == "fixed":
+        return np.array(list(light.pose))
+    if isinstance(light, Backlight):
+        return np.stack([180.0 - sensors[..., 0], (sensors[..., 1] + 180.0) % 360.0], -1)
+    return sensors
 
 
 @lru_cache(maxsize=64)

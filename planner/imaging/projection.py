@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.imaging.lens import image_centre, lens_jacobian, recorded
-from scenes import Camera, Light, Solid
+from scenes import Camera, Luminaire, Solid
 
 _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
 
@@ -47,9 +47,16 @@ def sensor_position(camera: Camera, poses: np.ndarray) -> np.ndarray:
     return np.array(camera.look_at) + camera.distance * direction(poses)
 
 
-def light_position(camera: Camera, light: Light, poses: np.ndarray) -> np.ndarray:
-    """Where a light stands, cm, shape (..., 3): on a sphere around the point that the camera looks at."""
-    return np.array(camera.look_at) + light.distance * direction(poses)
+def light_position(camera: Camera, light: Luminaire, poses: np.ndarray) -> np.ndarray:
+    """Where a light stands, cm, shape (..., 3): on a sphere around the point that the camera looks at.
+
+    One at the camera may be aside of the axis.
+    """
+    centre = np.array(camera.look_at) + light.distance * direction(poses)
+    if any(light.offset):
+        axes = frame(poses)
+        centre = centre + light.offset[0] * axes.right + light.offset[1] * axes.down
+    return centre
 
 
 def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:

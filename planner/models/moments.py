@@ -60,10 +60,10 @@ def _many_lights(scene, names, sensor, lights, count):
     powers = np.stack([np.ones_like(u), u, u * u], -1)
     points = edge_points(scene.solid, names, fractions).reshape(-1, 3)
     points = points - np.array(scene.camera.look_at)
-    plan = np.vstack([-2 * points.T, (points**2).sum(1) + scene.light.distance**2])
+    plan = np.vstack([-2 * points.T, (points**2).sum(1) + scene.lights[0].distance ** 2])
     found = np.empty((3, len(lights), len(names)))
     for at in range(0, len(lights), _BLOCK):
-        inverse = _inverse(scene.light.distance * direction(lights[at : at + _BLOCK]), plan)
+        inverse = _inverse(scene.lights[0].distance * direction(lights[at : at + _BLOCK]), plan)
         for e in range(len(names)):
             found[:, at : at + _BLOCK, e] = (inverse[:, e * count : (e + 1) * count] @ powers[e]).T
     return found
@@ -73,7 +73,7 @@ def _many_sensors(scene, names, sensors, light, count):
     """The same sums for one light and many sensors."""
     fractions = np.linspace(0, 1, count)
     points = edge_points(scene.solid, names, fractions) - np.array(scene.camera.look_at)
-    weights = 1 / ((scene.light.distance * direction(light) - points) ** 2).sum(-1)
+    weights = 1 / ((scene.lights[0].distance * direction(light) - points) ** 2).sum(-1)
     plan = np.vstack([-points.reshape(-1, 3).T, np.full(points.shape[0] * count, scene.camera.distance)])
     found = np.empty((3, len(sensors), len(names)))
     found[0] = weights.sum(-1)

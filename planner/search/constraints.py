@@ -122,7 +122,7 @@ class Constraints:
         apart = np.cos(np.radians(self.min_separation_deg)) if self.min_separation_deg > 0 else np.inf
         if self.same_mount:
             return float(apart)
-        camera, light = scene.camera.distance, scene.light.distance
+        camera, light = scene.camera.distance, scene.lights[0].distance
         bodies = _BODY * camera if self.camera_body is None else self.camera_body
         bodies += _BODY * light if self.light_body is None else self.light_body
         if bodies <= abs(camera - light):
@@ -166,7 +166,9 @@ def _outside(poses: np.ndarray, regions: tuple[Region, ...]) -> np.ndarray:
 def _in_view(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
     """Whether the light's image falls into the sensor's."""
     sensors, lights = np.broadcast_arrays(sensors, lights)
-    image = project(light_position(scene.camera, scene.light, lights)[..., None, :], sensors, scene.camera)[..., 0, :]
+    image = project(light_position(scene.camera, scene.lights[0], lights)[..., None, :], sensors, scene.camera)[
+        ..., 0, :
+    ]
     size = np.array([scene.camera.width, scene.camera.height])
     return ((image > -0.5) & (image < size - 0.5)).all(-1)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from planner import Pictures
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Luminaire, Scene
 
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
 
@@ -87,6 +88,12 @@ class Effect(ABC):
 def changed(scene: Scene, part: str, **values) -> Scene:
     """The scene with values of one part (``camera``, ``light``, ...) replaced."""
     return scene.model_copy(update={part: getattr(scene, part).model_copy(update=values)})
+
+
+def relit(scene: Scene, change: Callable[[Luminaire], Luminaire]) -> Scene:
+    """The scene with each of its lights replaced by what ``change`` makes of it."""
+    one, more = scene.light and change(scene.light), tuple(map(change, scene.several_lights))
+    return scene.model_copy(update={"light": one, "several_lights": more})
 
 
 def largest(bias: np.ndarray, variance: np.ndarray) -> Influence:

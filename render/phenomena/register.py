@@ -15,6 +15,7 @@ from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Satur
 from render.phenomena.shading import (
     Analyser,
     AttachedShadow,
+    BacklightShown,
     FallOff,
     LightSize,
     Polarisation,
@@ -28,7 +29,7 @@ REGISTER: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
-        Analyser(), Wavelength(), FallOff(), LightSize(), DepthOfField(),
+        Analyser(), Wavelength(), FallOff(), LightSize(), BacklightShown(), DepthOfField(),
         LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
         FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
     )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest
+from planner.imaging.backlight import backlights
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit
 from render.phenomena.edges import compare, lever, sides, total_variance
-from scenes import Scene
+from scenes import Backlight, Luminaire, Scene, as_point
 
 
 class AttachedShadow(Effect):
@@ -22,13 +23,10 @@ class AttachedShadow(Effect):
     def influence(self, pictures: Pictures) -> Influence:
         """Without it a face would be lit through the object."""
         found = sides(pictures)
-        away = np.einsum("efi,si->sef", found.normals, pictures.lights_at[0]) < np.einsum(
-            "efi,ei->ef", found.normals, found.points[:, 0]
-        )
-        seen = np.einsum("efi,si->sef", found.normals, pictures.sensor_at) > np.einsum(
-            "efi,ei->ef", found.normals, found.points[:, 0]
-        )
-        return EVERYTHING if (away & seen).any() else NOTHING
+        planes = np.einsum("efi,ei->ef", found.normals, found.points[:, 0])
+        seen = np.einsum("efi,si->sef", found.normals, pictures.sensor_at) > planes
+        away = (np.einsum("efi,...i->...ef", found.normals, emitter.at) < planes for emitter in pictures.emitters)
+        return EVERYTHING if any((seen & each).any() for each in away) else NOTHING
 
 
 class FallOff(Effect):
@@ -80,7 +78,7 @@ class Polarisation(Effect):
 
     def absent(self, pictures: Pictures) -> str | None:
         scene = pictures.scene
-        if scene.light.polarisation_deg is None:
+        if all(light.polarisation_deg is None for light in scene.lights):
             return "the light is unpolarised"
         return "diffuse reflection forgets polarisation" if scene.material.is_diffuse else None
 
@@ -89,7 +87,7 @@ class Polarisation(Effect):
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "light", polarisation_deg=None)
+        return relit(scene, lambda light: _changed(light, polarisation_deg=None))
 
 
 class Analyser(Effect):
@@ -133,33 +131,49 @@ class Wavelength(Effect):
 
 
 class LightSize(Effect):
-    """A light of finite radius: softer shading, lobes and shadows."""
+    """Lights of some size: softer shading, lobes and shadows."""
 
     name = "light_size"
     cost = 9.0
     random = True
-    has_formula = False
-    switch = "a sphere or a disc instead of a point"
+    switch = "spheres, discs, rectangles, rings and domes instead of points"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "the light is a point" if scene.light.radius == 0 else None
+        lights = [light for light in pictures.scene.lights if not isinstance(light, Backlight)]
+        one = "the light is a point" if len(lights) == 1 else "all lights are points"
+        return one if all(light.half_size == 0 for light in lights) else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        """Second order in the light's angle a: cos / r^2 changes by at most 2 a^2, a lobe m wide by (a / m)^2.
+        """Of the shading by quadrature over the lights against that of points in their middles.
 
-        Unbounded where a face is lit at less than 2 a, or where there is something to cast a penumbra on.
+        Unbounded where there is something to cast a penumbra on.
         """
         scene = pictures.scene
-        angle = scene.light.radius / scene.light.distance
-        found = sides(pictures)
-        towards = pictures.lights_at[0][:, None, None, None] - found.points[:, None]
-        sine = np.einsum("sefni,efi->sefn", towards, found.normals) / np.linalg.norm(towards, axis=-1)
-        if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
+        if scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
             return EVERYTHING
-        share = 2 * angle**2 + (0 if scene.material.is_diffuse else (angle / scene.material.roughness) ** 2)
-        moved = np.abs(found.shift(total_variance(scene))).max(-1) * share
-        return largest((lever(pictures) * moved).sum(-1), np.array([2 * share]))
+        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "light", radius=0.0)
+        return relit(scene, lambda light: light if isinstance(light, Backlight) else as_point(light))
+
+
+class BacklightShown(Effect):
+    """A light that the sensor sees behind the object."""
+
+    name = "backlight"
+    cost = 2.0
+    switch = "a bright plane behind the object; the whole frame is rendered"
+
+    def absent(self, pictures: Pictures) -> str | None:
+        return None if backlights(pictures.scene) else "there is no backlight"
+
+    def influence(self, pictures: Pictures) -> Influence:
+        """Everything: it is what outer edges are seen against."""
+        return EVERYTHING
+
+    def without(self, scene: Scene) -> Scene:
+        return relit(scene, lambda light: _changed(light, intensity=0.0) if isinstance(light, Backlight) else light)
+
+
+def _changed(light: Luminaire, **values) -> Luminaire:
+    return light.model_copy(update=values)

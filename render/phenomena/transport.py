@@ -27,7 +27,7 @@ class CastShadow(Effect):
         scene = pictures.scene
         if not scene.solid.is_convex:
             return EVERYTHING
-        lights = pictures.lights_at[0]
+        lights = np.concatenate([emitter.at.reshape(-1, 3) for emitter in pictures.emitters])
         points = sides(pictures).points.reshape(-1, 3)
         for obstacle in scene.obstacles:
             if any(_hides(obstacle.solid, points, light).any() for light in lights):
@@ -112,9 +112,10 @@ def _albedo(scene: Scene) -> float:
 
 
 def _gain(scene: Scene) -> float:
-    """Irradiance near the object is at most this times that at the reference point."""
+    """Irradiance near the object is at most this times what the camera's exposure stands for."""
     reach = float(np.linalg.norm(scene.solid.vertices - np.array(scene.camera.look_at), axis=1).max())
-    return (scene.light.distance / (scene.light.distance - reach)) ** 2
+    gains = (light.intensity / max(1 - reach / light.distance, 0.05) ** 2 for light in scene.lights)
+    return float(sum(gains))
 
 
 def _floor_levels(pictures: Pictures) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``parts`` and ``rate``."""
+"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``lights``, ``parts`` and ``rate``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
 from tests.proofs.kill import kill
 from tests.proofs.large import large
+from tests.proofs.lights import lights
 from tests.proofs.parts import parts
 from tests.proofs.rate import rate
 
@@ -16,6 +17,7 @@ app.command()(conditions)
 app.command()(crowded)
 app.command()(kill)
 app.command()(large)
+app.command()(lights)
 app.command()(parts)
 app.command()(rate)
 

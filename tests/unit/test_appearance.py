@@ -17,7 +17,7 @@ from planner.imaging.appearance import (
 )
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points
-from scenes import Floor, Noise, Obstacle, Picture, Scene
+from scenes import Floor, Noise, Obstacle, Picture
 from tests.oracle import axes
 
 FRACTIONS = np.array([0.07, 0.23, 0.41, 0.58, 0.77, 0.93])
@@ -190,11 +190,11 @@ def test_the_end_of_the_scale_takes_contrast_away(task1):
 
 
 @pytest.fixture
-def two_lights(monkeypatch, task1):
-    """Every scene has a second light, at 150 cm; none of the functions knows that there may be two."""
-    second = scenes.Light(distance=150.0)
-    monkeypatch.setattr(Scene, "lights", property(lambda self: (self.light, second)))
-    return task1.model_copy(update={"name": "two lights", "noise": Noise(sigma=2.4, dark_level=20.0)})
+def two_lights(task1):
+    """A second light, at 150 cm."""
+    both = task1.light, scenes.Light(distance=150.0)
+    noise = Noise(sigma=2.4, dark_level=20.0)
+    return task1.model_copy(update={"name": "two lights", "light": None, "several_lights": both, "noise": noise})
 
 
 def test_lights_add_up(two_lights, task1):

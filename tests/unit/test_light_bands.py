@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import scenes
+from planner.imaging.emitters import Emitter
 from planner.imaging.irradiance import bands, beam, electric_field, squared_distance
 from scenes import Light, Material
 from tests.oracle import axes
@@ -41,13 +42,14 @@ def test_one_band_without_a_table(task1):
 
 
 def test_beams_fall_off_with_the_square(rng):
-    light, at, points = Light(distance=50.0), np.array([10.0, -20.0, 60.0]), rng.uniform(-5, 5, (7, 3))
-    found = beam(light, at, points)
+    at, points = np.array([10.0, -20.0, 60.0]), rng.uniform(-5, 5, (7, 3))
+    emitter = Emitter(Light(distance=50.0), 0, at, None, 2500.0, 50.0)
+    found = beam(emitter, points)
     for point, to_light, strength in zip(points, found.to_light, found.strength, strict=True):
         away = np.sqrt(sum((a - p) ** 2 for a, p in zip(at, point, strict=True)))
         assert to_light * away == pytest.approx(at - point)
         assert strength == pytest.approx(2500 / away**2)
-    assert beam(light, at, points, fall_off=False).strength == 1.0
+    assert beam(emitter, points, fall_off=False).strength == 1.0
 
 
 def test_squared_distance_along_segments(rng):

@@ -27,7 +27,7 @@ def test_from_poses_pairs_or_a_picture(task1):
 
 
 def test_what_is_no_picture(task1):
-    with pytest.raises(InvalidInput, match=r"light must be 1 pose\(s\), one for each light, got 2"):
+    with pytest.raises(InvalidInput, match=r"light must be 1 pose\(s\), one for each free light, got 2"):
         Picture.of(task1, (30, 135), [(15, 315), (20, 30)])
     with pytest.raises(InvalidInput, match=r"sensor: pose must be a pair .*, got None"):
         Picture.of(task1)

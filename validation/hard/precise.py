@@ -33,7 +33,7 @@ class Inputs:
     def of(cls, scene: Scene, sensor, light) -> Inputs:
         """Exactly the floating-point numbers of a scene and a setting."""
         exact = [tuple(mpf(float(x)) for x in values) for values in (sensor, light)]
-        distances = mpf(scene.camera.distance), mpf(scene.light.distance)
+        distances = mpf(scene.camera.distance), mpf(scene.lights[0].distance)
         vertices = tuple(tuple(mpf(x) for x in row) for row in scene.solid.vertices.tolist())
         return cls(*exact, distances, vertices)
 
@@ -179,4 +179,4 @@ def contrast(scene: Scene, view: View, faces, point, fall_off: bool):
         for f in faces
     ]
     difference = mpf(scene.camera.exposure) * (levels[0] - levels[1])
-    return difference * mpf(scene.light.distance) ** 2 / distance2 if fall_off else difference
+    return difference * mpf(scene.lights[0].distance) ** 2 / distance2 if fall_off else difference

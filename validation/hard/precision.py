@@ -29,7 +29,7 @@ def paper_in(kind: type, scene: Scene, sensors: np.ndarray, lights: np.ndarray) 
     solid = scene.solid
     vertices, normals, offsets = (a.astype(kind) for a in (solid.vertices, solid.normals, solid.offsets))
     eye, right, down = _frame(sensors.astype(kind))
-    lamp = kind(scene.light.distance) * _frame(lights.astype(kind))[0]
+    lamp = kind(scene.lights[0].distance) * _frame(lights.astype(kind))[0]
     eye_height = kind(scene.camera.distance) * eye @ normals.T - offsets
     light_height = np.maximum(lamp @ normals.T - offsets, 0)
     albedo = (1 - scene.material.specular_fraction) * scene.material.diffuse_reflectance

@@ -56,13 +56,13 @@ def _distance(name: str, scene: Scene, sensor) -> Case:
 def _level(name: str, scene: Scene, light) -> Case:
     """Grey level in the middle of the top face, against cosine over squared distance, from above."""
     middle = scene.solid.vertices[list(scene.solid.faces[0])].mean(0)
-    away = scene.light.distance * np.array(
+    away = scene.lights[0].distance * np.array(
         [np.sin(np.radians(light[0])) * np.cos(np.radians(light[1])),
          np.sin(np.radians(light[0])) * np.sin(np.radians(light[1])), np.cos(np.radians(light[0]))]
     ) - middle  # fmt: skip
     size = np.linalg.norm(away)
     white = scene.camera.exposure * (1 - scene.material.specular_fraction) * scene.material.diffuse_reflectance
-    exact = white * away[2] / size * (scene.light.distance / size) ** 2
+    exact = white * away[2] / size * (scene.lights[0].distance / size) ** 2
     x, y = np.rint(project(middle[None], np.array([0.0, 0.0]), scene.camera)[0]).astype(int)
 
     def ours() -> Answer:
