@@ -171,15 +171,18 @@ def _dome(light: Dome, share: np.ndarray, weight: np.ndarray, around: np.ndarray
 
 
 def _sphere(light: Light, count: int) -> Nodes:
-    """Gauss-Chebyshev shells of density 1 / sqrt(1 - r^2), whose projection is a disc, with Gauss nodes on each."""
-    shells = np.sin((np.arange(_SHELLS) + 0.5) * np.pi / (2 * _SHELLS))
+    """Gauss-Chebyshev shells of density 1 / sqrt(1 - r^2), whose projection is a disc, with Gauss nodes on each.
+
+    The shells are turned against each other, so that a horizon meets their nodes one by one.
+    """
+    shells = np.sin((np.arange(_SHELLS) + 0.5) * np.pi / (2 * _SHELLS))[:, None, None]
     cosine, weight = np.polynomial.legendre.leggauss(count)
-    angle = (np.arange(2 * count) + 0.5) * np.pi / count
+    angle = (np.arange(2 * count) + np.arange(1, _SHELLS + 1)[:, None, None] / (_SHELLS + 1)) * np.pi / count
     sine = np.sqrt(1 - cosine**2)[:, None]
-    ways = np.stack(np.broadcast_arrays(sine * np.cos(angle), cosine[:, None], sine * np.sin(angle)), -1).reshape(-1, 3)
-    powers = np.outer(shells**2 / (shells**2).sum(), np.repeat(weight / 2 / angle.size, angle.size)).ravel()
-    places = (light.radius * shells[:, None, None] * ways).reshape(-1, 3)
-    return Nodes(places, None, light.intensity * light.distance**2 * powers)
+    ways = np.stack(np.broadcast_arrays(sine * np.cos(angle), cosine[:, None], sine * np.sin(angle)), -1)
+    powers = np.broadcast_to(shells**2 / (shells**2).sum() * weight[:, None] / (4 * count), ways.shape[:-1])
+    power = light.intensity * light.distance**2
+    return Nodes((light.radius * shells[..., None] * ways).reshape(-1, 3), None, power * powers.ravel())
 
 
 def _cone(light: Backlight) -> Nodes:
