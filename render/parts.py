@@ -47,8 +47,9 @@ def parts(picture: Picture, active: frozenset[str]) -> list[Part]:
     found, seen = [], backlights(picture.scene)
     for i, light in enumerate(picture.scene.lights):
         lone = _lone(picture, i)
-        if i in seen:  # it has a size that nothing can do without
-            found.append(Part(lone, active | {"light_size"}))
+        if i in seen:
+            if "spill" in active:  # it has a size that nothing can do without
+                found.append(Part(lone, active | {"light_size"}))
         elif light.intensity > 0:
             found.append(Part(lone, active if light.half_size else active - {"light_size"}))
         if i in seen:

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from planner.imaging.appearance import signal
+from planner.imaging.emitters import SMOOTH, emitters, is_point
 from planner.imaging.irradiance import beam
 from planner.imaging.pictures import Pictures
 from render.meshes import mesh
@@ -33,7 +34,7 @@ _FEWEST, _MOST = 16, 1 << 22  # intervals along a side, nodes
 _PARTS = 8  # of a side, over which errors are averaged
 _LOBE = 0.5  # roughnesses that a facet's slope may differ by between neighbours of the first table, lest it miss a lobe
 _AT_ONCE = 1 << 13  # points whose temporary arrays stay in the processor's cache
-_GRAZING = 1e-9  # sine: light or sensor in the face's plane
+_GRAZING, _LOW = 1e-9, 0.02  # sines: light or sensor in the face's plane; the middle of a light of some size near it
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Face:
 
 
 def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
-    """The solid's surface in parts, or None where a table would need too many nodes or a face sees part of a light.
+    """The solid's surface in parts, or None where a table would need too many nodes or a light's middle is too low.
 
     Faces that are dark or turned away share one part, of brightness 0.
 
@@ -68,14 +69,16 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     """
     found, dark = [], np.ones(len(solid.triangles), bool)
     pictures = Pictures.of(picture)
+    smooth = replace(pictures, _known={"emitters": emitters(pictures.scene, pictures.lights, SMOOTH)})
     above = np.array([_over(solid, emitter.at) for emitter in pictures.emitters]).reshape(-1, len(solid.normals))
-    lit = above.all(0) & _over(solid, pictures.lights_at[0])
+    small = is_point(pictures.scene.lights)
+    lit = _over(solid, pictures.lights_at[0], _GRAZING if small else _LOW)
     seen = _over(solid, pictures.sensor_at)
-    if (above.any(0) & ~lit & seen).any():
-        return None  # a horizon crosses the light
+    if (above.any(0) & ~lit & seen).any() and not small:
+        return None  # lit from the rim of a light whose middle is below the horizon
     for index in np.flatnonzero(lit & seen):
         of_face = solid.triangle_faces == index
-        made = _face(solid.triangles[of_face], solid.normals[index], pictures)
+        made = _face(solid.triangles[of_face], solid.normals[index], smooth if above[:, index].all() else pictures)
         if made is None:
             return None
         found.append(made)
@@ -84,9 +87,9 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     return (*found, Face(rest, np.zeros((*rest.shape[:2], 2)), np.zeros((2, 2))))
 
 
-def _over(solid: Solid, place: np.ndarray) -> np.ndarray:
-    """Which faces a place is over by more than rounding, bool (F,)."""
-    return solid.normals @ place - solid.offsets > _GRAZING * np.linalg.norm(place)
+def _over(solid: Solid, place: np.ndarray, sine: float = _GRAZING) -> np.ndarray:
+    """Which faces a place is over by more than a part of its distance from the origin, bool (F,)."""
+    return solid.normals @ place - solid.offsets > sine * np.linalg.norm(place)
 
 
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from planner.imaging.bore import Bore, bores, light_in_bore, place_in
-from planner.imaging.emitters import Emitter
+from planner.imaging.emitters import GLANCE, Emitter, emitters
 from planner.imaging.exchange import Exchanged, exchanged
 from planner.imaging.pictures import Pictures
 from planner.imaging.reflectance import diffuse
@@ -23,15 +23,15 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     scene = pictures.scene
     if not pictures.closely or scene.solid.is_convex or not points.size:
         return 0.0
-    emitters = tuple(_plain(emitter) for emitter in pictures.emitters)
+    shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
-    lent = _of_faces(scene, emitters)
+    lent = _of_faces(scene, shining)
     found = np.zeros(shape) if lent is None else lent.at(points, faces)
     for bore in bores(scene.solid):
         inside = np.isin(faces, bore.faces)
         if inside.any():
-            found[inside] = _of_wall(scene, emitters, bore).ev(*place_in(bore, points[inside]))
+            found[inside] = _of_wall(scene, shining, bore).ev(*place_in(bore, points[inside]))
     return scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None) * found
 
 
@@ -41,12 +41,12 @@ def _plain(emitter: Emitter) -> Emitter:
     return emitter._replace(at=at, axis=axis)
 
 
-def _of_faces(scene: Scene, emitters: tuple[Emitter, ...]) -> Exchanged | None:
+def _of_faces(scene: Scene, shining: tuple[Emitter, ...]) -> Exchanged | None:
     """Light between plane faces."""
-    return exchanged(scene, emitters, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
+    return exchanged(scene, shining, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
 
 
 @lru_cache(maxsize=64)
-def _of_wall(scene: Scene, emitters: tuple[Emitter, ...], bore: Bore) -> RectBivariateSpline:
+def _of_wall(scene: Scene, shining: tuple[Emitter, ...], bore: Bore) -> RectBivariateSpline:
     """Light that a bore's wall has."""
-    return light_in_bore(scene, emitters, bore, _of_faces(scene, emitters))
+    return light_in_bore(scene, shining, bore, _of_faces(scene, shining))

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from planner.imaging.emitters import Emitter, emitters
+from planner.imaging.emitters import FULL, GLANCE, Emitter, emitters
 from planner.imaging.projection import light_position, sensor_position
 from scenes import Backlight, InvalidInput, Luminaire, Picture, Scene
 from scenes.arrays import poses
@@ -75,7 +75,7 @@ class Pictures:
     @property
     def emitters(self) -> tuple[Emitter, ...]:
         """The points that shine: of each light one, or as many as its size calls for."""
-        return self.once("emitters", lambda: emitters(self.scene, self.lights, closely=self.closely))
+        return self.once("emitters", lambda: emitters(self.scene, self.lights, FULL if self.closely else GLANCE))
 
     def _lights_at(self) -> tuple[np.ndarray, ...]:
         lit = zip(self.scene.lights, self.lights, strict=True)

@@ -10,9 +10,11 @@ from planner.features.locator import reach
 from planner.features.measurand import Measurands, measurands, normals
 from planner.features.projected_edges import ProjectedEdges, cut, end_depths, image_fractions
 from planner.imaging.appearance import edge_contrast
+from planner.imaging.backlight import backlights
 from planner.imaging.lens import blur_at, lens_jacobian
 from planner.imaging.pictures import Pictures
 from planner.imaging.visibility import longest_span
+from scenes import Edge
 
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -95,10 +97,26 @@ def used_trims(pictures: Pictures, view: ProjectedEdges, *, trimmed: bool) -> np
     trims = view.framed if trimmed else np.zeros_like(view.trims)
     if scene.bodies.is_convex or not view.names:
         return trims
-    positions = pictures.sensor_at, *pictures.lights_at
-    spans = [longest_span(scene.bodies, scene.solid.edge(name), *positions) for name in view.names]
+    spans = [_span(pictures, scene.solid.edge(name)) for name in view.names]
     shown = image_fractions(scene, view.names, pictures.sensors, np.stack(spans, -2))
     return cut(trims, shown, view.lengths, reach(scene.locator.scale_px, scene.camera.blur_px) if trimmed else 0.0)
+
+
+def _span(pictures: Pictures, edge: Edge) -> np.ndarray:
+    """The longest part (..., 2) of an edge that the sensor sees and that lies in no light's shadow.
+
+    Of several lights, those that do not reach the edge at all are passed over.
+    """
+    bodies, sensor_at, shown = pictures.scene.bodies, pictures.sensor_at, backlights(pictures.scene)
+    lights_at = [at for i, at in enumerate(pictures.lights_at) if i not in shown]
+    if len(lights_at) == 1:
+        return longest_span(bodies, edge, sensor_at, *lights_at)
+    found = longest_span(bodies, edge, sensor_at)
+    for at in lights_at:
+        lit = longest_span(bodies, edge, sensor_at, at)
+        both = np.stack([np.maximum(found[..., 0], lit[..., 0]), np.minimum(found[..., 1], lit[..., 1])], -1)
+        found = np.where(both[..., :1] < both[..., 1:], both, found)
+    return found
 
 
 def integral(values: np.ndarray, length: np.ndarray) -> np.ndarray:

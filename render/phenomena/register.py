@@ -20,6 +20,7 @@ from render.phenomena.shading import (
     LightSize,
     Polarisation,
     SpecularLobe,
+    Spill,
     Wavelength,
 )
 from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
@@ -29,7 +30,7 @@ REGISTER: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
-        Analyser(), Wavelength(), FallOff(), LightSize(), BacklightShown(), DepthOfField(),
+        Analyser(), Wavelength(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
         LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
         FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
     )

@@ -7,7 +7,8 @@ import numpy as np
 from planner import Pictures
 from planner.imaging.backlight import backlights
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit
-from render.phenomena.edges import compare, lever, sides, total_variance
+from render.phenomena.edges import NEAR_STEP, compare, lever, sides, total_variance
+from render.phenomena.transport import albedo
 from scenes import Backlight, Luminaire, Scene, as_point
 
 
@@ -173,6 +174,28 @@ class BacklightShown(Effect):
 
     def without(self, scene: Scene) -> Scene:
         return relit(scene, lambda light: _changed(light, intensity=0.0) if isinstance(light, Backlight) else light)
+
+
+class Spill(Effect):
+    """Light of a backlight that falls on the object's sides."""
+
+    name = "spill"
+    cost = 9.0
+    random = True
+    switch = "rays from the object to the backlight"
+
+    def absent(self, pictures: Pictures) -> str | None:
+        return None if backlights(pictures.scene) else "there is no backlight"
+
+    def influence(self, pictures: Pictures) -> Influence:
+        """A side along the axis has (c - sin c cos c) / pi of the radiance of a cone of half angle c, c = 90 degrees
+        half of it; one that the sensor sees from within the cone at most twice that."""
+        scene = pictures.scene
+        cones = (np.radians(scene.lights[which].cone_deg) for which in backlights(scene))
+        share = float(sum(2 * (cone - np.sin(cone) * np.cos(cone)) / np.pi for cone in cones)) * albedo(scene)
+        moved = NEAR_STEP * np.sqrt(total_variance(scene)) * share
+        lost = 1 / (1 - share) ** 2 - 1 if share < 1 else np.inf
+        return largest((lever(pictures) * moved).sum(-1), np.array([lost]))
 
 
 def _changed(light: Luminaire, **values) -> Luminaire:

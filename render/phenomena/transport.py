@@ -79,15 +79,15 @@ class Interreflection(Effect):
         scene = pictures.scene
         if any(scene.solid.circle(name).hole for name in circles(scene)):
             return EVERYTHING
-        own, albedo, bodies = sides(pictures), _albedo(scene), _bodies(scene)
+        own, white, bodies = sides(pictures), albedo(scene), _bodies(scene)
         reflectance = scene.floor.reflectance if scene.floor else 0.0
         down = np.broadcast_to(((1 - own.normals[..., 2]) / 2)[..., None], own.levels.shape[1:])
         brightest = scene.camera.exposure * _gain(scene)
         rest = [_form_factor(body, own.points, own.normals) for body in bodies]
         to_solids = np.minimum(sum(rest), 1.0) if rest else np.zeros(own.levels.shape[1:])
-        multiple = 1 / (1 - albedo * max(reflectance, albedo if bodies else 0.0) * 0.5)
-        faces = albedo * (down * reflectance + to_solids * albedo) * brightest
-        behind = reflectance * 0.5 * albedo * brightest
+        multiple = 1 / (1 - white * max(reflectance, white if bodies else 0.0) * 0.5)
+        faces = white * (down * reflectance + to_solids * white) * brightest
+        behind = reflectance * 0.5 * white * brightest
         levels = multiple * (faces.max(1) + behind)
         near = min([_clearance(own.points, body) for body in bodies] + _above_floor(scene, own.points))
         return added_light(pictures, np.broadcast_to(levels, own.contrast.shape), max(near, 1e-3))
@@ -103,7 +103,7 @@ def _bodies(scene: Scene) -> list[Solid]:
     return [obstacle.solid for obstacle in scene.obstacles] + ([] if scene.solid.is_convex else [scene.solid])
 
 
-def _albedo(scene: Scene) -> float:
+def albedo(scene: Scene) -> float:
     """At most this part of the light is sent on."""
     material = scene.material
     return (1 - material.specular_fraction) * material.diffuse_reflectance + (

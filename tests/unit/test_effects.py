@@ -27,7 +27,7 @@ def active(scene, **tolerance):
 def test_register_has_every_effect_once():
     wanted = (
         "attached_shadow cast_shadow interreflection floor specular_lobe polarisation analyser wavelength fall_off "
-        "light_size backlight depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern "
+        "light_size backlight spill depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern "
         "quantisation saturation pose_jitter"
     )
     assert set(REGISTER) == set(wanted.split())
