@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -16,12 +16,15 @@ from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates, edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
+from planner.search.poses import as_array, as_poses
 from planner.search.refinement import refine
+from planner.search.sharing import Shared, applies, by_turns, search_shared, shares_of, shares_of_two
 from planner.search.trusted import trusted, untrusted
 from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Picture, Pose, Scene, Task
+from scenes import InvalidInput, Picture, Pose, Scene, Task, several
 
 Search = Literal["exhaustive", "alternating"]
+Shares = Literal["best", "given"]
 COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
 
 
@@ -33,8 +36,13 @@ class Plan:
     ----------
     scene : Scene
         The scene, its task with the required edges that the plan uses: ready to predict, render and measure.
-    sensor, light : Pose
-        Continuous if refined, else on the grid.
+    sensor : Pose
+    light : Pose or tuple of Pose
+        Of the light that is free, or of all that are. Continuous if refined, else on the grid.
+    shares : tuple of float
+        Of each light of several, of the sum of their intensities; the scene's intensities are made of them.
+    alone : float or None
+        Of two lights: what is minimised on the grid where one of them has all.
     objective, over, model : str
     variance : float
         What was minimised: the scene's unit squared or px^2 (degrees^2 for an angle); of several measurands the squared
@@ -65,14 +73,16 @@ class Plan:
 
     scene: Scene
     sensor: Pose
-    light: Pose
+    light: Pose | tuple[Pose, ...]
+    shares: tuple[float, ...]
+    alone: float | None
     objective: str
     over: str
     model: str
     variance: float
     limiting: str
     grid_sensor: Pose
-    grid_light: Pose
+    grid_light: Pose | tuple[Pose, ...]
     grid_variance: float
     prediction: Prediction
     trace: tuple[Step, ...]
@@ -85,8 +95,8 @@ class Plan:
     set_aside: tuple[Candidate, ...]
 
     @property
-    def poses(self) -> tuple[Pose, Pose]:
-        """Sensor and light."""
+    def poses(self) -> tuple[Pose, Pose | tuple[Pose, ...]]:
+        """Sensor and light, or lights."""
         return self.sensor, self.light
 
 
@@ -103,6 +113,7 @@ def plan(
     sensor: Any = None,
     light: Any = None,
     start: Any = (40, 41),
+    shares: Shares = "best",
     refined: bool = True,
     report: Report | None = None,
 ) -> Plan:
@@ -130,6 +141,8 @@ def plan(
         Hold one fixed.
     start : Pose or pair
         Where the alternating search's sensor begins.
+    shares : {"best", "given"}
+        Of two lights: search the shares that they have of the sum of their intensities, or keep them.
     refined : bool
         Whether to descend below the grid step.
 
@@ -149,12 +162,14 @@ def plan(
     variance_model(model)
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
+    _check("shares", shares, get_args(Shares))
     constraints = constraints or Constraints()
     sensor, light = _fixed(scene, constraints, sensor, light)
     tasks = required_edges(scene) if edges == "best" else ()
     worlds = [with_task(scene, task) for task in tasks] or [scene]
     options = [_Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
-    found = [option.search(aim, search, start, report) for option in options]
+    found = [option.search(aim, search, start, report, shares == "best") for option in options]
+    options = [option.with_lights(result.shared) for option, result in zip(options, found, strict=True)]
     best = min(range(len(found)), key=lambda k: found[k].variance)
     if not np.isfinite(found[best].variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
@@ -177,11 +192,11 @@ def _fixed(scene: Scene, constraints: Constraints, sensor: Any, light: Any) -> t
     if constraints.same_mount:
         sensor, light = (light if sensor is None else sensor), (sensor if light is None else light)
     if sensor is not None and light is not None:
-        poses = [scene.check_pose(*pair) for pair in (("sensor", sensor), ("light", light))]
-        if not constraints.pairs(scene, *(np.array(list(pose)) for pose in poses)):
+        pose, lights = scene.check_pose("sensor", sensor), scene.check_lights(several(light))
+        if not constraints.pairs(scene, np.array(list(pose)), as_array(lights)):
             raise InvalidInput(
-                f"sensor and light must keep the constraints on both (mount, separation, bodies, view), got {poses[0]}"
-                f" and {poses[1]}"
+                f"sensor and light must keep the constraints on both (mount, separation, bodies, view), got {pose} and "
+                + " ".join(map(str, lights))
             )
     return sensor, light
 
@@ -200,6 +215,7 @@ class _Result:
     variance: float
     partial: Partial | None
     found: Found | None
+    shared: Shared | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,21 +235,24 @@ class _Option:
         fast = has_bound(scene, model)
         step = (1.0 if fast else COARSE_STEP) if step_deg is None else step_deg
         sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
-        lights = ViewingSpace(step, constraints.light_polar_deg).poses
-        sensors, lights = sensors[constraints.sensors(scene, sensors)], lights[constraints.lights(lights)]
+        lights = ViewingSpace(step, constraints.light_polar_deg).poses if scene.free else np.zeros((1, 0))
+        sensors = sensors[constraints.sensors(scene, sensors)]
+        lights = lights[constraints.lights(lights)] if scene.free else lights
         if sensor is not None:
             sensors = np.array([list(scene.check_pose("sensor", sensor))])
             _keep("sensor", sensors, constraints.sensors(scene, sensors))
         if light is not None:
-            lights = np.array([list(scene.check_pose("light", light))])
-            _keep("light", lights, constraints.lights(lights))
+            lights = as_array(scene.check_lights(several(light)))[None]
+            _keep("light", lights.reshape(-1, 2), constraints.lights(lights.reshape(-1, 2)))
         if not len(sensors) or not len(lights):
             raise InvalidInput("constraints must leave a pose for sensor and light, got none")
         return cls(scene, model, step, constraints, sensors, lights, sensor is None and light is None)
 
-    def search(self, aim: Aim, search: str, start: Any, report: Report | None) -> _Result:
+    def search(self, aim: Aim, search: str, start: Any, report: Report | None, shares: bool) -> _Result:
+        if len(self.scene.lights) > 1 and self.free:
+            return self._search_lights(aim, report, shares)
         partial = found = None
-        plain = self.free and not self.constraints.coupled
+        plain = self.free and len(self.scene.free) == 1 and not self.constraints.coupled
         if plain:
             spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
             begin, limits = np.array(list(Pose.of(start))), self.constraints
@@ -242,6 +261,21 @@ class _Option:
             found = exhaustive(self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report)
         best = found or partial
         return _Result(self.sensors[best.sensor], self.lights[best.light], best.variance, partial, found)
+
+    def _search_lights(self, aim: Aim, report: Report | None, shares: bool) -> _Result:
+        """Several lights at once, or one after the other where their contrasts do not tell of mixtures."""
+        how = self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report or (lambda *_: None)
+        if applies(self.scene, self.model):
+            mixed = shares_of_two(self.scene) if shares else (shares_of(self.scene),)
+            shared = search_shared(*how, mixed)
+        else:
+            shared = by_turns(*how)
+        found = shared.found
+        return _Result(self.sensors[found.sensor], shared.lights[found.light], found.variance, None, found, shared)
+
+    def with_lights(self, shared: Shared | None) -> _Option:
+        """With the lights that a search of several found for each sensor."""
+        return self if shared is None else replace(self, scene=shared.scene, lights=shared.lights)
 
 
 class _Allowed(ViewingSpace):
@@ -265,7 +299,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         starts = [(sensor, light)]
         if not chosen.set_aside and (found is None or not has_bound(scene, option.model)):
             others = [c for c in choice[1:3] if c.edges == edges_of(scene)]
-            starts += [(np.array(list(c.sensor)), np.array(list(c.light))) for c in others]
+            starts += [(np.array(list(c.sensor)), as_array(c.light)) for c in others]
         limits = option.step_deg, option.constraints
         descents = [refine(scene, *at, *how, *limits, sizes=(0.7,)) for at in starts]
         sensor, light, _ = min(descents, key=lambda descent: descent[2])
@@ -274,18 +308,20 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
             sensor, light = chosen.sensor, chosen.light
     if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look
         variance = _closely(scene, sensor, light, *how)
-    prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)
+    prediction = predict(scene, tuple(map(float, sensor)), as_poses(light), option.model)
     return Plan(
         scene=scene,
         sensor=Pose(*map(float, sensor)),
-        light=Pose(*map(float, light)),
+        light=as_poses(light),
+        shares=shares_of(scene) if len(scene.lights) > 1 else (),
+        alone=result.shared and result.shared.alone,
         objective=aim.unit,
         over=aim.over,
         model=option.model,
         variance=float(variance),
         limiting=prediction.limiting or prediction.measurands[0].name,
         grid_sensor=Pose(*map(float, result.sensor)),
-        grid_light=Pose(*map(float, result.light)),
+        grid_light=as_poses(result.light),
         grid_variance=float(on_grid),
         prediction=prediction,
         trace=partial.trace if partial else (),
@@ -301,11 +337,23 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
 
 def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:
     """What is minimised, of one picture looked at closely."""
-    picture = Picture.of(scene, tuple(map(float, sensor)), tuple(map(float, light)))
+    picture = Picture.of(scene, tuple(map(float, sensor)), as_poses(light))
     return float(minimised(variance_model(model)(Pictures.of(picture)), aim))
 
 
 def _guarantee(option: _Option, found: Found | None) -> str:
+    if option.lights.shape[1] > 2 or len(option.scene.lights) > 1:
+        return _of_lights(option, found)
     if found is None:
         return "none: a partial optimum, no neighbour of the sensor and none of the light is better"
     return f"no pair of the {option.step_deg:g} degree grid is better; between its directions a better one may lie"
+
+
+def _of_lights(option: _Option, found: Found | None) -> str:
+    """What is known where there are several lights."""
+    if not applies(option.scene, option.model) or found is None:
+        return "none: a partial optimum, no other place of the sensor or of one of the lights is better"
+    return (
+        f"no sensor and lights of the {option.step_deg:g} degree grid are better, shares in tenths, by the formula of"
+        " long edges; between them better ones may lie"
+    )

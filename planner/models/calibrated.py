@@ -12,7 +12,7 @@ from planner.models.along import NODE_WEIGHTS, Along, Nodes
 from planner.models.errors import Errors, combined
 
 SHORT = 10.0  # smoothing scales: shorter edges take the double integral
-_ROUGH = 4.0  # ratio of squared contrasts along an edge beyond which points are dropped
+ROUGH = 4.0  # ratio of squared contrasts along an edge beyond which points are dropped
 
 
 def calibrated(pictures: Pictures) -> Errors:
@@ -44,7 +44,7 @@ def calibrated(pictures: Pictures) -> Errors:
             if short.any():
                 variance[short] = _double_integral(*_picked(nodes, weight * np.sqrt(per_point), short), scale)
             if not is_separable(scene):
-                rough = squared.max(-1) > _ROUGH * squared.min(-1)
+                rough = squared.max(-1) > ROUGH * squared.min(-1)
                 kept = squared >= MIN_CONTRAST**2 * noise
                 first_order = _first_order(nodes, a, b, per_point, kept)
                 variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)

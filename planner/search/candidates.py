@@ -11,6 +11,7 @@ from planner.imaging.projection import direction
 from planner.models import variance_model
 from planner.prediction import minimised
 from planner.search.aim import Aim
+from planner.search.poses import as_poses
 from scenes import Picture, Pose, Scene
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
@@ -22,7 +23,9 @@ class Candidate:
 
     Attributes
     ----------
-    sensor, light : Pose
+    sensor : Pose
+    light : Pose or tuple of Pose
+        Of the lights that are free.
     edges : tuple of str
         Required edges.
     variance_object, variance_image : float
@@ -34,7 +37,7 @@ class Candidate:
     """
 
     sensor: Pose
-    light: Pose
+    light: Pose | tuple[Pose, ...]
     edges: tuple[str, ...]
     variance_object: float
     variance_image: float
@@ -67,7 +70,7 @@ def candidates(options, results, aim: Aim, count: int = 10):
 
 
 def _candidate(option, sensor: np.ndarray, light: np.ndarray, aim: Aim) -> Candidate:
-    poses = Pose(*map(float, sensor)), Pose(*map(float, light))
+    poses = Pose(*map(float, sensor)), as_poses(light)
     found = variance_model(option.model)(Pictures.of(Picture.of(option.scene, *poses)))
     worst = int(np.argmax(found.variances_object * aim.shares))
     return Candidate(
@@ -100,4 +103,10 @@ def _spread(directions: np.ndarray, count: int) -> list[int]:
 def _differ(row: tuple, other: tuple) -> bool:
     """Whether sensors or lights are clearly apart."""
     near = np.cos(np.radians(_APART))
-    return any(direction(row[i]) @ direction(other[i]) < near for i in (2, 3))
+    pairs = zip(_each(row), _each(other), strict=True)
+    return any(direction(one) @ direction(two) < near for one, two in pairs)
+
+
+def _each(row: tuple) -> np.ndarray:
+    """Poses of sensor and lights, (1 + F, 2)."""
+    return np.concatenate([row[2], row[3]]).reshape(-1, 2)

@@ -108,21 +108,28 @@ class Constraints:
         return allowed & _around(poses, self.light_azimuth_deg)
 
     def pairs(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
-        """Which pairs of poses (..., 2), broadcast, are allowed; bool, shape (...)."""
+        """Which pairs of a sensor's (..., 2) and the free lights' (..., 2 F) poses, broadcast, are allowed; bool."""
+        allowed = np.ones(np.broadcast_shapes(sensors.shape[:-1], lights.shape[:-1]), bool)
+        for i, which in enumerate(scene.free):
+            allowed &= self._pairs(scene, sensors, lights[..., 2 * i : 2 * i + 2], which)
+        return allowed
+
+    def _pairs(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray, which: int) -> np.ndarray:
+        """The same of one of the lights."""
         cosine = _cosines(direction(sensors), direction(lights))
-        allowed = cosine <= self._most(scene)
+        allowed = cosine <= self._most(scene, which)
         if self.same_mount:
             allowed = allowed & (cosine > 1 - 1e-12)
         if self.light_out_of_view:
-            allowed = allowed & ~_in_view(scene, sensors, lights)
+            allowed = allowed & ~_in_view(scene, sensors, lights, which)
         return allowed
 
-    def _most(self, scene: Scene) -> float:
-        """Largest cosine of the angle between sensor and light; above 1 where any is allowed."""
+    def _most(self, scene: Scene, which: int) -> float:
+        """Largest cosine of the angle between sensor and a light; above 1 where any is allowed."""
         apart = np.cos(np.radians(self.min_separation_deg)) if self.min_separation_deg > 0 else np.inf
         if self.same_mount:
             return float(apart)
-        camera, light = scene.camera.distance, scene.lights[0].distance
+        camera, light = scene.camera.distance, scene.lights[which].distance
         bodies = _BODY * camera if self.camera_body is None else self.camera_body
         bodies += _BODY * light if self.light_body is None else self.light_body
         if bodies <= abs(camera - light):
@@ -130,9 +137,11 @@ class Constraints:
         return float(min(apart, (camera**2 + light**2 - bodies**2) / (2 * camera * light)))
 
     def allows(self, scene: Scene, sensor: np.ndarray, light: np.ndarray) -> bool:
-        """Whether one setting is allowed."""
+        """Whether one setting, a sensor (2,) and the free lights (2 F,), is allowed."""
         return bool(
-            self.sensors(scene, sensor[None])[0] and self.lights(light[None])[0] and self.pairs(scene, sensor, light)
+            self.sensors(scene, sensor[None])[0]
+            and self.lights(light.reshape(-1, 2)).all()
+            and self.pairs(scene, sensor, light)
         )
 
 
@@ -163,10 +172,10 @@ def _outside(poses: np.ndarray, regions: tuple[Region, ...]) -> np.ndarray:
     return allowed
 
 
-def _in_view(scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+def _in_view(scene: Scene, sensors: np.ndarray, lights: np.ndarray, which: int) -> np.ndarray:
     """Whether the light's image falls into the sensor's."""
     sensors, lights = np.broadcast_arrays(sensors, lights)
-    image = project(light_position(scene.camera, scene.lights[0], lights)[..., None, :], sensors, scene.camera)[
+    image = project(light_position(scene.camera, scene.lights[which], lights)[..., None, :], sensors, scene.camera)[
         ..., 0, :
     ]
     size = np.array([scene.camera.width, scene.camera.height])

@@ -14,6 +14,7 @@ from planner.models import variance_model
 from planner.prediction import minimised
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints
+from planner.search.poses import by_light
 from planner.search.separable import Separable, separable
 from scenes import Scene
 
@@ -64,7 +65,7 @@ def exhaustive(
     scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, objective: str | Aim,
     constraints: Constraints | None = None, report: Report | None = None,
 ) -> Found:  # fmt: skip
-    """Search all pairs of sensors (S, 2) and lights (L, 2), degrees.
+    """Search all pairs of sensors (S, 2) and lights (L, 2 F), degrees; F lights are free.
 
     For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
     not exceed the best variance known are evaluated. Otherwise every pair is evaluated.
@@ -74,12 +75,14 @@ def exhaustive(
 
 
 def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str | Aim) -> np.ndarray:
-    """What is minimised of pairs (n, 2), (n, 2), in chunks."""
+    """What is minimised of pairs (n, 2), (n, 2 F), in chunks."""
     values = np.empty(len(sensors))
     size = _PAIRS // 8
     for at in range(0, len(sensors), size):
         part = slice(at, at + size)
-        values[part] = minimised(variance_model(model)(Pictures.of(scene, sensors[part], lights[part])), objective)
+        values[part] = minimised(
+            variance_model(model)(Pictures.of(scene, sensors[part], by_light(lights[part]))), objective
+        )
     return values
 
 
@@ -137,7 +140,7 @@ def _one_by_one(scene, sensors, lights, model, objective, constraints, report) -
     size = max(1, 20_000 // max(len(lights), 1))
     for at in range(0, len(sensors), size):
         part = sensors[at : at + size]
-        values = minimised(evaluate(Pictures.of(scene, part[:, None], lights[None])), objective)
+        values = minimised(evaluate(Pictures.of(scene, part[:, None], by_light(lights[None]))), objective)
         if constraints is not None and constraints.on_pairs:
             values = np.where(constraints.pairs(scene, part[:, None], lights[None]), values, np.inf)
         best[at : at + size] = values.argmin(1)

@@ -15,11 +15,14 @@ def refine(
     scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, objective: str, step_deg: float,
     constraints: Constraints | None = None, value=None, sizes: tuple[float, ...] = (0.7, 0.1),
 ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
-    """Nelder-Mead from a pair of poses, in tangent planes of the sphere, so that the poles are places like others.
+    """Nelder-Mead from poses of a sensor and of all free lights.
+
+    In tangent planes of the sphere, so that the poles are places like others.
 
     Parameters
     ----------
-    sensor, light : ndarray, shape (2,)
+    sensor : ndarray, shape (2,)
+    light : ndarray, shape (2 F,)
         Where to begin, degrees.
     step_deg : float
         What the sizes are parts of.
@@ -30,7 +33,8 @@ def refine(
 
     Returns
     -------
-    sensor, light : ndarray, shape (2,)
+    sensor : ndarray, shape (2,)
+    light : ndarray, shape (2 F,)
     variance : float
         Not more than at the beginning.
     """
@@ -40,26 +44,31 @@ def refine(
         def value(s, k):
             return float(evaluate_pairs(scene, s[None], k[None], model, objective)[0])
 
-    def cost(x: np.ndarray) -> float:
-        s, k = (shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4))))
+    begin = np.concatenate([sensor, light]).reshape(-1, 2)
+
+    def moved(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        places = [shifted(pose, step_deg * by) for pose, by in zip(begin, x.reshape(-1, 2), strict=True)]
         if constraints.same_mount:
-            k = s
+            places[1:] = [places[0]] * (len(places) - 1)
+        return places[0], np.concatenate([np.zeros(0), *places[1:]])
+
+    def cost(x: np.ndarray) -> float:
+        s, k = moved(x)
         return value(s, k) if constraints.allows(scene, s, k) else np.inf
 
-    unit = cost(np.zeros(4))
+    unit = cost(np.zeros(begin.size))
     if not np.isfinite(unit):
         raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
-    x, least = np.zeros(4), 1.0
+    x, least = np.zeros(begin.size), 1.0
     for size in sizes:
         found = minimize(
             lambda x: min(cost(x) / unit, np.finfo(float).max), x, method="Nelder-Mead",
-            options={"initial_simplex": x + size * np.vstack([np.zeros(4), np.eye(4)]), "xatol": 1e-3, "fatol": 1e-7,
-                     "maxfev": 250},
+            options={"initial_simplex": x + size * np.vstack([np.zeros(x.size), np.eye(x.size)]), "xatol": 1e-3,
+                     "fatol": 1e-7, "maxfev": 250 if x.size <= 4 else 400},
         )  # fmt: skip
         if found.fun < least:
             x, least = found.x, found.fun
-    best = [shifted(pose, step_deg * x[part]) for pose, part in ((sensor, slice(0, 2)), (light, slice(2, 4)))]
-    return best[0], best[0] if constraints.same_mount else best[1], float(least * unit)
+    return *moved(x), float(least * unit)
 
 
 def shifted(pose: np.ndarray, by_deg: np.ndarray) -> np.ndarray:

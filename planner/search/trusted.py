@@ -14,6 +14,7 @@ import numpy as np
 
 from planner.prediction import predict
 from planner.search.candidates import Candidate, edges_of
+from planner.search.poses import as_array, as_poses
 from scenes import Scene
 
 DEAREST = 4.0  # times the least variance that is paid for it: standard deviations are twice as large
@@ -35,8 +36,8 @@ def trusted(
 
     Parameters
     ----------
-    best : pair of ndarray, shape (2,)
-        Sensor and light of the least variance.
+    best : pair of ndarray, shape (2,) and (2 F,)
+        Sensor and lights of the least variance.
     variance : float
         What was minimised, there.
     choice : sequence of Candidate
@@ -48,7 +49,7 @@ def trusted(
             break
         if candidate.edges != edges_of(scene):
             continue
-        poses = tuple(np.array(list(pose)) for pose in (candidate.sensor, candidate.light))
+        poses = np.array(list(candidate.sensor)), as_array(candidate.light)
         if all(np.allclose(pose, own) for pose, own in zip(poses, best, strict=True)):
             passed.append(candidate)
             continue
@@ -61,5 +62,5 @@ def trusted(
 
 def untrusted(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str) -> int:
     """How many measurands of a setting are not ``ok``."""
-    told = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), model)
+    told = predict(scene, tuple(map(float, sensor)), as_poses(light), model)
     return sum(each.status != "ok" for each in told.measurands)

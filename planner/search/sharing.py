@@ -1,0 +1,284 @@
+"""Several lights that share a given total: where they stand, which are on, and with what share.
+
+Light adds up: with c_l the contrast along an edge under light l alone with all of the total, it is sum_l share_l c_l
+under all of them, and the variance of a line is the sum of a sensor's weights over squared contrasts
+(`models.calibrated`, long edges). So one look at each light's place tells of all their combinations. What no mixture
+can exceed is the greatest contrast of any single place, which bounds a sensor from below: only sensors whose bound is
+below the best value known are looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.features.locator import MIN_CONTRAST
+from planner.features.measurand import measurands
+from planner.features.projected_edges import circles
+from planner.imaging.appearance import of_sides, side_signals
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import edge_points
+from planner.imaging.sensor import headroom
+from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes
+from planner.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
+from planner.search.aim import Aim
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import Found, Report, evaluate_pairs
+from planner.search.poses import by_light
+from scenes import Scene
+
+STEP = 0.1  # between shares
+_EXACT = 32  # sensors whose best combination is evaluated exactly
+_AT_ONCE = 1 << 21  # contrasts in memory
+_ENDS = 0.85  # at least, of a line's first-order variance, is left by what is at its ends; 2 s / (sqrt(pi) length) goes
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """The best lights for each sensor.
+
+    Attributes
+    ----------
+    scene : Scene
+        Its lights with the best shares as their intensities.
+    lights : ndarray, shape (S, 2 F)
+        Poses of the free lights that are best for each sensor with these shares.
+    found : Found
+        The best sensor; its lights are those of the same number.
+    alone : float or None
+        The least of what is minimised where one light has all; None where that was not asked.
+    """
+
+    scene: Scene
+    lights: np.ndarray
+    found: Found
+    alone: float | None
+
+
+def applies(scene: Scene, model: str) -> bool:
+    """Whether contrasts of single lights tell of mixtures: the calibrated model, straight edges, two lights."""
+    return model == "calibrated" and not circles(scene) and len(scene.lights) == 2
+
+
+def with_shares(scene: Scene, shares: tuple[float, ...]) -> Scene:
+    """The scene whose lights have shares of the sum of their intensities."""
+    total = sum(light.intensity for light in scene.lights)
+    lights = [light.model_copy(update={"intensity": s * total}) for light, s in zip(scene.lights, shares, strict=True)]
+    return scene.model_copy(update={"light": None, "several_lights": tuple(lights)})
+
+
+def shares_of(scene: Scene) -> tuple[float, ...]:
+    """Shares that a scene's lights have of the sum of their intensities."""
+    total = sum(light.intensity for light in scene.lights)
+    return tuple(light.intensity / total for light in scene.lights)
+
+
+def search_shared(
+    scene: Scene, sensors: np.ndarray, places: np.ndarray, model: str, aim: Aim,
+    constraints: Constraints, report: Report, shares: tuple[tuple[float, float], ...],
+) -> Shared:  # fmt: skip
+    """Search all sensors (S, 2), all places (L, 2) of each free light, and shares of two lights.
+
+    Places that a light may not have beside a sensor are left out one by one (`Constraints.pairs`).
+    """
+    looks = _Looks(scene, places, aim, constraints)
+    bounds = np.array([looks.bound(sensor) for sensor in sensors])
+    order = np.argsort(bounds)
+    best, chosen, alone, evaluated = np.inf, shares[0], np.inf, 0
+    for done, s in enumerate(order.tolist()):
+        report("lights", done + 1, 2 * len(sensors))
+        if not bounds[s] <= best:
+            break
+        known = looks.look(sensors[s])
+        for share in shares:
+            value, _ = looks.best(known, share)
+            evaluated += 1
+            if max(share) == 1:
+                alone = min(alone, value)
+            if value < best * (1 - 1e-9):
+                best, chosen = value, share
+    return _table(scene, sensors, order, bounds, looks, model, aim, chosen, (best, alone), report)
+
+
+def _table(scene, sensors, order, bounds, looks, model, aim, chosen, known, report) -> Shared:
+    """For each sensor the best lights with the chosen shares; the best of all is evaluated exactly."""
+    free = len(scene.free)
+    lights, least = np.zeros((len(sensors), 2 * free)), np.full(len(sensors), np.inf)
+    for done, s in enumerate(order.tolist()):
+        report("lights", len(sensors) + done + 1, 2 * len(sensors))
+        if not np.isfinite(bounds[s]):
+            break
+        if bounds[s] <= 16 * known[0]:  # beyond there is no candidate
+            least[s], lights[s] = looks.best(looks.look(sensors[s]), chosen)
+    other = with_shares(scene, chosen)
+    first = np.argsort(least)[:_EXACT]
+    first = first[np.isfinite(least[first])]
+    if len(first):
+        least[first] = evaluate_pairs(other, sensors[first], lights[first], model, aim)
+    best = int(np.argmin(least))
+    pairs = len(sensors) * looks.combinations
+    which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
+    found = Found(best, best, float(least[best]), pairs, len(first), which, least, guaranteed=True)
+    return Shared(other, lights, found, known[1] if np.isfinite(known[1]) else None)
+
+
+def by_turns(scene, sensors, places, model, aim: Aim, constraints: Constraints, report: Report) -> Shared:
+    """The sensor and each free light moved in turn to the best place of all, until none of them has a better one.
+
+    Begins from the best of a coarse sample with all lights at one place. Shares stay as they are.
+    """
+    free = len(scene.free)
+    some = [poses[:: max(1, len(poses) // 40)] for poses in (sensors, places if free else np.zeros((1, 0)))]
+    pairs = [(s, np.tile(k, free)) for s in some[0] for k in some[1]]
+    values = _values(scene, *(np.array(part) for part in zip(*pairs, strict=True)), model, aim, constraints)
+    sensor, lights = pairs[int(values.argmin())]
+    best, turns, evaluated = float(values.min()), 0, len(pairs)
+    while turns <= free and np.isfinite(best):
+        for role in range(free + 1):
+            tried = sensors if role == 0 else places
+            s, k = np.tile(sensor, (len(tried), 1)), np.tile(lights, (len(tried), 1))
+            (s if role == 0 else k[:, 2 * role - 2 : 2 * role])[:] = tried
+            values = _values(scene, s, k, model, aim, constraints)
+            evaluated += len(tried)
+            report("turns", min(turns, free), free + 1)
+            turns += 1
+            if values.min() < best * (1 - 1e-9):
+                at, turns = int(values.argmin()), 0
+                best, sensor, lights = float(values[at]), s[at], k[at]
+    table = np.tile(lights, (len(sensors), 1))
+    least = _values(scene, sensors, table, model, aim, constraints)
+    at = int(least.argmin())
+    which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
+    found = Found(at, at, float(least[at]), evaluated, evaluated, which, least, guaranteed=False)
+    return Shared(scene, table, found, None)
+
+
+def _values(scene, sensors, lights, model, aim, constraints: Constraints) -> np.ndarray:
+    values = evaluate_pairs(scene, sensors, lights, model, aim)
+    return np.where(constraints.pairs(scene, sensors, lights), values, np.inf) if constraints.on_pairs else values
+
+
+class _Looks:
+    """Contrasts of a scene's edges under each light alone, from each of its places."""
+
+    def __init__(self, scene: Scene, places: np.ndarray, aim: Aim, constraints: Constraints) -> None:
+        self.scene, self.aim, self.constraints = scene, aim, constraints
+        total = sum(light.intensity for light in scene.lights)
+        whole = [light.model_copy(update={"intensity": total}) for light in scene.lights]
+        self.lone = [scene.model_copy(update={"light": light, "several_lights": ()}) for light in whole]
+        self.places = [places if light.mount == "free" else np.zeros((1, 0)) for light in scene.lights]
+        self.combinations = int(np.prod([len(each) for each in self.places]))
+
+    def look(self, sensor: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]] | None:
+        """Weights (2, M, E, n) of 1 / C^2, and signals (L, E, 2, n) under each light; None where nothing is seen."""
+        alone = Pictures(self.scene, sensor, tuple(np.zeros(2) for _ in self.scene.lights))
+        known = measurands(alone)
+        if not known.view.visible.all():
+            return None
+        nodes = place_nodes(alone, known.view, known.view.framed)
+        gradient = known.gradient if self.aim.unit == "image" else known.gradient_object
+        offset, tilt = known.of_lines(gradient)
+        weights = [self._weights(nodes, a, b) for a, b in zip(offset, tilt, strict=True)]
+        points = edge_points(self.scene.solid, known.view.names, nodes.spatial)
+        return np.stack(weights, 1), [
+            self._signals(scene, sensor, places, known.view.names, points)
+            for scene, places in zip(self.lone, self.places, strict=True)
+        ]
+
+    def _weights(self, nodes: Nodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Of 1 / C^2 at the nodes, (2, E, n): of a long edge, and to first order, which is never negative."""
+        scale = self.scene.locator.scale_px
+        weight, point = line_weight(nodes, a, b), point_variance(nodes, scale)
+        whole = long_edge(nodes, weight, line_slope(nodes, a, b), scale)
+        inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
+        return np.stack([whole, 2 * np.sqrt(np.pi) * scale / nodes.along * inside * weight**2]) * point
+
+    def _signals(self, scene: Scene, sensor, places, names, points) -> np.ndarray:
+        """Under one light from its places; NaN where it may not stand."""
+        pictures = Pictures.of(scene, np.broadcast_to(sensor, (len(places), 2)), by_light(places))
+        found = side_signals(pictures, names, np.broadcast_to(points, (len(places), *points.shape)))
+        if places.shape[1]:
+            found = np.where(self.constraints.pairs(scene, sensor, places)[:, None, None, None], found, np.nan)
+        return found
+
+    def bound(self, sensor: np.ndarray) -> float:
+        """What no mixture of the lights can be below."""
+        known = self.look(sensor)
+        if known is None:
+            return np.inf
+        weights, signals = known
+        with np.errstate(all="ignore"):
+            most = [np.nanmax(np.abs(part[..., 0, :] - part[..., 1, :]), 0, initial=0.0) for part in signals]
+            ratio = self.scene.noise.variance / np.maximum(*most) ** 2
+            return _finite(self.aim(_ENDS * np.where(weights[1] > 0, weights[1] * ratio, 0.0).sum((-2, -1))))
+
+    def best(self, known: tuple | None, share: tuple[float, float]) -> tuple[float, np.ndarray]:
+        """The least of what is minimised under mixtures with these shares, and the free lights' poses (2 F,).
+
+        ``known`` is what `look` gives of the sensor.
+        """
+        if known is None:
+            return np.inf, np.zeros(2 * len(self.scene.free))
+        value, at = np.inf, (0, 0)
+        for rows, mixed in _mixtures(*known[1], share):
+            with np.errstate(all="ignore"):
+                squared, noise = self._contrast(mixed)
+                values = self.aim(_variances(known[0], squared, noise))
+            k = np.unravel_index(values.argmin(), values.shape)
+            if values[k] < value:
+                value, at = float(values[k]), (rows + int(k[0]), int(k[1]))
+        if min(share) == 0 and len(self.scene.free) == 2:
+            at = (max(at), max(at))  # one that is off stands where the other does
+        chosen = [places[i] for places, i in zip(self.places, at, strict=True)]
+        return value, np.concatenate(chosen)
+
+    def _contrast(self, mixed: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
+        """Squared recorded contrast and noise of signals (..., E, 2, n)."""
+        noise = self.scene.noise
+        if noise.gain == 0 and not np.nanmax(mixed, initial=0.0) > headroom(noise):
+            return (mixed[..., 0, :] - mixed[..., 1, :]) ** 2, noise.variance
+        found = of_sides(self.scene, np.where(np.isnan(mixed), 0.0, mixed))
+        return np.where(np.isnan(mixed[..., 0, :]), 0.0, found.squared), found.noise_variance
+
+
+def _variances(weights: np.ndarray, squared: np.ndarray, noise: np.ndarray | float) -> np.ndarray:
+    """Of quantities, (..., M), from weights (2, M, E, n) and squared contrasts (..., E, n); infinite if too faint.
+
+    To first order where the contrast changes much along an edge, as `calibrated` takes it.
+    """
+    inner, ratio = squared[..., 1:-1], noise / squared
+    ratio[..., [0, -1]] = np.where(np.isfinite(ratio[..., [0, -1]]), ratio[..., [0, -1]], 0.0)
+    whole = np.einsum("men,...en->...em", weights[0], ratio)
+    first = np.einsum("men,...en->...em", weights[1][..., 1:-1], ratio[..., 1:-1])
+    rough = squared.max(-1) > ROUGH * squared.min(-1)
+    faint = (inner / noise if np.ndim(noise) == 0 else inner / noise[..., 1:-1]).mean(-1) < MIN_CONTRAST**2
+    each = np.where(rough[..., None] | (whole < 0), first, whole)
+    values = np.where(faint[..., None], np.inf, each).sum(-2)
+    return np.where(np.isnan(values), np.inf, values)
+
+
+def _mixtures(one: np.ndarray, two: np.ndarray, share: tuple[float, float]) -> Iterator[tuple[int, np.ndarray]]:
+    """First row and signals (rows, L', E, 2, n) of all combinations of two lights, some at a time."""
+    size = max(1, _AT_ONCE // max(two.size, 1))
+    if share[1] == 0:  # one that is off may stand anywhere
+        yield 0, one[:, None]
+        return
+    if share[0] == 0:
+        yield 0, two[None]
+        return
+    for first in range(0, len(one), size):
+        yield first, share[0] * one[first : first + size, None] + share[1] * two
+
+
+def _finite(value: np.ndarray) -> float:
+    return float(value) if np.isfinite(value) else np.inf
+
+
+def shares_of_two(scene: Scene) -> tuple[tuple[float, float], ...]:
+    """Shares of two lights in tenths; lights that are alike may change places, so the first has at most half."""
+    one, two = (light.model_copy(update={"intensity": 1.0}) for light in scene.lights)
+    count = round(1 / STEP)
+    most = count // 2 if one == two and one.mount == "free" else count
+    return tuple((i / count, 1 - i / count) for i in range(most + 1))
