@@ -8,6 +8,7 @@ import scenes
 from render import variant
 from render.build import description
 from render.optics import blur_and_bin
+from render.parts import Part
 from render.renderer import Quality, window
 from render.testing import assert_images_agree
 from scenes import Floor, Lens, Picture
@@ -36,7 +37,7 @@ def theirs(scene, setting, active, quality):
     rows, columns = window(picture)
     crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
     size = scene.camera.width * k, scene.camera.height * k
-    made = description(mitsuba, picture, active, size, crop, quality.random_samples)
+    made = description(mitsuba, Part(picture, frozenset(active)), size, crop, quality.random_samples)
     fine = np.array(mitsuba.render(mitsuba.load_dict(made), seed=quality.seed), float)[:, :, 0]
     image = np.full((scene.camera.height, scene.camera.width), scene.noise.dark_level)
     image[rows, columns] += blur_and_bin(fine, scene.camera, k, (crop[1].start, crop[0].start))

@@ -17,6 +17,7 @@ from planner.imaging.irradiance import bands
 from planner.imaging.reflectance import reflected
 from render import build, mosaic, variant
 from render.adaptive import crossed
+from render.parts import Part
 from render.renderer import Quality
 from scenes import Picture
 from tests.oracle import block_image
@@ -150,6 +151,8 @@ def test_textures_are_used_where_they_can_be(monkeypatch):
     scalar(scene, scene.settings[0], Quality(1, 1, 1), effects=active)
     assert not described
     scalar(scene, scene.settings[0], Quality(1, 1, 1), effects=active | {"light_size"})
+    assert not described
+    scalar(scene, scene.settings[0], Quality(1, 1, 1), effects=active | {"interreflection"})
     assert described
 
 
@@ -159,7 +162,7 @@ def macro(lens):
     active, size = PLAIN | ({"depth_of_field"} if lens == "thinlens" else set()), (4 * 256, 4 * 240)
     crop = slice(161, 800), slice(121, 920)
     picture = Picture.of(scene, *poses(scene.settings[0]))
-    made = build.description(mitsuba, picture, active, size, crop, 16)
+    made = build.description(mitsuba, Part(picture, frozenset(active)), size, crop, 16)
     made = mitsuba.load_dict(made, parallel=False)
     view = build.view(mitsuba, picture, active, size, crop, 16)
     assert view["type"] == lens

@@ -9,6 +9,7 @@ from planner.imaging.irradiance import bands
 from planner.imaging.reflectance import reflected
 from render import bsdf, variant
 from render.lights import lamps
+from render.parts import Part
 from scenes import Material, Picture
 from tests import textbook
 from tests.unit.test_reflectance import plain
@@ -97,7 +98,8 @@ def test_polarised_light_is_known_by_the_size_it_is_simulated_with(task1):
     def angle(radius, *effects):
         light = task1.light.model_copy(update={"radius": radius, "polarisation_deg": 20.0})
         picture = Picture.of(task1.model_copy(update={"light": light}), (30, 135), (15, 315))
-        (lamp,) = lamps(picture, frozenset({"polarisation", *effects}))
+        part = Part(picture, frozenset()).reduced(frozenset({"polarisation", *effects}))
+        (lamp,) = lamps(part.picture, part.active)
         return lamp.angle
 
     assert angle(0.4, "light_size") == pytest.approx(0.008)
