@@ -10,8 +10,9 @@ from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.prediction import minimised
 from planner.search.aim import DEFAULT_OBJECTIVE, Objective
+from planner.search.poses import as_array, by_light
 from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Scene, several
 
 _CHUNK = 4096  # directions at a time, which bounds the memory
 
@@ -31,7 +32,7 @@ def variance_map(
     ----------
     scene : Scene
     sensor, light : Pose or pair of float, optional
-        Exactly one: the one that is held fixed. Degrees.
+        Exactly one: the one that is held fixed. Degrees. Poses of all free lights where there are several or none.
     space : ViewingSpace, optional
         Where the other one may stand; the paper's 41 347 directions when not given.
     model : {"calibrated", "paper", "bound"}
@@ -57,7 +58,12 @@ def variance_map(
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
-    fixed = np.array(list(scene.check_pose("sensor" if light is None else "light", sensor if light is None else light)))
+    if light is None:
+        if len(scene.free) != 1:
+            raise InvalidInput(f"light must be given where not exactly one light is free, got {len(scene.free)} free")
+        fixed = np.array(list(scene.check_pose("sensor", sensor)))
+    else:
+        fixed = by_light(as_array(scene.check_lights(several(light))))
     evaluate = variance_model(model)
     values = np.empty(len(space))
     for at in range(0, len(space), _CHUNK):

@@ -12,7 +12,7 @@ from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Circle, Edge, Solid, block
 from scenes.picture import Picture, mounted
-from scenes.pose import Pose, several
+from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
@@ -21,5 +21,5 @@ __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
     "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh",
     "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "Task",
-    "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "several",
+    "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

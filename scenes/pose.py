@@ -67,6 +67,26 @@ class Pose:
 PoseField = Annotated[Pose, BeforeValidator(Pose.of, json_schema_input_type=tuple[float, float]), PlainSerializer(list)]
 
 
+def pairs(lights: Pose | tuple[Pose, ...]) -> tuple[Any, ...]:
+    """A pose as a pair of numbers, several as a tuple of pairs.
+
+    >>> pairs(Pose(15, 315)), pairs((Pose(15, 315), Pose(60, 90))), pairs(())
+    ((15.0, 315.0), ((15.0, 315.0), (60.0, 90.0)), ())
+    """
+    return tuple(lights) if isinstance(lights, Pose) else tuple(tuple(each) for each in lights)
+
+
+def shown(lights: tuple[Any, ...]) -> str:
+    """What `pairs` gives, for people.
+
+    >>> shown((15.0, 315.0)), shown(((15.0, 315.0), (60.0, 90.0))), shown(())
+    ('(15, 315)', '(15, 315) (60, 90)', '-')
+    """
+    if lights and not isinstance(lights[0], tuple | list):
+        return f"({lights[0]:g}, {lights[1]:g})"
+    return " ".join(map(shown, lights)) or "-"
+
+
 def several(lights: Any) -> tuple[Any, ...]:
     """A pose, a pair of numbers, or a list of either, as a tuple."""
     if isinstance(lights, Pose):

@@ -24,7 +24,7 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
-from scenes.pose import Pose, PoseField, several
+from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
@@ -51,14 +51,10 @@ def _poses(value: Any) -> Pose | tuple[Pose, ...]:
     return found[0] if len(found) == 1 else found
 
 
-def _pairs(value: Pose | tuple[Pose, ...]) -> list[Any]:
-    return list(value) if isinstance(value, Pose) else [list(each) for each in value]
-
-
 LightPoses = Annotated[
     Pose | tuple[Pose, ...],
     BeforeValidator(_poses, json_schema_input_type=tuple[float, float] | list[tuple[float, float]]),
-    PlainSerializer(_pairs),
+    PlainSerializer(pairs),
 ]
 
 

@@ -121,6 +121,10 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
     """
     if tolerances == Tolerances():
         raise InvalidInput("tolerances must be given for at least one input, got none")
+    if len(plan.scene.lights) != 1 or not plan.scene.free:
+        raise InvalidInput(
+            f"tolerances must be left out but for one light that is free, got {len(plan.scene.lights)} lights"
+        )
     names, aim = tolerances.of_the_scene, Aim.of(plan.scene.quantities, plan.objective, plan.over)
     corners = [dict(zip(names, signs, strict=True)) for signs in product((-1, 1), repeat=len(names))]
     worlds = [altered(plan.scene, {n: 1 + sign * getattr(tolerances, n) for n, sign in c.items()}) for c in corners]

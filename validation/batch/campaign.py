@@ -126,8 +126,8 @@ class Campaign(Model):
         which, combination, place = self._place(index)
         scene = self._scene(which, combination)
         setting = self._setting(which, place)
-        for role in ("sensor", "light"):
-            scene.check_pose(role, getattr(setting, role))
+        scene.check_pose("sensor", setting.sensor)
+        scene.check_lights(setting.lights)
         return Case(index, scene, setting, self._parameters(combination))
 
     def at(self, index: int) -> tuple[Setting, dict[str, Any]]:

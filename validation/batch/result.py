@@ -11,7 +11,7 @@ import numpy as np
 
 import planner
 import scenes
-from scenes import InvalidInput
+from scenes import InvalidInput, pairs
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
@@ -163,5 +163,5 @@ def _search(campaign: Campaign, scale: float | None):
     for other in map(scenes.load, campaign.scenes[0].same_scale):
         for setting in other.settings:
             ours = planner.predict(other, setting.sensor, setting.light, "paper").variance_image * scale
-            found.append((other.name, tuple(setting.sensor), tuple(setting.light), setting.paper_ice, ours))
+            found.append((other.name, tuple(setting.sensor), pairs(setting.light), setting.paper_ice, ours))
     return tuple(found)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes import pairs
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.found import STATUSES, Found, ratios, row_status
@@ -55,7 +56,7 @@ class Row:
     parameters: dict[str, Any]
     value_px: float
     sensor: tuple[float, float]
-    light: tuple[float, float]
+    light: tuple[Any, ...]
     paper_ice: float | None
     paper_real: tuple[float, float] | None
     paper: float
@@ -196,7 +197,7 @@ class Rows(Sequence[Row]):
         bias = numbers.pop("predicted_bias")
         judged = [_judged(name, place, bias) for name, place in zip(names, record["judged"], strict=False)]
         return Row(
-            index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=tuple(setting.light),
+            index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=pairs(setting.light),
             paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=judged[0], classic=tuple(judged[1:]),
             measurands=self.measured[number], **numbers,
         )  # fmt: skip

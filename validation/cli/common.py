@@ -28,7 +28,9 @@ _EVERY_S = 10.0  # between lines of progress where there is no terminal
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene or a TOML file.")]
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
-LightPose = Annotated[str, typer.Option(metavar="P,A", help="Light pose: polar angle and azimuth, degrees.")]
+LightPose = Annotated[
+    str | None, typer.Option(metavar="P,A", help='Pose of the free light, or of each: "P,A P,A", degrees.')
+]
 Effects = Annotated[
     str, typer.Option("--effects", metavar="WHICH", help="What is simulated: auto, all, or names with commas between.")
 ]
@@ -83,6 +85,14 @@ def parse_pose(option: str, text: str) -> Pose:
         raise InvalidInput(f"{option}: {error}") from None
     except ValueError:
         raise InvalidInput(f"{option} must be two numbers P,A (degrees), got {text!r}") from None
+
+
+def parse_poses(option: str, text: str | None) -> Pose | tuple[Pose, ...] | None:
+    """One pose, or several with spaces between; None where nothing is given."""
+    if text is None:
+        return None
+    found = tuple(parse_pose(option, part) for part in text.split())
+    return found[0] if len(found) == 1 else found
 
 
 def say(facts: dict, as_json: bool, text: str) -> None:

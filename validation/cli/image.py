@@ -22,6 +22,7 @@ from validation.cli.common import (
     check_seed,
     commands,
     parse_pose,
+    parse_poses,
     say,
     tolerance,
 )
@@ -38,8 +39,8 @@ commands = commands()
 def render_command(
     scene: SceneName,
     sensor: Sensor,
-    light: LightPose,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
+    light: LightPose = None,
     noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
     effects: Effects = "auto",
     bias_px: LeaveOutPx = None,
@@ -47,7 +48,7 @@ def render_command(
     as_json: Json = False,
 ) -> None:
     """Render one image of a scene."""
-    poses = parse_pose("--sensor", sensor), parse_pose("--light", light)
+    poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
     check_seed(noise_seed, "--noise-seed")
     check_file("--output", output, ".png", ".tif", ".tiff", ".npy")
     loaded = scenes.load(scene)
@@ -101,7 +102,7 @@ def measure_command(
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
-    poses = parse_pose("--sensor", sensor), light and parse_pose("--light", light)
+    poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
     known = scenes.load(scene)
     found = measure.measure(picture, known, *poses, estimator, threshold)
     rows = measurands.facts(found)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import scenes
-from validation.cli.common import Json, SceneName, check_number, commands, parse_pose, progress
+from validation.cli.common import Json, SceneName, check_number, commands, parse_poses, progress
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 
@@ -31,6 +31,7 @@ Model = Annotated[str, typer.Option(help="calibrated or paper")]
 Edges = Annotated[str, typer.Option(help="given, or best of all sets that measure the same")]
 Step = Annotated[float | None, typer.Option(help="Grid step, degrees; default 1, or 10 for hollow or glossy.")]
 Pair = Annotated[str | None, typer.Option(metavar="P,A", help="Hold it fixed: polar angle and azimuth, degrees.")]
+Shares = Annotated[str, typer.Option(help="Of several lights in their total: best, or given by the scene.")]
 Start = Annotated[str, typer.Option(metavar="P,A", help="First sensor of the alternating search.")]
 Range = Annotated[str | None, typer.Option(metavar="LOW,HIGH", help="Polar angles allowed, degrees; default 0,90.")]
 MinEdge = Annotated[float, typer.Option(help="Least usable length of a required edge, px.")]
@@ -68,6 +69,7 @@ def plan_command(
     sensor: Pair = None,
     light: Pair = None,
     start: Start = "40,41",
+    shares: Shares = "best",
     sensor_polar: Range = None,
     light_polar: Range = None,
     sensor_azimuth: Azimuths = None,
@@ -109,7 +111,15 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
-    how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
+    how = {
+        "over": over,
+        "model": model,
+        "search": search,
+        "edges": edges,
+        "step_deg": step,
+        "constraints": limits,
+        "shares": shares,
+    }
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
@@ -129,9 +139,9 @@ def _pixels(scene: scenes.Scene) -> int:
     return scene.camera.width * scene.camera.height
 
 
-def _poses(**texts: str | None) -> dict[str, scenes.Pose | None]:
+def _poses(**texts: str | None) -> dict[str, scenes.Pose | tuple[scenes.Pose, ...] | None]:
     """Poses by name, from what the options of that name say."""
-    return {name: text and parse_pose(f"--{name}", text) for name, text in texts.items()}
+    return {name: parse_poses(f"--{name}", text) for name, text in texts.items()}
 
 
 def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan, float]:
@@ -222,7 +232,9 @@ def _facts(
         "objective": found.objective,
         "model": found.model,
         "sensor": list(found.sensor),
-        "light": list(found.light),
+        "light": scenes.pairs(found.light),
+        "shares": found.shares,
+        "alone": found.alone,
         "edges": list(planner.edges_of(found.scene)),
         "over": found.over,
         "variance": found.variance,
@@ -232,7 +244,11 @@ def _facts(
         "variance_object": p.variance_object,
         "variance_image": p.variance_image,
         "status": p.status,
-        "grid": {"sensor": list(found.grid_sensor), "light": list(found.grid_light), "variance": found.grid_variance},
+        "grid": {
+            "sensor": list(found.grid_sensor),
+            "light": scenes.pairs(found.grid_light),
+            "variance": found.grid_variance,
+        },
         "alternating": _alternating(found),
         "guarantee": found.guarantee,
         "pairs": found.pairs,
@@ -267,7 +283,7 @@ def _measurand(each: planner.Forecast) -> dict:
 
 def _with_poses(found) -> dict:
     """A candidate or a robust plan with its poses as pairs."""
-    return {**dataclasses.asdict(found), "sensor": list(found.sensor), "light": list(found.light)}
+    return {**dataclasses.asdict(found), "sensor": list(found.sensor), "light": scenes.pairs(found.light)}
 
 
 def _alternating(found: planner.Plan) -> dict:
@@ -305,7 +321,7 @@ def _setting(row: CheckedSetting) -> dict:
         name: value if math.isfinite(value) else None
         for name, value in (("calibrated", row.calibrated), ("propagated", row.propagated))
     }
-    poses = {"sensor": list(row.sensor), "light": list(row.light), "edges": list(row.edges)}
+    poses = {"sensor": list(row.sensor), "light": scenes.pairs(row.light), "edges": list(row.edges)}
     return {
         **poses,
         **variances,

@@ -7,6 +7,7 @@ import math
 from rich.table import Table
 
 from render.phenomena import Decision, Effect
+from scenes import pairs, shown
 from validation.effects_check import RENDERED, Switched
 
 
@@ -38,7 +39,7 @@ def checked(row: Switched) -> dict:
     bounds = [value if math.isfinite(value) else None for value in row.estimated]
     return {
         "sensor": list(row.setting.sensor),
-        "light": list(row.setting.light),
+        "light": pairs(row.setting.light),
         "effect": row.name,
         "estimated": bounds,
         "measured": [row.bias_px, row.variance],
@@ -75,7 +76,7 @@ def check_table(rows: list[Switched]) -> Table:
         made.add_column(name, justify="right")
     for row in rows:
         made.add_row(
-            f"{row.setting.sensor} {row.setting.light}",
+            f"{row.setting.sensor} {shown(pairs(row.setting.light))}",
             row.name,
             f"{row.bias_px:+.4f}",
             f"{_number(row.estimated.bias_px)} +{row.resolution_px:.4f}",

@@ -86,13 +86,20 @@ def _line(row: Row) -> dict[str, object]:
         "index": row.index, "scene": row.scene,
         **{key: value if isinstance(value, int | float | str) else str(value) for key, value in row.parameters.items()},
         "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
-        "light_polar": row.light[0], "light_azimuth": row.light[1],
+        "light_polar": _angle(row.light, 0), "light_azimuth": _angle(row.light, 1),
         "paper_ice": row.paper_ice, "paper_real_12": real[0], "paper_real_10": real[1],
         "our_ice": row.paper, "calibrated": row.calibrated, "bound": row.bound,
     }  # fmt: skip
     for judged in (row.main, *row.classic):
         line |= {f"{judged.method}_{key}": value for key, value in _judged(judged).items()}
     return line
+
+
+def _angle(light: tuple, which: int) -> float | str:
+    """Of the one free light, or of all that are, with spaces between."""
+    if light and not isinstance(light[0], tuple | list):
+        return light[which]
+    return " ".join(f"{pose[which]:g}" for pose in light)
 
 
 def _judged(judged: Judged) -> dict[str, object]:
@@ -109,7 +116,7 @@ def measurands(found: Validation) -> Iterator[dict[str, object]]:
     for row in found.rows:
         place = {
             "index": row.index, "scene": row.scene, "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
-            "light_polar": row.light[0], "light_azimuth": row.light[1],
+            "light_polar": _angle(row.light, 0), "light_azimuth": _angle(row.light, 1),
         }  # fmt: skip
         yield from ({**place, **_flat(each)} for each in row.measurands)
 

@@ -16,7 +16,7 @@ import render
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
 from render.renderer import window
-from scenes import Picture, Pose, Scene
+from scenes import Picture, Pose, Scene, pairs, shown
 from validation.batch.campaign import Campaign, Case
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
@@ -99,7 +99,7 @@ def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[fl
         axis.set(xticks=[], yticks=[])
     for axis, picture, light in zip(axes.flat, pictures, lights, strict=False):
         axis.imshow(picture, cmap="gray", vmin=grey[0], vmax=grey[1], interpolation="nearest")
-        axis.set_title(f"light {light}", fontsize=10)
+        axis.set_title(f"light {shown(pairs(light))}", fontsize=10)
     return save(figure, path)
 
 

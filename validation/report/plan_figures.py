@@ -16,6 +16,7 @@ from planner.imaging.appearance import is_separable, signal
 from planner.imaging.lens import recorded
 from planner.imaging.projection import direction, facing, project
 from planner.imaging.visibility import visible_spans
+from scenes import Picture, Pose
 
 _STEP = 1.0  # degrees, where a map takes a moment; where it takes longer:
 _COARSE = 4.0
@@ -26,11 +27,10 @@ def draw(plan: Plan, directory: Path) -> list[Path]:
     """Write all pictures of a plan as PNG; their paths."""
     directory.mkdir(parents=True, exist_ok=True)
     paths = [_seen(plan, directory / "optimum.png")]
-    for role in ("light", "sensor"):
+    for role in _roles(plan):
         space, values = _map(plan, role)
         best = plan.light if role == "light" else plan.sensor
-        held = f"sensor at {_short(plan.sensor)}" if role == "light" else f"light at {_short(plan.light)}"
-        title = f"Where the {role} may stand, {held}"
+        title = f"Where the {role} may stand{_held(plan, role)}"
         paths.append(_search_space(plan, space, values, best, title, directory / f"map_{role}.png"))
         paths.append(_surface(plan, space, values, title, directory / f"surface_{role}.png"))
     return paths
@@ -38,13 +38,25 @@ def draw(plan: Plan, directory: Path) -> list[Path]:
 
 def map_picture(plan: Plan, path: Path) -> Path:
     """The two search-space maps of a plan side by side in one file."""
-    figure, axes = plt.subplots(1, 2, figsize=(11, 5.2), layout="constrained")
-    for axis, role in zip(axes, ("light", "sensor"), strict=True):
+    roles = _roles(plan)
+    figure, axes = plt.subplots(1, len(roles), figsize=(5.5 * len(roles), 5.2), layout="constrained", squeeze=False)
+    for axis, role in zip(axes[0], roles, strict=True):
         space, values = _map(plan, role)
         best = plan.light if role == "light" else plan.sensor
-        held = f"sensor at {_short(plan.sensor)}" if role == "light" else f"light at {_short(plan.light)}"
-        _draw_map(figure, axis, plan, space, values, best, f"Where the {role} may stand, {held}")
+        _draw_map(figure, axis, plan, space, values, best, f"Where the {role} may stand{_held(plan, role)}")
     return _save(figure, path)
+
+
+def _roles(plan: Plan) -> tuple[str, ...]:
+    """What there is a map of: the sensor, and the light where one is free."""
+    return ("light", "sensor") if isinstance(plan.light, Pose) else ("sensor",)
+
+
+def _held(plan: Plan, role: str) -> str:
+    """What is held fixed meanwhile."""
+    if role == "light":
+        return f", sensor at {_short(plan.sensor)}"
+    return f", light at {_short(plan.light)}" if plan.light else ""
 
 
 def _map(plan: Plan, role: str) -> tuple[ViewingSpace, np.ndarray]:
@@ -132,7 +144,7 @@ def _surface(plan, space, values, title, path: Path) -> Path:
 
 def _seen(plan: Plan, path: Path) -> Path:
     """The object from the optimal sensor: faces by brightness, required edges in colour."""
-    scene, pictures = plan.scene, Pictures.of(plan.scene, list(plan.sensor), list(plan.light))
+    scene, pictures = plan.scene, Pictures.of(Picture.of(plan.scene, plan.sensor, plan.light))
     solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
     figure, axis = plt.subplots(figsize=(6.5, 6), layout="constrained")
     axis.set_facecolor("0.05")
@@ -181,7 +193,9 @@ def _rim(axis, scene, pose, circle) -> None:
         _segment(axis, scene, pose, edge, (0, 1), color="C9", lw=2.5, label=circle.name if k == 0 else None)
 
 
-def _short(pose) -> str:
+def _short(pose: Pose | tuple[Pose, ...]) -> str:
+    if not isinstance(pose, Pose):
+        return " ".join(map(_short, pose))
     return f"({pose.polar_deg:.0f}, {pose.azimuth_deg:.0f})"
 
 

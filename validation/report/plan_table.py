@@ -64,6 +64,10 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if found.shares:
+        lines.insert(
+            0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
+        )
     if found.set_aside:
         many = len(found.set_aside)
         lines.append(
@@ -71,6 +75,13 @@ def _searched(found: planner.Plan, seconds: float) -> str:
             " of what is minimised: there more of what is measured is clutter."
         )
     return "\n".join(lines)
+
+
+def _alone(found: planner.Plan) -> str:
+    """What several lights gain over one that has all of the total, on the grid."""
+    if found.alone is None:
+        return ""
+    return f"; one light with all of it: {found.alone / found.grid_variance:.4g} of what is minimised, on the grid"
 
 
 def _units(found: planner.Plan) -> tuple[str, str]:
@@ -200,5 +211,7 @@ def _table(title: str, *columns: str) -> Table:
     return table
 
 
-def _pose(pose: Pose) -> str:
-    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
+def _pose(poses: Pose | tuple[Pose, ...]) -> str:
+    if not isinstance(poses, Pose):
+        return " ".join(map(_pose, poses)) or "-"
+    return f"({poses.polar_deg:.1f}, {poses.azimuth_deg:.1f})"

@@ -9,6 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from scenes import shown
 from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
 
@@ -70,7 +71,7 @@ def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list
     cells = {
         row.index: [
             *([row.scene] if many else []), *(str(row.parameters[key]) for key in keys),
-            pose(row.sensor), pose(row.light),
+            shown(row.sensor), shown(row.light),
         ]
         for row in rows
     }  # fmt: skip
@@ -175,8 +176,8 @@ def _search(found: Validation) -> Table:
     )
     for _, sensor, light, theirs, ours in found.search:
         table.add_row(
-            pose(sensor),
-            pose(light),
+            shown(sensor),
+            shown(light),
             number(theirs, 4),
             number(ours, 4),
             number(ours / theirs if theirs else None),
@@ -213,10 +214,6 @@ def _time(found: Validation) -> Text:
     wall, workers = spent.pop("wall"), spent.pop("workers")
     parts = ", ".join(f"{name} {value:.1f}" for name, value in spent.items())
     return Text(f"\nTime: {wall:.1f} s with {workers} workers on {found.variant}. Working seconds: {parts}.")
-
-
-def pose(pose: tuple[float, float]) -> str:
-    return f"({pose[0]:g}, {pose[1]:g})"
 
 
 def number(value: float | None, digits: int = 3) -> str:
