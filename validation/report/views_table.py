@@ -39,7 +39,7 @@ def _minimised(found: planner.Views) -> str:
 
 def _numbers(found: planner.Views) -> Table:
     columns = ("pictures", "measured", "minimised", "worst ratio", "limited by", "one / it", "repeats / it",
-               "over exhaustive", "over bound")  # fmt: skip
+               "over exhaustive", "over grid's bound")  # fmt: skip
     table = _table("\nN pictures take N times as long: the fair comparison is with the best one repeated", *columns)
     whole = len(found.scene.quantities)
     for each in found.sets:
