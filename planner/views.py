@@ -204,7 +204,8 @@ def plan_views(
     option = _Option.of(scene, model, step, constraints, sensor, light)
     pairs = len(option.sensors) * len(option.lights)
     if pairs * len(scene.quantities) > _MOST_NUMBERS:
-        raise InvalidInput(f"step_deg must leave fewer pairs for several pictures, got {step:g} with {pairs:.2g} pairs")
+        most = f"{_MOST_NUMBERS:.0e} pairs times measurands"
+        raise InvalidInput(f"step must leave at most {most} for several pictures, got {step:g} ({pairs:.2g} pairs)")
     told = glanced(scene, option.sensors, option.lights, model, aim, constraints, report)
     if not told.any():
         raise InvalidInput("constraints must leave a setting that can measure, got none")

@@ -132,8 +132,8 @@ def _key(view: planner.View) -> tuple[Pose, Pose]:
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
     clean, rng = render.image(picture, quality=quality), np.random.default_rng(seed)
     told = measure.propagate(clean, picture, estimator=ESTIMATOR).measurands
-    size = max(1, _PIXELS // clean.size)
-    parts = (render.expose(clean, picture.scene.noise, rng, count) for count in _parts(repeats * images, size))
+    size, where = max(1, _PIXELS // clean.size), measure.region_of_interest(picture, estimators=(ESTIMATOR,))
+    parts = (render.expose(clean, picture.scene.noise, rng, count, where) for count in _parts(repeats * images, size))
     values = [measure.measure(part, picture, estimator=ESTIMATOR).value for part in parts]
     return _Shot(np.concatenate(values).reshape(repeats, images, -1), told.covariance)
 

@@ -88,7 +88,10 @@ def test_held_sensor(task1):
         ({"count": 2, "objective": "image"}, r"objective must be object for several pictures, got 'image'"),
         ({"count": 2, "share": "both"}, r"share must be one of sensor, light, got 'both'"),
         ({"count": 2, "model": "bound"}, r"model must be one of calibrated, paper for several pictures, got 'bound'"),
-        ({"count": 2, "step_deg": 1.0}, r"step_deg must leave fewer pairs"),
+        (
+            {"count": 2, "step_deg": 1.0},
+            r"step must leave at most 3e\+07 pairs times measurands for several pictures, got 1",
+        ),
         ({"count": 2, "light": (170, 0)}, r"light must keep the constraints"),
     ],
 )
