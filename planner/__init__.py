@@ -16,7 +16,8 @@ from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
 from planner.search.viewing import ViewingSpace, local_minima
-from planner.views import View, Views, ViewSet, plan_views
+from planner.view_sets import View, Views, ViewSet
+from planner.views import plan_views
 
 __all__ = [
     "Aim", "Candidate", "Combination", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread",

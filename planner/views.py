@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from planner.combining import Combination, combine
+from planner.combining import combine
 from planner.models import DEFAULT_MODEL, ModelName
 from planner.planning import COARSE_STEP, _fixed, _Option
-from planner.prediction import Prediction
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.beside import descend
 from planner.search.constraints import Constraints
@@ -27,6 +25,8 @@ from planner.search.subsets import (
     least_value,
     sets_of,
 )
+from planner.search.worthwhile import all_ok, alone, shared, worthwhile
+from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Scene
 
 Share = Literal["sensor", "light"]
@@ -34,114 +34,6 @@ MOST_VIEWS = 12
 _FINE_STEP = 5.0  # degrees, where a pair takes microseconds
 _MOST_NUMBERS = 30_000_000  # pairs x quantities that a grid may have
 _LOOKS = 20  # a number of pictures: how many settings are looked at closely for each
-_GROUPS = 24  # places of what is shared that are searched on
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """One picture of several.
-
-    Attributes
-    ----------
-    sensor, light : Pose
-    prediction : Prediction
-        Of this picture alone, looked at closely.
-    """
-
-    sensor: Pose
-    light: Pose
-    prediction: Prediction
-
-
-@dataclass(frozen=True, eq=False)
-class ViewSet:
-    """The best K pictures that were found; one may be there several times.
-
-    Attributes
-    ----------
-    views : tuple of View
-    combination : Combination
-        What they tell together.
-    minimised : float
-        Largest squared ratio of combined sigma to tolerance, or the weighted sum, of what is measured (of a single
-        quantity its variance); what is ``clutter`` counts as four times its variance.
-    lost : tuple of str
-        Names of the quantities that none of the pictures measures.
-    over_one, over_repeats : float or None
-        How many times as large what is minimised is for the best single picture, and for that one taken K times, which
-        takes as long; None where that picture does not measure as many quantities.
-    exhaustive : float or None
-        What is minimised by the best of all sets of K of the settings that were looked at; None where they are more
-        than 200 000.
-    bound : float or None
-        What no K pictures of the grid can stay below, if a glance is right and nothing is clutter; None where some
-        quantity cannot be measured anywhere, or what is shared is not free.
-    """
-
-    views: tuple[View, ...]
-    combination: Combination
-    minimised: float
-    lost: tuple[str, ...]
-    over_one: float | None
-    over_repeats: float | None
-    exhaustive: float | None
-    bound: float | None
-
-    @property
-    def worst_ratio(self) -> float | None:
-        """Largest combined sigma over tolerance of what is measured; None without tolerances."""
-        return self._worst[0]
-
-    @property
-    def limiting(self) -> str | None:
-        """Name of that quantity."""
-        return self._worst[1]
-
-    @property
-    def _worst(self) -> tuple[float, str] | tuple[None, None]:
-        told = zip(self.views[0].prediction.measurands, self.combination.variances, strict=True)
-        known = [(math.sqrt(v) / each.tolerance.half, each.name) for each, v in told if each.tolerance and v < math.inf]
-        return max(known, default=(None, None))
-
-    @property
-    def gap(self) -> float | None:
-        """``minimised`` over ``exhaustive``, less 1: what greedy search with exchange leaves."""
-        return None if self.exhaustive is None else self.minimised / self.exhaustive - 1
-
-
-@dataclass(frozen=True, eq=False)
-class Views:
-    """For 1, 2, ... N pictures the best ones, and how they were found.
-
-    Attributes
-    ----------
-    scene : Scene
-    over, model : str
-    share : str or None
-        What all pictures of a set have in common: ``sensor`` or ``light``.
-    sets : tuple of ViewSet
-        One for each number of pictures.
-    pairs : int
-        Pairs of the grid.
-    looked : int
-        Settings looked at closely.
-    guarantee : str
-        What is known about the optimum.
-    most_over_repeats : float or None
-        What `ViewSet.over_repeats` can be at most, of the grid's best pair and however many pictures of the grid, if a
-        glance is right and nothing is clutter; 1 where one picture sees all best. None as of `ViewSet.bound`, and
-        where no picture measures all.
-    """
-
-    scene: Scene
-    over: str
-    model: str
-    share: str | None
-    sets: tuple[ViewSet, ...]
-    pairs: int
-    looked: int
-    guarantee: str
-    most_over_repeats: float | None
 
 
 def plan_views(
@@ -236,48 +128,11 @@ def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share:
 
 def _pool(option: _Option, aim: Aim, told: np.ndarray, share: str | None, count: int) -> tuple[Pool, np.ndarray | None]:
     """The settings to choose from, and which of them share a place."""
-    rows = _worthwhile(told, aim) if share is None else _shared(told, aim, share, count)
+    rows = worthwhile(told, aim) if share is None else shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
     poses = np.concatenate([option.sensors[s], option.lights[k]], 1)
     pool = Pool(option.scene, option.model, aim, poses, told.reshape(-1, told.shape[-1])[rows])
     return pool, None if share is None else s if share == "sensor" else k
-
-
-def _worthwhile(told: np.ndarray, aim: Aim) -> np.ndarray:
-    """Pairs that no other can stand in for, and each sensor's best: for the aim, and for each quantity."""
-    flat = told.reshape(-1, told.shape[-1])
-    best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
-    best.append(_alone(told, aim).argmin(1))
-    each = [np.arange(len(told)) * told.shape[1] + column for column in best]
-    rows = np.unique(np.concatenate([front(_all_ok(flat, aim)), *each]))
-    return rows[flat[rows].any(1)]
-
-
-def _alone(told: np.ndarray, aim: Aim) -> np.ndarray:
-    """What is minimised of each pair alone; infinite where not all is measured."""
-    with np.errstate(divide="ignore"):
-        parts = 1 / told
-    return parts.max(-1) if aim.over == "minimax" else parts.sum(-1)
-
-
-def _shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
-    """Pairs at the places of what is shared that promise most, those that no other of the place can stand in for."""
-    axis = 0 if share == "sensor" else 1
-    found = []
-    for place in range(told.shape[axis]):
-        table = _all_ok(told.take(place, axis), aim)
-        kept = front(table)
-        if len(kept):
-            own = table.only(kept)
-            found.append((own.of_sets(np.array(greedy(own, count)[-1])).at(0), place, kept))
-    found.sort(key=lambda each: each[0])
-    rows = [np.ravel_multi_index((place, kept) if axis == 0 else (kept, place), told.shape[:2])
-            for _, place, kept in found[:_GROUPS]]  # fmt: skip
-    return np.concatenate(rows)
-
-
-def _all_ok(told: np.ndarray, aim: Aim) -> Information:
-    return Information(told, np.zeros_like(told), aim.over)
 
 
 def _chosen(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> tuple[tuple[int, ...], ...]:
@@ -333,12 +188,12 @@ def _refine(pool: Pool, count: int, constraints: Constraints, step: float, repor
 
 def _bounds(aim: Aim, told: np.ndarray, count: int) -> tuple[list[float | None], float | None]:
     """Of each number of pictures, by a glance at the whole grid; and over how many repeats they can be better."""
-    table = _all_ok(told.reshape(-1, told.shape[-1]), aim)
+    table = all_ok(told.reshape(-1, told.shape[-1]), aim)
     table = table.only(front(table))
     found = [least_value(table, size) for size in range(1, count + 1)]
     if not math.isfinite(found[0]):
         return [None] * count, None
-    single = float(_alone(table.ok, aim).min())
+    single = float(alone(table.ok, aim).min())
     return list(found), single / found[0] if math.isfinite(single) else None
 
 

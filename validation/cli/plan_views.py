@@ -46,7 +46,7 @@ def run(
     import planner
 
     began = time.perf_counter()
-    with progress(f"{scene.name}: searching", "sensors") as shown:
+    with progress(f"{scene.name}: searching", "steps") as shown:
         found = planner.plan_views(scene, count, objective, **how, report=shown or (lambda *_: None))
     seconds = time.perf_counter() - began
     check = _check(found) if checked else None
