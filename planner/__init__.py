@@ -1,5 +1,6 @@
 """The analytic expert: from a scene and poses to the precision of the measurement, without an image."""
 
+from planner.combining import Combination, combine
 from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
 from planner.forecast import Forecast
@@ -15,10 +16,12 @@ from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
 from planner.search.viewing import ViewingSpace, local_minima
+from planner.view_sets import View, Views, ViewSet
+from planner.views import plan_views
 
 __all__ = [
-    "Aim", "Candidate", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction",
-    "Robust", "Tolerances", "ViewingSpace", "alternate", "edges_of", "exhaustive", "local_minima", "plan",
-    "pose_scatter", "pose_spread", "predict", "projected_edges", "required_edges", "robust", "variance_map",
-    "variances",
+    "Aim", "Candidate", "Combination", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread",
+    "Prediction", "Robust", "Tolerances", "View", "ViewSet", "ViewingSpace", "Views", "alternate", "combine",
+    "edges_of", "exhaustive", "local_minima", "plan", "plan_views", "pose_scatter", "pose_spread", "predict",
+    "projected_edges", "required_edges", "robust", "variance_map", "variances",
 ]  # fmt: skip

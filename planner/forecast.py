@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,3 +109,12 @@ def _status(known: Measurands, quantity: Quantity, edge_status: dict[str, str], 
 def worst(forecasts: tuple[Forecast, ...]) -> str:
     """The most serious of several statuses."""
     return min((each.status for each in forecasts), key=_WORST_FIRST.index)
+
+
+def mildest(states: Iterable[str]) -> str:
+    """The least serious of several statuses.
+
+    >>> mildest(["not_visible", "clutter"])
+    'clutter'
+    """
+    return max(states, key=_WORST_FIRST.index)

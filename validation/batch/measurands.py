@@ -94,7 +94,7 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
     def add(self, told: list[dict[str, Any]], found: list[Found]) -> None:
         """Append a setting: what is predicted of each measurand (`predicted`), and what was measured."""
         self._grow(len(told))
-        share = _independent([each.distances for each in found])
+        share = independent([each.distances for each in found])
         for about, each in zip(told, found, strict=True):
             record = self._records[self._size]
             key = about["name"], about["kind"], about["unit"]
@@ -148,7 +148,7 @@ def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasura
     )  # fmt: skip
 
 
-def _independent(values: list[np.ndarray]) -> float:
+def independent(values: list[np.ndarray]) -> float:
     """For how many independent sample variances each of M correlated ones counts: M over the sum of rho^2."""
     together = np.stack(values)
     together = together[:, np.isfinite(together).all(0)]

@@ -55,6 +55,10 @@ Check = Annotated[
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Render nothing.")]
 Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Write the maps.")]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")]
+ViewCount = Annotated[
+    int | None, typer.Option("--views", metavar="N", help="Plan 1 to N pictures that together measure best.")
+]
+ViewsShare = Annotated[str | None, typer.Option(help="With --views: sensor or light, the same in all pictures.")]
 
 
 @commands.command("plan")
@@ -86,6 +90,8 @@ def plan_command(
     no_check: NoCheck = False,
     map_file: Map = None,
     out: Out = None,
+    views: ViewCount = None,
+    views_share: ViewsShare = None,
     as_json: Json = False,
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
@@ -101,6 +107,13 @@ def plan_command(
     check_file("--map", map_file, ".png")
     check_directory("--out", out)
     poses = _poses(sensor=sensor, light=light, start=start)
+    several = views is not None or views_share is not None
+    if several:
+        from validation.cli import plan_views
+
+        without = {"--search": (search, "exhaustive"), "--edges": (edges, "given"), "--start": (start, "40,41"),
+                   "--tolerance": (" ".join(tolerance or []), ""), "--map": (map_file, None)}  # fmt: skip
+        plan_views.check_options(views, views_share, without)
     loaded = scenes.load(scene)
     import planner
 
@@ -111,23 +124,26 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
-    how = {
-        "over": over,
-        "model": model,
-        "search": search,
-        "edges": edges,
-        "step_deg": step,
-        "constraints": limits,
-        "shares": shares,
-    }
+    how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
+    how["shares"] = shares
+    count = 0 if no_check else _renders(loaded) if check is None else check
+    if several:
+        how = {"over": over, "model": model, "step_deg": step, "constraints": limits, "share": views_share}
+        poses.pop("start")
+        plan_views.run(loaded, views, objective, how | poses, bool(count), out, as_json)
+        _say_unchecked(loaded, bool(count or no_check or as_json))
+        return
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
-    count = 0 if no_check else _renders(loaded) if check is None else check
     checked = _check(found, count) if count else None
     _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json)
-    if not (count or no_check or as_json):
-        print(f"Not checked by rendering, which takes long for {_pixels(loaded) / 1e6:.1f} megapixels: --check 1 does.")
+    _say_unchecked(loaded, bool(count or no_check or as_json))
+
+
+def _say_unchecked(scene: scenes.Scene, said: bool) -> None:
+    if not said:
+        print(f"Not checked by rendering, which takes long for {_pixels(scene) / 1e6:.1f} megapixels: --check 1 does.")
 
 
 def _renders(scene: scenes.Scene) -> int:

@@ -143,10 +143,16 @@ def _surface(plan, space, values, title, path: Path) -> Path:
 
 
 def _seen(plan: Plan, path: Path) -> Path:
-    """The object from the optimal sensor: faces by brightness, required edges in colour."""
-    scene, pictures = plan.scene, Pictures.of(Picture.of(plan.scene, plan.sensor, plan.light))
-    solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
+    """The object from the optimal sensor."""
     figure, axis = plt.subplots(figsize=(6.5, 6), layout="constrained")
+    draw_seen(axis, plan.scene, plan.sensor, plan.light, plan.prediction.corners)
+    return _save(figure, path)
+
+
+def draw_seen(axis, scene, sensor, light, points) -> None:
+    """Draw the object from a sensor: faces by brightness, required edges in colour, points (px) as rings."""
+    pictures = Pictures.of(Picture.of(scene, sensor, light))
+    solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
     axis.set_facecolor("0.05")
     shown = facing(solid, position)
     levels = signal(pictures, solid.triangles.mean(1), solid.normals[solid.triangle_faces], 1)
@@ -167,7 +173,7 @@ def _seen(plan: Plan, path: Path) -> Path:
             _segment(axis, scene, pose, solid.edge(name), span, color=f"C{i % 10}", lw=2.5, label=name)
     for name in circles(scene):
         _rim(axis, scene, pose, solid.circle(name))
-    axis.plot(*recorded(plan.prediction.corners, camera).T, "o", mfc="none", color="w", ms=11, mew=1.5)
+    axis.plot(*recorded(points, camera).T, "o", mfc="none", color="w", ms=11, mew=1.5)
     low, high = (f(project(solid.vertices, pose, camera), axis=0) for f in (np.min, np.max))
     axis.set(
         xlim=(low[0] - 12, high[0] + 12),
@@ -176,9 +182,8 @@ def _seen(plan: Plan, path: Path) -> Path:
         xlabel="x, px",
         ylabel="y, px",
     )
-    axis.set_title(f"{scene.name} from {_short(plan.sensor)}, light at {_short(plan.light)}", fontsize=10)
+    axis.set_title(f"{scene.name} from {_short(sensor)}, light at {_short(light)}", fontsize=10)
     axis.legend(title="required", fontsize=8, loc="upper right")
-    return _save(figure, path)
 
 
 def _segment(axis, scene, pose, edge, span, **style) -> None:

@@ -1,0 +1,117 @@
+"""What a plan of several pictures is: the pictures, what they tell together, and how good that is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from planner.combining import Combination
+from planner.prediction import Prediction
+from scenes import Pose, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One picture of several.
+
+    Attributes
+    ----------
+    sensor, light : Pose
+    prediction : Prediction
+        Of this picture alone, looked at closely.
+    """
+
+    sensor: Pose
+    light: Pose
+    prediction: Prediction
+
+
+@dataclass(frozen=True, eq=False)
+class ViewSet:
+    """The best K pictures that were found; one may be there several times.
+
+    Attributes
+    ----------
+    views : tuple of View
+    combination : Combination
+        What they tell together.
+    minimised : float
+        Largest squared ratio of combined sigma to tolerance, or the weighted sum, of what is measured (of a single
+        quantity its variance); what is ``clutter`` counts as four times its variance.
+    lost : tuple of str
+        Names of the quantities that none of the pictures measures.
+    over_one, over_repeats : float or None
+        How many times as large what is minimised is for the best single picture, and for that one taken K times, which
+        takes as long; None where that picture does not measure as many quantities.
+    exhaustive : float or None
+        What is minimised by the best of all sets of K of the settings that were looked at; None where they are more
+        than 200 000.
+    bound : float or None
+        What no K pictures of the grid can stay below, if a glance is right and nothing is clutter; None where some
+        quantity cannot be measured anywhere, or what is shared is not free.
+    """
+
+    views: tuple[View, ...]
+    combination: Combination
+    minimised: float
+    lost: tuple[str, ...]
+    over_one: float | None
+    over_repeats: float | None
+    exhaustive: float | None
+    bound: float | None
+
+    @property
+    def worst_ratio(self) -> float | None:
+        """Largest combined sigma over tolerance of what is measured; None without tolerances."""
+        return self._worst[0]
+
+    @property
+    def limiting(self) -> str | None:
+        """Name of that quantity."""
+        return self._worst[1]
+
+    @property
+    def _worst(self) -> tuple[float, str] | tuple[None, None]:
+        told = zip(self.views[0].prediction.measurands, self.combination.variances, strict=True)
+        known = [(math.sqrt(v) / each.tolerance.half, each.name) for each, v in told if each.tolerance and v < math.inf]
+        return max(known, default=(None, None))
+
+    @property
+    def gap(self) -> float | None:
+        """``minimised`` over ``exhaustive``, less 1: what greedy search with exchange leaves."""
+        return None if self.exhaustive is None else self.minimised / self.exhaustive - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """For 1, 2, ... N pictures the best ones, and how they were found.
+
+    Attributes
+    ----------
+    scene : Scene
+    over, model : str
+    share : str or None
+        What all pictures of a set have in common: ``sensor`` or ``light``.
+    sets : tuple of ViewSet
+        One for each number of pictures.
+    pairs : int
+        Pairs of the grid.
+    looked : int
+        Settings looked at closely.
+    guarantee : str
+        What is known about the optimum.
+    most_over_repeats : float or None
+        What `ViewSet.over_repeats` can be at most, of the grid's best pair and however many pictures of the grid, if a
+        glance is right and nothing is clutter; 1 where one picture sees all best. None as of `ViewSet.bound`, and
+        where no picture measures all.
+    """
+
+    scene: Scene
+    over: str
+    model: str
+    share: str | None
+    sets: tuple[ViewSet, ...]
+    pairs: int
+    looked: int
+    guarantee: str
+    most_over_repeats: float | None

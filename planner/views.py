@@ -1,0 +1,247 @@
+"""Several pictures that together measure all quantities best: where sensor and light stand for each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+
+from planner.combining import combine
+from planner.models import DEFAULT_MODEL, ModelName
+from planner.planning import COARSE_STEP, _fixed, _Option
+from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
+from planner.search.beside import descend
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import Report, has_bound
+from planner.search.looked import Pool, glanced
+from planner.search.subsets import (
+    MOST_SETS,
+    Information,
+    every_set,
+    front,
+    greedy,
+    least_value,
+    sets_of,
+)
+from planner.search.worthwhile import all_ok, alone, shared, worthwhile
+from planner.view_sets import View, Views, ViewSet
+from scenes import InvalidInput, Pose, Scene
+
+Share = Literal["sensor", "light"]
+MOST_VIEWS = 12
+_FINE_STEP = 5.0  # degrees, where a pair takes microseconds
+_MOST_NUMBERS = 30_000_000  # pairs x quantities that a grid may have
+_LOOKS = 20  # a number of pictures: how many settings are looked at closely for each
+
+
+def plan_views(
+    scene: Scene,
+    count: int,
+    objective: Objective = DEFAULT_OBJECTIVE,
+    *,
+    over: Over = DEFAULT_OVER,
+    model: ModelName = DEFAULT_MODEL,
+    step_deg: float | None = None,
+    constraints: Constraints | None = None,
+    sensor: Any = None,
+    light: Any = None,
+    share: Share | None = None,
+    refined: bool = True,
+    report: Report | None = None,
+) -> Views:
+    """Find ``count`` pictures, each of one sensor and light, that together measure all quantities best.
+
+    Each quantity is combined by inverse variance from the pictures in which it is ``ok``, and what is minimised is
+    what `plan` minimises, of these variances. N pictures take N times as long as one: compare them with one picture
+    taken N times, whose variances are an Nth. Several sensors at a time are several pictures.
+
+    All pairs of a grid are glanced at; of those that no other can stand in for, sets are chosen greedily with
+    exchange. What is chosen is looked at closely (clutter, light between surfaces), and chosen again, until all that
+    is chosen has been looked at; then the poses of each picture descend, those of the others held.
+
+    Parameters
+    ----------
+    scene : Scene
+    count : int
+        1 to 12.
+    objective : {"object"}
+        Values in different images do not combine.
+    over, model, constraints, sensor, light, refined
+        As of `plan`.
+    step_deg : float, optional
+        Grid step; by default 5 where a pair takes microseconds (convex, diffuse, straight edges) and nothing is
+        shared, else 10 degrees.
+    share : {"sensor", "light"}, optional
+        Hold one the same in all pictures of a set: one camera and several lamps, or the reverse. Not refined.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is none of its choices, or no allowed setting can measure anything.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> found = plan_views(scenes.load("task1"), 2, step_deg=10)
+    >>> round(found.sets[1].over_repeats, 6)  # of one quantity, the best picture twice
+    1.0
+    """
+    aim = _aim(scene, count, objective, over, model, share)
+    constraints, report = constraints or Constraints(), report or (lambda *_: None)
+    sensor, light = _fixed(scene, constraints, sensor, light)
+    fast = has_bound(scene, model) and share is None
+    step = (_FINE_STEP if fast else COARSE_STEP) if step_deg is None else step_deg
+    option = _Option.of(scene, model, step, constraints, sensor, light)
+    pairs = len(option.sensors) * len(option.lights)
+    if pairs * len(scene.quantities) > _MOST_NUMBERS:
+        most = f"{_MOST_NUMBERS:.0e} pairs times measurands"
+        raise InvalidInput(f"step must leave at most {most} for several pictures, got {step:g} ({pairs:.2g} pairs)")
+    told = glanced(scene, option.sensors, option.lights, model, aim, constraints, report)
+    if not told.any():
+        raise InvalidInput("constraints must leave a setting that can measure, got none")
+    pool, groups = _pool(option, aim, told, share, count)
+    _look(pool, groups, count, _LOOKS * count, report)
+    if refined and option.free and share is None:
+        _refine(pool, count, option.constraints, step, report)
+    bounds, most = _bounds(aim, told, count) if share is None else ([None] * count, None)
+    return Views(
+        scene, aim.over, model, share, _sets(pool, groups, count, bounds), pairs, len(pool.closely),
+        _guarantee(step, share), most,
+    )  # fmt: skip
+
+
+def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share: str | None) -> Aim:
+    """What is minimised, once the arguments are seen to be usable."""
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_VIEWS:
+        raise InvalidInput(f"views must be 1 to {MOST_VIEWS}, got {count}")
+    if share not in (None, "sensor", "light"):
+        raise InvalidInput(f"share must be one of sensor, light, got {share!r}")
+    if model not in ("calibrated", "paper"):
+        raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
+    aim = Aim.of(scene.quantities, objective, over)
+    if aim.unit != "object":
+        raise InvalidInput(f"objective must be object for several pictures, got {aim.unit!r}")
+    return aim
+
+
+def _pool(option: _Option, aim: Aim, told: np.ndarray, share: str | None, count: int) -> tuple[Pool, np.ndarray | None]:
+    """The settings to choose from, and which of them share a place."""
+    rows = worthwhile(told, aim) if share is None else shared(told, aim, share, count)
+    s, k = np.unravel_index(rows, told.shape[:2])
+    poses = np.concatenate([option.sensors[s], option.lights[k]], 1)
+    pool = Pool(option.scene, option.model, aim, poses, told.reshape(-1, told.shape[-1])[rows])
+    return pool, None if share is None else s if share == "sensor" else k
+
+
+def _chosen(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> tuple[tuple[int, ...], ...]:
+    """For 1 to ``count`` pictures the best sets of some rows of a table, those of one group where there are groups."""
+    best: list[tuple] = []
+    for _, own in _grouped(rows, groups):
+        kept = own[front(table.only(own))]
+        if not len(kept):
+            continue
+        some = table.only(kept)
+        found = greedy(some, count)
+        told = [(some.of_sets(np.array(each)).at(0), tuple(int(kept[i]) for i in each)) for each in found]
+        best = [min(pair, key=lambda each: each[0]) for pair in zip(best, told, strict=True)] if best else told
+    return tuple(members for _, members in best)
+
+
+def _grouped(rows: np.ndarray, groups: np.ndarray | None) -> Iterator[tuple[int, np.ndarray]]:
+    if groups is None:
+        yield 0, rows
+        return
+    for group in np.unique(groups[rows]):
+        yield int(group), rows[groups[rows] == group]
+
+
+def _look(pool: Pool, groups: np.ndarray | None, count: int, most: int, report: Report) -> None:
+    """Choose, look closely at what is chosen and choose again, until nothing new is chosen or ``most`` were seen."""
+    everything = np.arange(len(pool.poses))
+    while len(pool.closely) < most:
+        chosen = _chosen(pool.expected(), everything, groups, count)
+        fresh = [row for row in dict.fromkeys(row for members in chosen for row in members) if row not in pool.closely]
+        if not fresh:
+            return
+        for row in fresh[: most - len(pool.closely)]:
+            pool.look(row)
+            report("close looks", len(pool.closely), most)
+
+
+def _refine(pool: Pool, count: int, constraints: Constraints, step: float, report: Report) -> None:
+    """Let the poses of each chosen picture descend, once, the others of its set held; what is found joins the pool."""
+    done: set[int] = set()
+    for size in range(1, count + 1):
+        seen, known = pool.seen, pool.known()
+        members = _chosen(known, np.arange(len(seen)), None, size)[-1]
+        for position, member in enumerate(members):
+            row = int(seen[member])
+            if row in done:
+                continue
+            others = list(members[:position] + members[position + 1 :])
+            rest = known.ok[others].sum(0), known.clutter[others].sum(0)
+            done |= {row, descend(pool, row, rest, constraints, step)}
+        report("descents", size, count)
+
+
+def _bounds(aim: Aim, told: np.ndarray, count: int) -> tuple[list[float | None], float | None]:
+    """Of each number of pictures, by a glance at the whole grid; and over how many repeats they can be better."""
+    table = all_ok(told.reshape(-1, told.shape[-1]), aim)
+    table = table.only(front(table))
+    found = [least_value(table, size) for size in range(1, count + 1)]
+    if not math.isfinite(found[0]):
+        return [None] * count, None
+    single = float(alone(table.ok, aim).min())
+    return list(found), single / found[0] if math.isfinite(single) else None
+
+
+def _sets(pool: Pool, groups: np.ndarray | None, count: int, bounds: list[float | None]) -> tuple[ViewSet, ...]:
+    seen, table = pool.seen, pool.known()
+    own = None if groups is None else groups[seen]
+    rows = np.arange(len(seen))
+    chosen = _chosen(table, rows, own, count)
+    first = table.of_sets(np.array(chosen[0])).at(0)
+    made = []
+    for members, bound in zip(chosen, bounds, strict=True):
+        lost, value, _ = table.of_sets(np.array(members)).at(0)
+        views = tuple(_view(pool, int(seen[member])) for member in members)
+        combination = combine([view.prediction for view in views])
+        over_one = first[1] / value if lost == first[0] else None
+        made.append(
+            ViewSet(
+                views=views,
+                combination=combination,
+                minimised=value,
+                lost=tuple(q.name for q, used in zip(pool.scene.quantities, combination.used.any(0), strict=True)
+                           if not used),
+                over_one=over_one,
+                over_repeats=None if over_one is None else over_one / len(members),
+                exhaustive=_exhaustive(table, rows, own, len(members)),
+                bound=bound,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _exhaustive(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> float | None:
+    """What is minimised by the best of all sets of the rows; None where they are too many to try."""
+    kept = [own[front(table.only(own))] for _, own in _grouped(rows, groups)]
+    if sum(sets_of(len(own), count) for own in kept) > MOST_SETS:
+        return None
+    found = [(table.only(own), every_set(table.only(own), count)) for own in kept if len(own)]
+    return min(some.of_sets(np.array(best)).at(0) for some, best in found)[1]
+
+
+def _view(pool: Pool, row: int) -> View:
+    sensor, light = (Pose(*map(float, pool.poses[row, part])) for part in (slice(0, 2), slice(2, 4)))
+    return View(sensor, light, pool.closely[row])
+
+
+def _guarantee(step: float, share: str | None) -> str:
+    held = "" if share is None else f", the same {share} in all"
+    return (
+        f"no exchange of one picture for another that was looked at makes a set better{held}; of all pairs of the"
+        f" {step:g} degree grid only the bound is known"
+    )

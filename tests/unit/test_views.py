@@ -1,0 +1,100 @@
+"""Plans of several pictures."""
+
+import numpy as np
+import pytest
+
+import planner
+import scenes
+from planner.search.aim import Aim
+from tests.sides import sides
+
+
+@pytest.fixture(scope="module")
+def around(tmp_path_factory):
+    """A front and a top, for 1 to 3 pictures."""
+    scene = sides(tmp_path_factory.mktemp("sides"), "front", "height", "top")
+    return planner.plan_views(scene, 3, step_deg=20, refined=False)
+
+
+def test_two_pictures_beat_one_repeated(around):
+    one, two, three = around.sets
+    assert one.lost == ()
+    assert one.over_one == one.over_repeats == 1
+    assert two.over_repeats > 1.3  # two different ones are better than one twice, which would be 1
+    assert two.over_one == pytest.approx(2 * two.over_repeats)
+    assert one.minimised > two.minimised > three.minimised
+    assert len({view.sensor for view in two.views}) == 2
+
+
+def test_gap_to_all_sets_of_what_was_looked_at(around):
+    for each in around.sets:
+        assert each.gap is not None
+        assert 0 <= each.gap + 1e-9 < 0.05
+        assert each.bound <= each.minimised
+
+
+def test_what_is_minimised_is_of_the_combination(around):
+    """By hand from the single pictures: ok ones, or where there is none clutter, which counts 4 times its variance."""
+    aim = Aim.of(around.scene.quantities, "object")
+    for each in around.sets:
+        variances = np.array([[f.variance_object for f in view.prediction.measurands] for view in each.views])
+        fine = np.array([[f.status == "ok" for f in view.prediction.measurands] for view in each.views])
+        own = 1 / np.where(fine | ~fine.any(0), 1 / variances, 0).sum(0)
+        np.testing.assert_allclose(each.combination.variances, own)
+        assert each.minimised == pytest.approx(float(aim(np.where(fine.any(0), own, 4 * own))))
+        assert each.worst_ratio == pytest.approx(float(aim(own)) ** 0.5)
+
+
+def test_opposite_sides_need_two_pictures(tmp_path):
+    """No picture sees front and back; what is not measured is said, and two measure both."""
+    found = planner.plan_views(sides(tmp_path, "front", "back"), 2, step_deg=30, refined=False)
+    one, two = found.sets
+    assert len(one.lost) == 1
+    assert np.isinf(one.combination.variances).sum() == 1
+    assert found.most_over_repeats is None
+    assert two.lost == ()
+    assert two.over_one is two.over_repeats is None
+    assert np.isfinite(two.combination.variances).all()
+    assert two.combination.used.sum(0).tolist() == [1, 1]
+
+
+def test_one_sensor_for_all(tmp_path):
+    scene = sides(tmp_path, "front", "top")
+    for share in ("sensor", "light"):
+        found = planner.plan_views(scene, 2, step_deg=30, share=share)
+        for each in found.sets:
+            assert len({getattr(view, share) for view in each.views}) == 1
+        assert found.sets[1].minimised <= found.sets[0].minimised / 2 * (1 + 1e-9)
+
+
+def test_one_quantity_is_best_measured_by_repeats(task1):
+    found = planner.plan_views(task1, 2, step_deg=20)
+    assert found.sets[1].over_repeats == pytest.approx(1)
+    assert found.most_over_repeats == pytest.approx(1)
+    rough = planner.plan_views(task1, 1, step_deg=20, refined=False)
+    assert found.sets[0].minimised < rough.sets[0].minimised
+
+
+def test_held_sensor(task1):
+    found = planner.plan_views(task1, 2, step_deg=30, sensor=(30, 135))
+    assert {tuple(view.sensor) for each in found.sets for view in each.views} == {(30.0, 135.0)}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"count": 0}, r"views must be 1 to 12, got 0"),
+        ({"count": 13}, r"views must be 1 to 12, got 13"),
+        ({"count": 2, "objective": "image"}, r"objective must be object for several pictures, got 'image'"),
+        ({"count": 2, "share": "both"}, r"share must be one of sensor, light, got 'both'"),
+        ({"count": 2, "model": "bound"}, r"model must be one of calibrated, paper for several pictures, got 'bound'"),
+        (
+            {"count": 2, "step_deg": 1.0},
+            r"step must leave at most 3e\+07 pairs times measurands for several pictures, got 1",
+        ),
+        ({"count": 2, "light": (170, 0)}, r"light must keep the constraints"),
+    ],
+)
+def test_bad_input(task1, arguments, line):
+    with pytest.raises(scenes.InvalidInput, match=line):
+        planner.plan_views(task1, **arguments)

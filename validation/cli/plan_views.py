@@ -1,0 +1,158 @@
+"""``ice plan --views``: several pictures that together measure all measurands best."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+import scenes
+from planner.views import MOST_VIEWS
+from validation.cli.common import progress
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    import planner
+    from validation.views_check import ViewsCheck
+
+
+def check_options(views: int | None, share: str | None, others: dict[str, tuple[object, object]]) -> None:
+    """See that the options make sense together.
+
+    Parameters
+    ----------
+    others : dict
+        Of each option that several pictures have no use for its value, and the value that says nothing.
+    """
+    if views is None:
+        raise scenes.InvalidInput(f"--views must be given with --views-share, got nothing beside {share!r}")
+    if not 1 <= views <= MOST_VIEWS:
+        raise scenes.InvalidInput(f"--views must be 1 to {MOST_VIEWS}, got {views}")
+    if share not in (None, "sensor", "light"):
+        raise scenes.InvalidInput(f"--views-share must be one of sensor, light, got {share!r}")
+    for option, (value, none) in others.items():
+        if value != none:
+            raise scenes.InvalidInput(f"{option} must be left out with --views, got {value}")
+
+
+def run(
+    scene: scenes.Scene, count: int, objective: str, how: dict, checked: bool, out: Path | None, as_json: bool
+) -> None:
+    """Plan, check by rendering, show; the command ends with 1 if the pictures contradict the plan."""
+    import planner
+
+    began = time.perf_counter()
+    with progress(f"{scene.name}: searching", "steps") as shown:
+        found = planner.plan_views(scene, count, objective, **how, report=shown or (lambda *_: None))
+    seconds = time.perf_counter() - began
+    check = _check(found) if checked else None
+    pictures = _pictures(found, out) if out else []
+    if as_json:
+        print(json.dumps(facts(found, check, pictures, seconds), indent=1))
+    else:
+        from validation.report import views_table
+
+        shown_on = console()
+        shown_on.print(views_table.report(found, check, seconds), highlight=False)
+        for path in pictures:
+            shown_on.print(f"picture: {path}", highlight=False)
+    if check and check.verdict and not check.verdict.agrees:
+        raise typer.Exit(1)
+
+
+def _check(found: planner.Views) -> ViewsCheck:
+    from validation.views_check import check_views
+
+    with progress(f"{found.scene.name}: rendering", "pictures") as shown:
+        return check_views(found, report=shown or (lambda *_: None))
+
+
+def _pictures(found: planner.Views, out: Path) -> list[Path]:
+    from validation.report import views_figure  # matplotlib takes half a second to load
+
+    return views_figure.draw(found, out)
+
+
+def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], seconds: float) -> dict:
+    """Everything for JSON; null is what is infinite or not known."""
+    return {
+        "scene": found.scene.name,
+        "objective": "object",
+        "over": found.over,
+        "model": found.model,
+        "share": found.share,
+        "views": [_set(each) for each in found.sets],
+        "most_over_repeats": found.most_over_repeats,
+        "pairs": found.pairs,
+        "looked": found.looked,
+        "guarantee": found.guarantee,
+        "check": None if check is None else _checked(check),
+        "pictures": [str(path) for path in pictures],
+        "seconds": seconds,
+    }
+
+
+def _set(each: planner.ViewSet) -> dict:
+    both, first = each.combination, each.views[0].prediction.measurands
+    joint = {"covariance": both.covariance, "covariance_least_squares": both.covariance_least_squares}
+    return {
+        "count": len(each.views),
+        "poses": [{"sensor": list(view.sensor), "light": list(view.light)} for view in each.views],
+        "minimised": each.minimised,
+        "worst_ratio": each.worst_ratio,
+        "limiting": each.limiting,
+        "lost": list(each.lost),
+        "over_one": each.over_one,
+        "over_repeats": each.over_repeats,
+        "exhaustive": each.exhaustive,
+        "gap": each.gap,
+        "bound": each.bound,
+        "measurands": [_measurand(each, m) for m in range(len(first))],
+        **{name: [[_known(value) for value in row] for row in matrix.tolist()] for name, matrix in joint.items()},
+    }
+
+
+def _measurand(each: planner.ViewSet, m: int) -> dict:
+    both, forecast = each.combination, each.views[0].prediction.measurands[m]
+    sigma, jointly = (_known(float(matrix[m, m])) for matrix in (both.covariance, both.covariance_least_squares))
+    return {
+        "name": forecast.name,
+        "kind": forecast.kind,
+        "unit": forecast.unit,
+        "sigma": None if sigma is None else math.sqrt(sigma),
+        "sigma_least_squares": None if jointly is None else math.sqrt(jointly),
+        "bias": _known(float(both.bias[m])),
+        "status": both.status[m],
+        "pictures": [v + 1 for v in range(len(each.views)) if both.used[v, m]],
+        "weights": both.weights[:, m].tolist(),
+        "single": [_alone(view.prediction.measurands[m]) for view in each.views],
+    }
+
+
+def _alone(forecast: planner.Forecast) -> dict:
+    """What one picture tells."""
+    variance = _known(forecast.variance_object)
+    return {"sigma": None if variance is None else math.sqrt(variance), "status": forecast.status}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _checked(check: ViewsCheck) -> dict:
+    rows = [
+        {name: _known(value) if isinstance(value, float) else value for name, value in vars(row).items()}
+        for row in check.rows
+    ]
+    verdict = check.verdict
+    return {
+        "rows": rows,
+        "agrees": None if verdict is None else verdict.agrees,
+        "verdict": None if verdict is None else verdict.text,
+        "reason": check.reason or None,
+        "seconds": check.seconds,
+    }

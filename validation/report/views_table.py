@@ -1,0 +1,149 @@
+"""What ``ice plan --views`` prints."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+import planner
+from scenes import Pose
+from validation.views_check import CheckedQuantity, ViewsCheck
+
+
+def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
+    """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
+    parts = [Text(_head(found)), _numbers(found), _poses(found), _quantities(found), Text(_searched(found, seconds))]
+    if check:
+        parts += [_checked(check)] if check.rows else []
+        said = check.verdict.text if check.verdict else f"Nothing is judged: {check.reason}."
+        parts.append(Text(f"  {said}\n  The check took {check.seconds:.1f} s (--no-check leaves it out)."))
+    return Group(*parts)
+
+
+def _head(found: planner.Views) -> str:
+    held = f", one {found.share} for all" if found.share else ""
+    return (
+        f"{found.scene.title or found.scene.name}\n"
+        f"Pictures that together measure best: least {_minimised(found)} ({found.model} model){held}"
+    )
+
+
+def _minimised(found: planner.Views) -> str:
+    if len(found.scene.quantities) == 1:
+        return "variance"
+    return "worst ratio of sigma to tolerance, squared" if found.over == "minimax" else "sum of ratios^2"
+
+
+def _numbers(found: planner.Views) -> Table:
+    columns = ("pictures", "measured", "minimised", "worst ratio", "limited by", "one / it", "repeats / it",
+               "over exhaustive", "over grid's bound")  # fmt: skip
+    table = _table("\nN pictures take N times as long: the fair comparison is with the best one repeated", *columns)
+    whole = len(found.scene.quantities)
+    for each in found.sets:
+        table.add_row(
+            str(len(each.views)), f"{whole - len(each.lost)} of {whole}", f"{each.minimised:.4g}",
+            _number(each.worst_ratio, ".3g"), each.limiting or "-", _number(each.over_one, ".3f"),
+            _number(each.over_repeats, ".3f"),
+            "not searched" if each.gap is None else f"{100 * each.gap:.1f} %",
+            _number(each.bound and each.minimised / each.bound, ".2f"),
+        )  # fmt: skip
+    return table
+
+
+def _poses(found: planner.Views) -> Table:
+    table = _table("\nWhere they are taken", "pictures", "", "sensor", "light", "measures alone")
+    for each in found.sets:
+        for number, view in enumerate(each.views, 1):
+            told = view.prediction.measurands
+            fine, doubtful = (sum(f.status == state for f in told) for state in ("ok", "clutter"))
+            alone = f"{fine} ok" + (f", {doubtful} clutter" if doubtful else "")
+            row = (str(len(each.views)) if number == 1 else "", f"no. {number}", _pose(view.sensor), _pose(view.light))
+            table.add_row(*row, alone)
+    return table
+
+
+def _quantities(found: planner.Views) -> Table:
+    """Of each measurand its sigma for each number of pictures, and which pictures it is taken from."""
+    columns = [f"sigma of {len(each.views)}" for each in found.sets]
+    last = found.sets[-1]
+    title = "\nEach measurand by inverse variance from the pictures that see it; beside it all jointly by least squares"
+    table = _table(title, "name", "unit", *columns, "jointly", "taken from", "status")
+    for m, forecast in enumerate(last.views[0].prediction.measurands):
+        sigmas = [_sigma(each.combination.covariance[m, m]) for each in found.sets]
+        used = [str(v + 1) for v in range(len(last.views)) if last.combination.used[v, m]]
+        jointly = _sigma(last.combination.covariance_least_squares[m, m])
+        taken = "no. " + " ".join(used) if used else "-"
+        table.add_row(forecast.name, forecast.unit, *sigmas, jointly, taken, last.combination.status[m])
+    return table
+
+
+def _searched(found: planner.Views, seconds: float) -> str:
+    most = found.most_over_repeats
+    lines = [
+        f"  {found.pairs} pairs glanced at, {found.looked} settings looked at closely, in {seconds:.1f} s",
+        f"  Guarantee: {found.guarantee}.",
+    ]
+    if most is not None:
+        lines.append(
+            "  By a glance at the grid, were nothing clutter: no pictures, however many, are more than"
+            f" {most:.2f} times as good as the best one repeated."
+        )
+    if any(row.status == "clutter" for row in _all_told(found)):
+        lines.append(
+            "  What is clutter counts as 4 times its variance in what is minimised, and only where no picture is ok."
+        )
+    return "\n".join(lines)
+
+
+def _all_told(found: planner.Views):
+    return (told for each in found.sets for view in each.views for told in view.prediction.measurands)
+
+
+def _checked(check: ViewsCheck) -> Table:
+    images = check.rows[0].n + check.rows[0].failed
+    title = f"\nEach picture rendered, {images} noisy images of it measured, their values combined by these weights"
+    columns = ("pictures", "name", "predicted sigma", "measured / predicted", "least squares", "bias", "propagated /",
+               "failed", "status")  # fmt: skip
+    table = _table(title, *columns)
+    for row in check.rows:
+        table.add_row(
+            str(row.pictures), row.name, _sigma(row.predicted), _interval(row.ratio, row.ratio_interval),
+            _interval(row.ratio_least_squares, row.interval_least_squares), _bias(row),
+            _number(row.propagated / row.predicted, ".3f"), str(row.failed),
+            row.status if row.judged else f"{row.status}, not judged",
+        )  # fmt: skip
+    return table
+
+
+def _bias(row: CheckedQuantity) -> str:
+    """Mean error in sigmas."""
+    return "-" if row.bias is None else f"{row.bias / row.predicted**0.5:+.2f} sigma"
+
+
+def _interval(ratio: float | None, interval: tuple[float, float] | None) -> str:
+    if ratio is None or interval is None:
+        return "-"
+    out = "" if interval[0] <= 1 <= interval[1] else " *"
+    return f"{ratio:.3f} [{interval[0]:.3f}, {interval[1]:.3f}]{out}"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None or not math.isfinite(value) else format(value, form)
+
+
+def _sigma(variance: float) -> str:
+    return f"{math.sqrt(variance):.3g}" if math.isfinite(variance) else "-"
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def _pose(pose: Pose) -> str:
+    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
