@@ -18,7 +18,7 @@ from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.poses import as_array, as_poses
 from planner.search.refinement import refine
-from planner.search.sharing import Shared, applies, by_turns, search_shared, shares_of, shares_of_two
+from planner.search.sharing import Shared, applies, by_turns, search_shared, shares_of, shares_of_two, with_shares
 from planner.search.trusted import trusted, untrusted
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Picture, Pose, Scene, Task, several
@@ -42,7 +42,7 @@ class Plan:
     shares : tuple of float
         Of each light of several, of the sum of their intensities; the scene's intensities are made of them.
     alone : float or None
-        Of two lights: what is minimised on the grid where one of them has all.
+        Of two lights: the least of what is minimised where one of them has all; refined if the plan is.
     objective, over, model : str
     variance : float
         What was minimised: the scene's unit squared or px^2 (degrees^2 for an angle); of several measurands the squared
@@ -314,7 +314,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         sensor=Pose(*map(float, sensor)),
         light=as_poses(light),
         shares=shares_of(scene) if len(scene.lights) > 1 else (),
-        alone=result.shared and result.shared.alone,
+        alone=_alone(option, result, aim, refined),
         objective=aim.unit,
         over=aim.over,
         model=option.model,
@@ -333,6 +333,16 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         candidates=choice,
         set_aside=chosen.set_aside,
     )  # fmt: skip
+
+
+def _alone(option: _Option, result: _Result, aim: Aim, refined: bool) -> float | None:
+    """The least of what is minimised where one of several lights has all; None where that is not known."""
+    best = result.shared and result.shared.alone
+    if best is None or not refined:
+        return best and best.value
+    scene = with_shares(option.scene, best.shares)
+    how = option.model, aim, option.step_deg, option.constraints
+    return refine(scene, best.sensor, best.lights, *how, sizes=(0.7, 0.1))[2]
 
 
 def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:

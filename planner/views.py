@@ -89,6 +89,8 @@ def plan_views(
     1.0
     """
     aim = _aim(scene, count, objective, over, model, share)
+    if len(scene.lights) != 1 or not scene.free:
+        raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
     constraints, report = constraints or Constraints(), report or (lambda *_: None)
     sensor, light = _fixed(scene, constraints, sensor, light)
     fast = has_bound(scene, model) and share is None

@@ -60,10 +60,8 @@ class Picture:
         sensor = scene.check_pose("sensor", sensor)
         if lights is None and scene.free:
             return cls(scene, sensor)
-        poses = several(() if lights is None else lights)
-        if len(poses) == len(scene.lights):
-            poses = tuple(poses[i] for i in scene.free)  # those of another picture, complete
-        return cls(scene, sensor, _complete(scene, sensor, scene.check_lights(poses)))
+        free = scene.check_lights(several(() if lights is None else lights))
+        return cls(scene, sensor, _complete(scene, sensor, free))
 
     @property
     def light(self) -> Pose | None:

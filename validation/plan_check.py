@@ -13,7 +13,7 @@ import planner
 import render
 from measure import status
 from render import Quality
-from scenes import InvalidInput, Pose, Scene, Setting
+from scenes import InvalidInput, Pose, Scene, Setting, several
 
 ESTIMATOR = "gradient"  # whose closed form the calibrated model is
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
@@ -25,7 +25,8 @@ class CheckedSetting:
 
     Attributes
     ----------
-    sensor, light : Pose
+    sensor : Pose
+    light : Pose or tuple of Pose
     edges : tuple of str
         Required edges.
     calibrated, propagated : float
@@ -137,7 +138,8 @@ def _best(found: planner.Plan) -> list[tuple[Pose, Pose, tuple[str, ...]]]:
 
 def _same(first: tuple, second: tuple) -> bool:
     """Whether sensors and lights stand nearly in the same place."""
-    return all(_angle(a, b) < _SAME for a, b in zip(first[:2], second[:2], strict=True))
+    places = ((each[0], *several(each[1])) for each in (first, second))
+    return all(_angle(a, b) < _SAME for a, b in zip(*places, strict=True))
 
 
 def _angle(first: Pose, second: Pose) -> float:

@@ -50,8 +50,6 @@ class Pictures:
         if lights is None and scene.free:
             return cls(scene, sensors)
         each = lights if isinstance(lights, tuple) and len(scene.free) != 1 else () if lights is None else (lights,)
-        if len(each) == len(scene.lights):
-            each = tuple(each[i] for i in scene.free)
         if len(each) != len(scene.free):
             raise InvalidInput(f"lights must be {len(scene.free)} arrays, one for each free light, got {len(each)}")
         free = iter([poses(some, "lights") for some in each])

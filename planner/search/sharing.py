@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,15 @@ _AT_ONCE = 1 << 21  # contrasts in memory
 _ENDS = 0.85  # at least, of a line's first-order variance, is left by what is at its ends; 2 s / (sqrt(pi) length) goes
 
 
+class Alone(NamedTuple):
+    """The best setting with one light that has all: what is minimised, shares, sensor (2,) and lights (2 F,)."""
+
+    value: float
+    shares: tuple[float, float]
+    sensor: np.ndarray
+    lights: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Shared:
     """The best lights for each sensor.
@@ -47,14 +57,14 @@ class Shared:
         Poses of the free lights that are best for each sensor with these shares.
     found : Found
         The best sensor; its lights are those of the same number.
-    alone : float or None
-        The least of what is minimised where one light has all; None where that was not asked.
+    alone : Alone or None
+        The best where one light has all; None where that was not asked.
     """
 
     scene: Scene
     lights: np.ndarray
     found: Found
-    alone: float | None
+    alone: Alone | None
 
 
 def applies(scene: Scene, model: str) -> bool:
@@ -86,17 +96,16 @@ def search_shared(
     looks = _Looks(scene, places, aim, constraints)
     bounds = np.array([looks.bound(sensor) for sensor in sensors])
     order = np.argsort(bounds)
-    best, chosen, alone, evaluated = np.inf, shares[0], np.inf, 0
+    best, chosen, alone = np.inf, shares[0], None
     for done, s in enumerate(order.tolist()):
         report("lights", done + 1, 2 * len(sensors))
         if not bounds[s] <= best:
             break
         known = looks.look(sensors[s])
         for share in shares:
-            value, _ = looks.best(known, share)
-            evaluated += 1
-            if max(share) == 1:
-                alone = min(alone, value)
+            value, lights = looks.best(known, share)
+            if max(share) == 1 and np.isfinite(value) and (alone is None or value < alone.value):
+                alone = Alone(value, share, sensors[s], lights)
             if value < best * (1 - 1e-9):
                 best, chosen = value, share
     return _table(scene, sensors, order, bounds, looks, model, aim, chosen, (best, alone), report)
@@ -121,7 +130,7 @@ def _table(scene, sensors, order, bounds, looks, model, aim, chosen, known, repo
     pairs = len(sensors) * looks.combinations
     which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
     found = Found(best, best, float(least[best]), pairs, len(first), which, least, guaranteed=True)
-    return Shared(other, lights, found, known[1] if np.isfinite(known[1]) else None)
+    return Shared(other, lights, found, known[1])
 
 
 def by_turns(scene, sensors, places, model, aim: Aim, constraints: Constraints, report: Report) -> Shared:

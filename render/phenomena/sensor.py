@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.imaging.backlight import backlights
 from planner.imaging.sensor import shot_noise
 from planner.models import DEFAULT_MODEL, variance_model
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
@@ -16,7 +17,8 @@ def _brightest(pictures: Pictures) -> float:
     """Highest level above darkness beside a required edge."""
     scene = pictures.scene
     floor = scene.camera.exposure * scene.floor.reflectance if scene.floor else 0.0
-    return max(float(sides(pictures).levels.max()), floor)
+    behind = sum(scene.camera.exposure * scene.lights[which].intensity for which in backlights(scene))
+    return max(float(sides(pictures).levels.max()), floor, behind)
 
 
 def _relative(part: float, rest: float) -> Influence:

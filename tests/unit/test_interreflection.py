@@ -8,7 +8,7 @@ import pytest
 from planner.imaging.pictures import Pictures
 from render.phenomena import transport
 from render.phenomena.register import REGISTER
-from render.phenomena.transport import _above_floor, _albedo, _clearance, _form_factor, _gain, _hides
+from render.phenomena.transport import _above_floor, _clearance, _form_factor, _gain, _hides, albedo
 from scenes import Floor, Material, Obstacle
 
 WALL = Obstacle(corner=(20.0, -5.0, 0.0), size=(2.0, 10.0, 6.0))
@@ -60,8 +60,8 @@ def test_albedo_and_gain(task1):
     """No more is sent on than the diffuse part and all of the specular one; light is nearest at the farthest corner."""
     dull = Material(specular_fraction=0.2, diffuse_reflectance=0.5)
     glossy = Material(specular_fraction=0.2, diffuse_reflectance=0.5, refractive_index=1.5)
-    assert _albedo(SimpleNamespace(material=dull)) == pytest.approx(0.4)
-    assert _albedo(SimpleNamespace(material=glossy)) == pytest.approx(0.6)
+    assert albedo(SimpleNamespace(material=dull)) == pytest.approx(0.4)
+    assert albedo(SimpleNamespace(material=glossy)) == pytest.approx(0.6)
     far = max(np.linalg.norm(v - np.array(task1.camera.look_at)) for v in task1.solid.vertices)
     assert _gain(task1) == pytest.approx((task1.light.distance / (task1.light.distance - far)) ** 2)
 

@@ -78,10 +78,10 @@ def _searched(found: planner.Plan, seconds: float) -> str:
 
 
 def _alone(found: planner.Plan) -> str:
-    """What several lights gain over one that has all of the total, on the grid."""
+    """What several lights gain over one that has all of the total."""
     if found.alone is None:
         return ""
-    return f"; one light with all of it: {found.alone / found.grid_variance:.4g} of what is minimised, on the grid"
+    return f"; one light with all of it, where it is best: {found.alone / found.variance:.4g} of what is minimised"
 
 
 def _units(found: planner.Plan) -> tuple[str, str]:

@@ -1,0 +1,91 @@
+"""Several lights that share a given total: searches against every combination evaluated one by one."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+import planner
+import scenes
+from planner.search.aim import Aim
+from planner.search.constraints import Constraints
+from planner.search.sharing import search_shared, shares_of, shares_of_two, with_shares
+from planner.search.viewing import ViewingSpace
+from scenes import InvalidInput
+
+STEP = 30
+
+
+def quiet(*_):
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return scenes.load("two_lights")
+
+
+def test_no_combination_of_the_grid_is_better(scene):
+    """Every sensor, both lights anywhere, shares in tenths, by `planner.variances`."""
+    places = ViewingSpace(STEP, (0, 75)).poses
+    aim = Aim.of(scene.quantities, "object")
+    found = search_shared(scene, places, places, "calibrated", aim, Constraints(), quiet, shares_of_two(scene))
+    each = np.array(list(product(range(len(places)), repeat=3)))
+    allowed = Constraints().pairs(scene, places[each[:, 0]], np.hstack([places[each[:, 1]], places[each[:, 2]]]))
+    each, best = each[allowed], np.inf
+    for share in shares_of_two(scene):
+        lights = tuple(places[each[:, k]] for k in (1, 2))
+        values = planner.variances(with_shares(scene, share), places[each[:, 0]], lights)
+        best = min(best, values.min())
+    assert found.found.variance == pytest.approx(best, rel=0.02)
+    assert found.found.variance >= best * (1 - 1e-9)
+    assert found.alone.value > 1.02 * best  # one light is not enough here, so the test can tell
+
+
+def test_two_lights_do_not_help_where_all_edges_want_the_same(task1):
+    """Task1's four edges lie around one face: the best pair is the best light alone."""
+    two = task1.light, task1.light
+    both = task1.model_copy(update={"light": None, "several_lights": two, "settings": ()})
+    found = planner.plan(with_shares(both, (0.5, 0.5)), step_deg=STEP, refined=False)
+    assert max(found.shares) == 1
+    assert found.variance == pytest.approx(found.alone)
+    single = planner.plan(task1.model_copy(update={"light": with_shares(both, (0, 1)).lights[1]}), step_deg=STEP)
+    assert found.variance == pytest.approx(single.grid_variance, rel=1e-6)
+
+
+def test_shares_that_are_given_stay(scene):
+    found = planner.plan(scene, step_deg=STEP, shares="given", refined=False)
+    assert found.shares == pytest.approx((0.6, 0.4))
+    assert found.alone is None
+    assert shares_of(found.scene) == pytest.approx(found.shares)
+    better = planner.plan(scene, step_deg=STEP, refined=False)
+    assert better.variance <= found.variance * (1 + 1e-9)
+    assert len(better.light) == 2
+
+
+def test_the_only_light_at_the_camera():
+    """Nothing but the sensor is searched; the candidates' lights are none."""
+    found = planner.plan(scenes.load("ring_light"), step_deg=STEP)
+    assert found.light == ()
+    assert found.prediction.status == "ok"
+    assert found.sensor.polar_deg < 5
+
+
+def test_lights_by_turns_with_a_circle():
+    """Where no formula tells of mixtures: no single move to another place of the grid is better."""
+    plate = scenes.load("plate")
+    both = plate.model_copy(update={"light": None, "several_lights": (plate.light, plate.light), "settings": ()})
+    limits = Constraints(sensor_polar_deg=(0, 30), light_polar_deg=(0, 45))
+    found = planner.plan(with_shares(both, (0.5, 0.5)), step_deg=STEP, constraints=limits, refined=False)
+    assert found.guarantee.startswith("none")
+    tried = planner.variances(found.scene, list(found.sensor), (list(found.light[0]), ViewingSpace(STEP, (0, 45)).poses))
+    assert tried.min() >= found.grid_variance * (1 - 1e-6)
+
+
+def test_what_cannot_be_planned(scene):
+    with pytest.raises(InvalidInput, match="lights must be one that is free, for several pictures, got 2"):
+        planner.plan_views(scene, 2)
+    with pytest.raises(InvalidInput, match=r"light must be 2 pose\(s\), one for each free light, got 1"):
+        planner.plan(scene, light=(10, 10), sensor=(40, 280))
+    with pytest.raises(InvalidInput, match="shares must be one of best, given"):
+        planner.plan(scene, shares="some")
