@@ -11,14 +11,16 @@ from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.search.aim import Aim
 from planner.search.alternating import alternate
 from planner.search.candidates import edges_of
+from planner.search.choices import Choice, with_choice
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
+from planner.search.varied import Chosen, Varied
 from planner.search.viewing import ViewingSpace, local_minima
 
 __all__ = [
-    "Aim", "Candidate", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction",
-    "Robust", "Tolerances", "ViewingSpace", "alternate", "edges_of", "exhaustive", "local_minima", "plan",
-    "pose_scatter", "pose_spread", "predict", "projected_edges", "required_edges", "robust", "variance_map",
-    "variances",
+    "Aim", "Candidate", "Choice", "Chosen", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan",
+    "PoseSpread", "Prediction", "Robust", "Tolerances", "Varied", "ViewingSpace", "alternate", "edges_of", "exhaustive",
+    "local_minima", "plan", "pose_scatter", "pose_spread", "predict", "projected_edges", "required_edges", "robust",
+    "variance_map", "variances", "with_choice",
 ]  # fmt: skip

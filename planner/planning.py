@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -14,10 +14,13 @@ from planner.prediction import Prediction, minimised, predict
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates, edges_of
+from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.refinement import refine
 from planner.search.trusted import trusted, untrusted
+from planner.search.varied import Varied
+from planner.search.varying import vary_choice
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Picture, Pose, Scene, Task
 
@@ -61,6 +64,9 @@ class Plan:
     set_aside : tuple of Candidate
         Those of less variance than the plan's own that were not taken, for a close look at them says that more of the
         measurands cannot be trusted there (`clutter`).
+    varied : Varied, optional
+        What other polarisers, another lamp or another filter gain, with poses of their own; all else is about the
+        scene's own choice.
     """
 
     scene: Scene
@@ -83,6 +89,7 @@ class Plan:
     evaluated: int
     candidates: tuple[Candidate, ...]
     set_aside: tuple[Candidate, ...]
+    varied: Varied | None = None
 
     @property
     def poses(self) -> tuple[Pose, Pose]:
@@ -105,6 +112,8 @@ def plan(
     start: Any = (40, 41),
     refined: bool = True,
     report: Report | None = None,
+    vary: tuple[Vary, ...] = (),
+    hold: Hold = DEFAULT_HOLD,
 ) -> Plan:
     """Find the sensor and light poses of the least variance.
 
@@ -132,6 +141,12 @@ def plan(
         Where the alternating search's sensor begins.
     refined : bool
         Whether to descend below the grid step.
+    vary : tuple of {"analyser", "polarisation", "band"}
+        What else is to be found beside the poses (`Plan.varied`): the angle of the analyser, that of the light's
+        polarisation, each or no such polariser; one of the scene's ``lamps`` and ``filters``.
+    hold : {"time", "white"}
+        What is equal then: exposure time, so that polarisers and filters cost their light, or the grey level of a white
+        diffuse surface, so that they cost exposure time.
 
     Raises
     ------
@@ -149,6 +164,8 @@ def plan(
     variance_model(model)
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
+    if vary:
+        check_vary(scene, vary, hold)
     constraints = constraints or Constraints()
     sensor, light = _fixed(scene, constraints, sensor, light)
     tasks = required_edges(scene) if edges == "best" else ()
@@ -158,7 +175,15 @@ def plan(
     best = min(range(len(found)), key=lambda k: found[k].variance)
     if not np.isfinite(found[best].variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    return _finish(options, found, best, aim, refined)
+    made = _finish(options, found, best, aim, refined)
+    if not vary:
+        return made
+    others = tuple((c.sensor, c.light) for c in made.candidates)
+    varied = vary_choice(
+        made.scene, made.poses, others, vary, hold=hold, model=model, aim=aim, constraints=constraints,
+        held=(sensor is not None, light is not None), report=report,
+    )  # fmt: skip
+    return replace(made, varied=varied)
 
 
 def with_task(scene: Scene, task: Task) -> Scene:
@@ -271,7 +296,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         sensor, light, _ = min(descents, key=lambda descent: descent[2])
         sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,))
         if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
-            sensor, light = chosen.sensor, chosen.light
+            sensor, light, variance = chosen.sensor, chosen.light, on_grid
     if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look
         variance = _closely(scene, sensor, light, *how)
     prediction = predict(scene, tuple(map(float, sensor)), tuple(map(float, light)), option.model)

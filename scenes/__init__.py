@@ -2,6 +2,7 @@
 
 from scenes.camera import Camera
 from scenes.errors import InvalidInput
+from scenes.filters import Filter, Lamp
 from scenes.lens import Lens
 from scenes.lights import Light
 from scenes.load import find, load, names
@@ -18,7 +19,7 @@ from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens",
-    "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene",
-    "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
+    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Filter", "Floor", "InvalidInput", "Jitter",
+    "Lamp", "Lens", "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose",
+    "Quantity", "Scene", "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
 ]  # fmt: skip

@@ -16,6 +16,7 @@ from scenes.camera import Camera
 from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
+from scenes.filters import Filter, Lamp, check_names
 from scenes.lights import Light
 from scenes.materials import Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
@@ -99,6 +100,10 @@ class Scene(Model):
     """What stands beside it."""
     jitter: Jitter = Jitter()
     """How exactly poses are set."""
+    lamps: tuple[Lamp, ...] = ()
+    """Lamps that a plan may choose instead of the light's own (`ice plan --vary band`)."""
+    filters: tuple[Filter, ...] = ()
+    """Filters that a plan may put before the lens."""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -175,6 +180,8 @@ class Scene(Model):
         check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
         self._check_measurands()
         self._check_surroundings()
+        check_names("lamps", self.lamps)
+        check_names("filters", self.filters)
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")

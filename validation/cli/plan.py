@@ -19,6 +19,7 @@ from validation.report.terminal import console
 if TYPE_CHECKING:
     import planner
     from validation.plan_check import CheckedSetting, PlanCheck
+    from validation.vary_check import VaryCheck
 
 commands = commands()
 _CHECKED, _MOST_CHECKED = 10, 1000
@@ -47,6 +48,11 @@ ToleranceList = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Robust plan: roughness=0.2, noise=0.1, sensor_deg=2, ..."),
 ]
+Vary = Annotated[
+    str | None,
+    typer.Option(metavar="LIST", help="Find these, too: analyser, polarisation, band (of the scene's lamps, filters)."),
+]
+HoldEqual = Annotated[str, typer.Option("--hold", help="Equal with --vary: exposure time, or white's grey level.")]
 Check = Annotated[
     int | None,
     typer.Option(metavar="N", help="Render the best N settings and propose the best; 10, none of above a megapixel."),
@@ -80,6 +86,8 @@ def plan_command(
     light_out_of_view: OutOfView = False,
     same_mount: SameMount = False,
     tolerance: ToleranceList = None,
+    vary: Vary = None,
+    hold: HoldEqual = "time",
     check: Check = None,
     no_check: NoCheck = False,
     map_file: Map = None,
@@ -110,14 +118,18 @@ def plan_command(
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
     how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
+    how |= {"vary": () if vary is None else tuple(part.strip() for part in vary.split(",")), "hold": hold}
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     count = 0 if no_check else _renders(loaded) if check is None else check
     checked = _check(found, count) if count else None
-    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json)
+    scatter = _check_varied(found) if found.varied and count else None
+    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json, scatter)
     if not (count or no_check or as_json):
         print(f"Not checked by rendering, which takes long for {_pixels(loaded) / 1e6:.1f} megapixels: --check 1 does.")
+    if scatter and not scatter.agrees:
+        raise typer.Exit(1)
 
 
 def _renders(scene: scenes.Scene) -> int:
@@ -149,6 +161,13 @@ def _check(found: planner.Plan, count: int) -> PlanCheck:
 
     with progress(f"{found.scene.name}: rendering the best", "settings") as shown:
         return check_plan(found, count, report=shown or (lambda *_: None))
+
+
+def _check_varied(found: planner.Plan) -> VaryCheck:
+    from validation.vary_check import check_varied
+
+    with progress(f"{found.scene.name}: measuring both choices", "plans") as shown:
+        return check_varied(found, report=shown or (lambda *_: None))
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:
@@ -196,16 +215,21 @@ def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> l
 
 def _show(
     found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path],
-    as_json: bool,
+    as_json: bool, scatter: VaryCheck | None = None,
 ) -> None:  # fmt: skip
     """The plan, as JSON or as tables."""
+    from validation.report import vary_table
+
     if as_json:
-        print(json.dumps(_facts(found, checked, safe, seconds, pictures), indent=1))
+        varied = {"varied": vary_table.facts(found.varied, scatter)}
+        print(json.dumps(_facts(found, checked, safe, seconds, pictures) | varied, indent=1))
         return
     from validation.report import plan_table
 
     shown_on = console()
     shown_on.print(plan_table.report(found, checked, safe, seconds), highlight=False)
+    if found.varied:
+        shown_on.print(vary_table.report(found, scatter, seconds), highlight=False)
     for path in pictures:
         shown_on.print(f"picture: {path}", highlight=False)
 
