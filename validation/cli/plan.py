@@ -52,7 +52,10 @@ Vary = Annotated[
     str | None,
     typer.Option(metavar="LIST", help="Find these, too: analyser, polarisation, band (of the scene's lamps, filters)."),
 ]
-HoldEqual = Annotated[str, typer.Option("--hold", help="Equal with --vary: exposure time, or white's grey level.")]
+HoldEqual = Annotated[
+    str | None,
+    typer.Option("--hold", metavar="WHAT", help="Equal with --vary: time (of exposure; default) or white (its level)."),
+]
 Check = Annotated[
     int | None,
     typer.Option(metavar="N", help="Render the best N settings and propose the best; 10, none of above a megapixel."),
@@ -87,7 +90,7 @@ def plan_command(
     same_mount: SameMount = False,
     tolerance: ToleranceList = None,
     vary: Vary = None,
-    hold: HoldEqual = "time",
+    hold: HoldEqual = None,
     check: Check = None,
     no_check: NoCheck = False,
     map_file: Map = None,
@@ -118,7 +121,7 @@ def plan_command(
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
     how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
-    how |= {"vary": () if vary is None else tuple(part.strip() for part in vary.split(",")), "hold": hold}
+    how |= _varied(loaded, vary, hold)
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
@@ -130,6 +133,23 @@ def plan_command(
         print(f"Not checked by rendering, which takes long for {_pixels(loaded) / 1e6:.1f} megapixels: --check 1 does.")
     if scatter and not scatter.agrees:
         raise typer.Exit(1)
+
+
+def _varied(scene: scenes.Scene, vary: str | None, hold: str | None) -> dict:
+    """What is varied beside the poses, checked before anything is searched."""
+    from planner.search.choices import DEFAULT_HOLD, check_vary
+
+    if vary is None:
+        if hold is not None:
+            raise scenes.InvalidInput(f"--hold must be left out without --vary, got {hold!r}")
+        return {}
+    names, hold = tuple(part.strip() for part in vary.split(",")), hold or DEFAULT_HOLD
+    try:
+        check_vary(scene, names, hold)
+    except scenes.InvalidInput as error:
+        text = str(error)
+        raise scenes.InvalidInput(f"--{text}" if text.startswith(("vary", "hold")) else text) from None
+    return {"vary": names, "hold": hold}
 
 
 def _renders(scene: scenes.Scene) -> int:
