@@ -28,7 +28,7 @@ from planner.search.choices import (
 )
 from planner.search.constraints import Constraints
 from planner.search.descent import descend
-from planner.search.exhaustive import Report, evaluate_pairs
+from planner.search.exhaustive import Report
 from planner.search.trusted import DEAREST, untrusted
 from planner.search.varied import Chosen, Place, Varied
 from planner.search.viewing import ViewingSpace
@@ -39,7 +39,7 @@ POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
 _LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are looked at closely, and descents
 _BANDS_WITH = 3  # angles with which all bands are tried
-_UNCUT = 0.9  # of the noise's variance in darkness: below, the end of the scale has cut it off
+_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
@@ -182,19 +182,22 @@ class _Search:
     def _best_of(self, choice: Choice, sensors: np.ndarray, lights: np.ndarray) -> list[Place]:
         """The best pairs; if there are any, of those where no edge's levels are cut off at the end of the scale.
 
-        What is cut off scatters less, so that a plain minimum is led to where every measurement is biased.
+        What is cut off scatters less, so that a plain minimum is led to where every measurement is biased; descents
+        do not go there, either.
         """
-        world, values, cut = with_choice(self.scene, choice, self.hold), [], []
-        for at in range(0, len(sensors), _AT_ONCE):
-            pictures = Pictures.of(world, sensors[at : at + _AT_ONCE], lights[at : at + _AT_ONCE])
-            found = variance_model(self.model)(pictures)
-            values.append(minimised(found, self.aim))
-            cut.append((found.noise_variance < _UNCUT * world.noise.variance).any(-1))
-        least = np.concatenate(values)
-        whole = np.where(np.concatenate(cut), np.inf, least)
+        world = with_choice(self.scene, choice, self.hold)
+        parts = [slice(at, at + _AT_ONCE) for at in range(0, len(sensors), _AT_ONCE)]
+        found = [self._values(world, sensors[part], lights[part]) for part in parts]
+        least, cut = (np.concatenate(each) for each in zip(*found, strict=True))
+        whole = np.where(cut, np.inf, least)
         least = whole if np.isfinite(whole).any() else least
         order = [i for i in np.argsort(least, kind="stable")[:_KEPT] if np.isfinite(least[i])]
         return [Place(choice, sensors[i], lights[i], float(least[i])) for i in order]
+
+    def _values(self, world: Scene, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
+        found = variance_model(self.model)(Pictures.of(world, sensors, lights))
+        return minimised(found, self.aim), (found.noise_variance < _UNCUT * world.noise.variance).any(-1)
 
     def _clear(self, found: list[Place]) -> Iterator[Place]:
         """Clearly different ones, the best first."""
@@ -235,7 +238,8 @@ class _Search:
             if any(free) and not self.limits.allows(self.scene, sensor, light):
                 return np.inf
             world = with_choice(self.scene, self._turned(choice, turning, turns), self.hold)
-            return float(evaluate_pairs(world, sensor[None], light[None], self.model, self.aim)[0])
+            (found,), (cut,) = self._values(world, sensor[None], light[None])
+            return np.inf if cut else float(found)
 
         def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> bool:
             return self._untrusted(Place(self._turned(choice, turning, turns), sensor, light, np.nan)) <= most

@@ -199,7 +199,7 @@ def test_lost_pictures_contradict(rng):
 
 
 def test_saturation_is_felt_beside_an_edge_that_is_seen_end_on():
-    """One picture's levels do not depend on what else is looked at with it: an edge without a direction is not known."""
+    """One picture's levels do not depend on what else is looked at with it, nor on what is unknown of that."""
     scene = scenes.load("glossy_metal")
     sides = np.array([[[300.0], [0.0]], [[np.nan], [np.nan]]])
     found, alone = of_sides(scene, sides), of_sides(scene, sides[:1])
