@@ -102,6 +102,15 @@ def bands_of(scene: Scene) -> list[tuple[str | None, str | None]]:
     ]  # fmt: skip
 
 
+def angles_of(scene: Scene, vary: tuple[str, ...], step_deg: float) -> list[Choice]:
+    """The scene's own choice first, then a grid of the angles that are varied, each also none, in its own band."""
+    own, grid = own_choice(scene), [None, *np.arange(0.0, 180.0, step_deg).tolist()]
+    analysers = grid if "analyser" in vary else [own.analyser_deg]
+    polarisations = grid if "polarisation" in vary else [own.polarisation_deg]
+    found = [Choice(*pair) for pair in product(analysers, polarisations)]
+    return [own, *(choice for choice in found if choice != own)]
+
+
 def throughput(scene: Scene, choice: Choice) -> float:
     """Light that reaches a white surface and the sensor in the same time, over the scene's own; without the analyser.
 

@@ -20,6 +20,7 @@ from planner.search.aim import Aim
 from planner.search.choices import (
     Choice,
     Hold,
+    angles_of,
     bands_of,
     check_vary,
     exposure_time,
@@ -99,7 +100,7 @@ class _Search:
 
     def run(self, poses: tuple[Pose, Pose], others: tuple[tuple[Pose, Pose], ...], report: Report) -> Varied:
         sensor, light = (np.array(list(pose)) for pose in poses)
-        pairs, angles = self._pairs((sensor, light), others), list(self._angles())
+        pairs, angles = self._pairs((sensor, light), others), angles_of(self.scene, self.vary, ANGLE_STEP)
         count = 0
 
         def tried(choices: list[Choice], sensors: np.ndarray, lights: np.ndarray) -> list[Place]:
@@ -139,16 +140,6 @@ class _Search:
             if wrong < most:
                 least, most = place, wrong
         return self._lowest([least, *own], least, most, _STARTS, angles=False), most
-
-    def _angles(self) -> Iterator[Choice]:
-        """The scene's own choice first, then the grid of angles and none, in its own band."""
-        own, grid = own_choice(self.scene), [None, *np.arange(0.0, 180.0, ANGLE_STEP).tolist()]
-        analysers = grid if "analyser" in self.vary else [own.analyser_deg]
-        polarisations = grid if "polarisation" in self.vary else [own.polarisation_deg]
-        yield own
-        for pair in product(analysers, polarisations):
-            if Choice(*pair) != own:
-                yield Choice(*pair)
 
     def _bands(self, found: list[Place]) -> list[Choice]:
         """The other bands with those angles that were best so far."""
