@@ -12,16 +12,18 @@ from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.search.aim import Aim
 from planner.search.alternating import alternate
 from planner.search.candidates import edges_of
+from planner.search.choices import Choice, with_choice
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
+from planner.search.varied import Chosen, Varied
 from planner.search.viewing import ViewingSpace, local_minima
 from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
 
 __all__ = [
-    "Aim", "Candidate", "Combination", "Constraints", "EdgePrediction", "Forecast", "Pictures", "Plan", "PoseSpread",
-    "Prediction", "Robust", "Tolerances", "View", "ViewSet", "ViewingSpace", "Views", "alternate", "combine",
-    "edges_of", "exhaustive", "local_minima", "plan", "plan_views", "pose_scatter", "pose_spread", "predict",
-    "projected_edges", "required_edges", "robust", "variance_map", "variances",
+    "Aim", "Candidate", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction", "Forecast", "Pictures",
+    "Plan", "PoseSpread", "Prediction", "Robust", "Tolerances", "Varied", "View", "ViewSet", "ViewingSpace", "Views",
+    "alternate", "combine", "edges_of", "exhaustive", "local_minima", "plan", "plan_views", "pose_scatter",
+    "pose_spread", "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

@@ -14,12 +14,24 @@ from planner.prediction import Prediction, minimised, predict
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.alternating import Partial, Step, alternate
 from planner.search.candidates import Candidate, candidates, edges_of
+from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
 from planner.search.poses import as_array, as_poses
 from planner.search.refinement import refine
-from planner.search.sharing import Shared, applies, by_turns, search_shared, shares_of, shares_of_two, with_shares
+from planner.search.sharing import (
+    Alone,
+    Shared,
+    applies,
+    by_turns,
+    search_shared,
+    shares_of,
+    shares_of_two,
+    with_shares,
+)
 from planner.search.trusted import trusted, untrusted
+from planner.search.varied import Varied
+from planner.search.varying import vary_choice
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Picture, Pose, Scene, Task, several
 
@@ -69,6 +81,9 @@ class Plan:
     set_aside : tuple of Candidate
         Those of less variance than the plan's own that were not taken, for a close look at them says that more of the
         measurands cannot be trusted there (`clutter`).
+    varied : Varied, optional
+        What other polarisers, another lamp or another filter gain, with poses of their own; all else is about the
+        scene's own choice.
     """
 
     scene: Scene
@@ -93,6 +108,7 @@ class Plan:
     evaluated: int
     candidates: tuple[Candidate, ...]
     set_aside: tuple[Candidate, ...]
+    varied: Varied | None = None
 
     @property
     def poses(self) -> tuple[Pose, Pose | tuple[Pose, ...]]:
@@ -116,6 +132,8 @@ def plan(
     shares: Shares = "best",
     refined: bool = True,
     report: Report | None = None,
+    vary: tuple[Vary, ...] = (),
+    hold: Hold = DEFAULT_HOLD,
 ) -> Plan:
     """Find the sensor and light poses of the least variance.
 
@@ -145,6 +163,12 @@ def plan(
         Of two lights: search the shares that they have of the sum of their intensities, or keep them.
     refined : bool
         Whether to descend below the grid step.
+    vary : tuple of {"analyser", "polarisation", "band"}
+        What else is to be found beside the poses (`Plan.varied`): the angle of the analyser, that of the light's
+        polarisation, each or no such polariser; one of the scene's ``lamps`` and ``filters``.
+    hold : {"time", "white"}
+        What is equal then: exposure time, so that polarisers and filters cost their light, or the grey level of a white
+        diffuse surface, so that they cost exposure time.
 
     Raises
     ------
@@ -163,6 +187,8 @@ def plan(
     _check("search", search, get_args(Search))
     _check("edges", edges, ("given", "best"))
     _check("shares", shares, get_args(Shares))
+    if vary:
+        check_vary(scene, vary, hold)
     constraints = constraints or Constraints()
     sensor, light = _fixed(scene, constraints, sensor, light)
     tasks = required_edges(scene) if edges == "best" else ()
@@ -173,7 +199,15 @@ def plan(
     best = min(range(len(found)), key=lambda k: found[k].variance)
     if not np.isfinite(found[best].variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    return _finish(options, found, best, aim, refined)
+    made = _finish(options, found, best, aim, refined)
+    if not vary:
+        return made
+    others = tuple((c.sensor, c.light) for c in made.candidates)
+    varied = vary_choice(
+        made.scene, made.poses, others, vary, hold=hold, model=model, aim=aim, constraints=constraints,
+        held=(sensor is not None, light is not None), report=report,
+    )  # fmt: skip
+    return replace(made, varied=varied)
 
 
 def with_task(scene: Scene, task: Task) -> Scene:
@@ -305,16 +339,19 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         sensor, light, _ = min(descents, key=lambda descent: descent[2])
         sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,))
         if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
-            sensor, light = chosen.sensor, chosen.light
+            sensor, light, variance = chosen.sensor, chosen.light, on_grid
     if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look
         variance = _closely(scene, sensor, light, *how)
+    alone = _alone(option, result, aim, refined)
+    if alone is not None and alone.value < variance:
+        scene, sensor, light, variance = with_shares(scene, alone.shares), alone.sensor, alone.lights, alone.value
     prediction = predict(scene, tuple(map(float, sensor)), as_poses(light), option.model)
     return Plan(
         scene=scene,
         sensor=Pose(*map(float, sensor)),
         light=as_poses(light),
         shares=shares_of(scene) if len(scene.lights) > 1 else (),
-        alone=_alone(option, result, aim, refined),
+        alone=alone and alone.value,
         objective=aim.unit,
         over=aim.over,
         model=option.model,
@@ -335,14 +372,15 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
     )  # fmt: skip
 
 
-def _alone(option: _Option, result: _Result, aim: Aim, refined: bool) -> float | None:
-    """The least of what is minimised where one of several lights has all; None where that is not known."""
+def _alone(option: _Option, result: _Result, aim: Aim, refined: bool) -> Alone | None:
+    """The best setting where one of several lights has all; None where that is not known."""
     best = result.shared and result.shared.alone
     if best is None or not refined:
-        return best and best.value
+        return best
     scene = with_shares(option.scene, best.shares)
     how = option.model, aim, option.step_deg, option.constraints
-    return refine(scene, best.sensor, best.lights, *how, sizes=(0.7, 0.1))[2]
+    sensor, lights, value = refine(scene, best.sensor, best.lights, *how, sizes=(0.7, 0.1))
+    return Alone(value, best.shares, sensor, lights)
 
 
 def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:

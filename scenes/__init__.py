@@ -2,6 +2,7 @@
 
 from scenes.camera import Camera
 from scenes.errors import InvalidInput
+from scenes.filters import Filter, Lamp
 from scenes.lens import Lens
 from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
@@ -19,7 +20,8 @@ from scenes.units import UNITS, Unit
 
 __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
-    "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh",
-    "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "Task",
-    "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
+    "Filter", "Floor", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator", "Luminaire", "Material",
+    "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side",
+    "Solid", "Task", "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several",
+    "shown",
 ]  # fmt: skip

@@ -81,7 +81,7 @@ class Disc(Luminaire):
     kind: Literal["disc"]
     """disc"""
     radius: Positive
-    """[length]"""
+    """Its radius [length]."""
 
     @property
     def half_size(self) -> float:
@@ -113,9 +113,9 @@ class Ring(Luminaire):
     kind: Literal["ring"]
     """ring"""
     inner_radius: NotNegative
-    """[length]"""
+    """Of its hole [length]."""
     outer_radius: Positive
-    """[length]"""
+    """Of its rim [length]."""
     tilt_deg: Annotated[float, Field(ge=0, lt=90)] = 0.0
     """Between its surface and the plane across its axis: it shines inwards, and its outer rim is nearer [degrees]."""
 

@@ -16,6 +16,7 @@ from scenes.camera import Camera
 from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
+from scenes.filters import Filter, Lamp, check_names
 from scenes.lights import AnyLight
 from scenes.materials import Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
@@ -123,6 +124,10 @@ class Scene(Model):
     """What stands beside it."""
     jitter: Jitter = Jitter()
     """How exactly poses are set."""
+    lamps: tuple[Lamp, ...] = ()
+    """Lamps that a plan may choose instead of the light's own (`ice plan --vary band`)."""
+    filters: tuple[Filter, ...] = ()
+    """Filters that a plan may put before the lens."""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -208,6 +213,8 @@ class Scene(Model):
         self._check_measurands()
         self._check_surroundings()
         self._check_lights()
+        check_names("lamps", self.lamps)
+        check_names("filters", self.filters)
         for i, setting in enumerate(self.settings):
             self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
             self.check_lights(setting.lights, f"settings[{i}].light")

@@ -152,7 +152,7 @@ def edge_contrast(pictures: Pictures, names: tuple[str, ...], fractions: np.ndar
 
 def of_sides(scene: Scene, sides: np.ndarray) -> EdgeContrast:
     """Recorded contrast and noise from the signals (..., 2, n) of both sides, shape (..., n)."""
-    if scene.noise.gain == 0 and not sides.max(initial=0.0) > sensor.headroom(scene.noise):
+    if scene.noise.gain == 0 and not (sides > sensor.headroom(scene.noise)).any():  # NaN of one picture is its own
         return EdgeContrast((sides[..., 0, :] - sides[..., 1, :]) ** 2, scene.noise.variance)
     found = sensor.recorded(scene.noise, scene.noise.dark_level + sides)
     squared = (found.level[..., 0, :] - found.level[..., 1, :]) ** 2

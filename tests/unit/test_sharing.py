@@ -78,7 +78,9 @@ def test_lights_by_turns_with_a_circle():
     limits = Constraints(sensor_polar_deg=(0, 30), light_polar_deg=(0, 45))
     found = planner.plan(with_shares(both, (0.5, 0.5)), step_deg=STEP, constraints=limits, refined=False)
     assert found.guarantee.startswith("none")
-    tried = planner.variances(found.scene, list(found.sensor), (list(found.light[0]), ViewingSpace(STEP, (0, 45)).poses))
+    tried = planner.variances(
+        found.scene, list(found.sensor), (list(found.light[0]), ViewingSpace(STEP, (0, 45)).poses)
+    )
     assert tried.min() >= found.grid_variance * (1 - 1e-6)
 
 

@@ -19,6 +19,7 @@ from validation.report.terminal import console
 if TYPE_CHECKING:
     import planner
     from validation.plan_check import CheckedSetting, PlanCheck
+    from validation.vary_check import VaryCheck
 
 commands = commands()
 _CHECKED, _MOST_CHECKED = 10, 1000
@@ -47,6 +48,14 @@ SameMount = Annotated[bool, typer.Option("--same-mount", help="The light is moun
 ToleranceList = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Robust plan: roughness=0.2, noise=0.1, sensor_deg=2, ..."),
+]
+Vary = Annotated[
+    str | None,
+    typer.Option(metavar="LIST", help="Find these, too: analyser, polarisation, band (of the scene's lamps, filters)."),
+]
+HoldEqual = Annotated[
+    str | None,
+    typer.Option("--hold", metavar="WHAT", help="Equal with --vary: time (of exposure; default) or white (its level)."),
 ]
 Check = Annotated[
     int | None,
@@ -86,6 +95,8 @@ def plan_command(
     light_out_of_view: OutOfView = False,
     same_mount: SameMount = False,
     tolerance: ToleranceList = None,
+    vary: Vary = None,
+    hold: HoldEqual = None,
     check: Check = None,
     no_check: NoCheck = False,
     map_file: Map = None,
@@ -128,22 +139,45 @@ def plan_command(
     how["shares"] = shares
     count = 0 if no_check else _renders(loaded) if check is None else check
     if several:
+        if vary is not None:
+            raise scenes.InvalidInput(f"--vary must be left out with --views, got {vary!r}")
         how = {"over": over, "model": model, "step_deg": step, "constraints": limits, "share": views_share}
         poses.pop("start")
         plan_views.run(loaded, views, objective, how | poses, bool(count), out, as_json)
         _say_unchecked(loaded, bool(count or no_check or as_json))
         return
+    how |= _varied(loaded, vary, hold)
     tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how | poses)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = _check(found, count) if count else None
-    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json)
+    scatter = _check_varied(found) if found.varied and count else None
+    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json, scatter)
     _say_unchecked(loaded, bool(count or no_check or as_json))
+    if scatter and not scatter.agrees:
+        raise typer.Exit(1)
 
 
 def _say_unchecked(scene: scenes.Scene, said: bool) -> None:
     if not said:
         print(f"Not checked by rendering, which takes long for {_pixels(scene) / 1e6:.1f} megapixels: --check 1 does.")
+
+
+def _varied(scene: scenes.Scene, vary: str | None, hold: str | None) -> dict:
+    """What is varied beside the poses, checked before anything is searched."""
+    from planner.search.choices import DEFAULT_HOLD, check_vary
+
+    if vary is None:
+        if hold is not None:
+            raise scenes.InvalidInput(f"--hold must be left out without --vary, got {hold!r}")
+        return {}
+    names, hold = tuple(part.strip() for part in vary.split(",")), hold or DEFAULT_HOLD
+    try:
+        check_vary(scene, names, hold)
+    except scenes.InvalidInput as error:
+        text = str(error)
+        raise scenes.InvalidInput(f"--{text}" if text.startswith(("vary", "hold")) else text) from None
+    return {"vary": names, "hold": hold}
 
 
 def _renders(scene: scenes.Scene) -> int:
@@ -175,6 +209,13 @@ def _check(found: planner.Plan, count: int) -> PlanCheck:
 
     with progress(f"{found.scene.name}: rendering the best", "settings") as shown:
         return check_plan(found, count, report=shown or (lambda *_: None))
+
+
+def _check_varied(found: planner.Plan) -> VaryCheck:
+    from validation.vary_check import check_varied
+
+    with progress(f"{found.scene.name}: measuring both choices", "plans") as shown:
+        return check_varied(found, report=shown or (lambda *_: None))
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:
@@ -222,16 +263,21 @@ def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> l
 
 def _show(
     found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path],
-    as_json: bool,
+    as_json: bool, scatter: VaryCheck | None = None,
 ) -> None:  # fmt: skip
     """The plan, as JSON or as tables."""
+    from validation.report import vary_table
+
     if as_json:
-        print(json.dumps(_facts(found, checked, safe, seconds, pictures), indent=1))
+        varied = {"varied": vary_table.facts(found.varied, scatter)}
+        print(json.dumps(_facts(found, checked, safe, seconds, pictures) | varied, indent=1))
         return
     from validation.report import plan_table
 
     shown_on = console()
     shown_on.print(plan_table.report(found, checked, safe, seconds), highlight=False)
+    if found.varied:
+        shown_on.print(vary_table.report(found, scatter, seconds), highlight=False)
     for path in pictures:
         shown_on.print(f"picture: {path}", highlight=False)
 

@@ -1,0 +1,269 @@
+"""Polarisers, lamp and filter as unknowns of the plan, beside the poses.
+
+At fixed poses the brightness is a linear form in (1, cos 2a, sin 2a) of either polariser's angle (nearly so off the
+optical axis), so angles every 30 degrees miss no feature of it. They are tried on a coarse grid of poses; from the best
+that can be trusted a descent leads down in poses and angles together. The scene's own choice is among the starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice, product
+
+import numpy as np
+
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from planner.prediction import minimised, predict, variances
+from planner.search.aim import Aim
+from planner.search.choices import (
+    Choice,
+    Hold,
+    angles_of,
+    bands_of,
+    check_vary,
+    exposure_time,
+    own_choice,
+    with_choice,
+)
+from planner.search.constraints import Constraints
+from planner.search.descent import descend
+from planner.search.exhaustive import Report
+from planner.search.trusted import DEAREST, untrusted
+from planner.search.varied import Chosen, Place, Varied
+from planner.search.viewing import ViewingSpace
+from scenes import Pose, Scene
+
+ANGLE_STEP = 30.0  # degrees, of either polariser
+POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
+_KEPT = 12  # pairs of poses of each choice
+_LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are looked at closely, and descents
+_BANDS_WITH = 3  # angles with which all bands are tried
+_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
+_SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
+_POLISHED = 3  # ends of descents that are polished
+_ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
+_AT_ONCE = 8192  # pairs
+
+
+def vary_choice(
+    scene: Scene,
+    poses: tuple[Pose, Pose],
+    others: tuple[tuple[Pose, Pose], ...],
+    vary: tuple[str, ...],
+    *,
+    hold: Hold,
+    model: str,
+    aim: Aim,
+    constraints: Constraints,
+    held: tuple[bool, bool] = (False, False),
+    report: Report | None = None,
+) -> Varied:
+    """The best polarisers, lamp and filter, with poses of their own.
+
+    Parameters
+    ----------
+    scene : Scene
+    poses : pair of Pose
+        The best of the scene's own choice.
+    others : tuple of pairs of Pose
+        More pairs to begin at.
+    vary : tuple of {"analyser", "polarisation", "band"}
+    hold : {"time", "white"}
+    model, aim, constraints
+        As for the plan.
+    held : pair of bool
+        Whether the sensor's and the light's pose stay.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene lacks what is to be varied.
+    """
+    check_vary(scene, vary, hold)
+    search = _Search(scene, vary, hold, model, aim, constraints, held)
+    return search.run(poses, others, report or (lambda *_: None))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The question, and the steps of its answer."""
+
+    scene: Scene
+    vary: tuple[str, ...]
+    hold: Hold
+    model: str
+    aim: Aim
+    limits: Constraints
+    held: tuple[bool, bool]
+
+    def run(self, poses: tuple[Pose, Pose], others: tuple[tuple[Pose, Pose], ...], report: Report) -> Varied:
+        sensor, light = (np.array(list(pose)) for pose in poses)
+        pairs, angles = self._pairs((sensor, light), others), angles_of(self.scene, self.vary, ANGLE_STEP)
+        count = 0
+
+        def tried(choices: list[Choice], sensors: np.ndarray, lights: np.ndarray) -> list[Place]:
+            nonlocal count
+            found = []
+            for choice in choices:
+                found += self._best_of(choice, sensors, lights)
+                count += len(sensors)
+                report("choices", count, whole)
+            return found
+
+        bands = min(_BANDS_WITH, len(angles)) * (len(bands_of(self.scene)) - 1) if "band" in self.vary else 0
+        whole = (len(angles) + bands) * (len(pairs[0]) + 1)
+        there = tried(angles, *pairs)
+        fixed, most = self._fixed(self._place(own_choice(self.scene), sensor, light), there)
+        here = fixed.sensor[None], fixed.light[None]
+        at_poses = tried(angles, *here)
+        there += tried(self._bands(there), *pairs)
+        at_poses += tried(self._bands(at_poses), *here)
+        same = self._lowest(at_poses, fixed, most, 2, poses=False)
+        best = self._lowest([*there, same], same, most, _STARTS)
+        if best.choice == fixed.choice:  # what is gained then, better poses gain
+            fixed = same = best
+        return Varied(self.vary, self.hold, *map(self._told, (fixed, same, best)), count, _GUARANTEE)
+
+    def _fixed(self, plan: Place, found: list[Place]) -> tuple[Place, int]:
+        """The best setting of the scene's own choice, and how many of its measurands cannot be trusted.
+
+        The plan's, unless another that does not cost too much can be trusted more.
+        """
+        least, most = plan, self._untrusted(plan)
+        own = [place for place in found if place.choice == plan.choice and place.value <= DEAREST * plan.value]
+        for place in self._clear(own):
+            if most == 0:
+                break
+            wrong = self._untrusted(place)
+            if wrong < most:
+                least, most = place, wrong
+        return self._lowest([least, *own], least, most, _STARTS, angles=False), most
+
+    def _bands(self, found: list[Place]) -> list[Choice]:
+        """The other bands with those angles that were best so far."""
+        if "band" not in self.vary:
+            return []
+        angles = list(dict.fromkeys(place.choice for place in sorted(found, key=_value)))[:_BANDS_WITH]
+        return [
+            replace(choice, lamp=lamp, filter=filter_)
+            for choice, (lamp, filter_) in product(angles, bands_of(self.scene)[1:])
+        ]
+
+    def _pairs(self, poses, others) -> tuple[np.ndarray, np.ndarray]:
+        """Allowed pairs of a coarse grid, and those that are given, shape (n, 2) each."""
+        grids = []
+        for held, pose, polar in zip(
+            self.held, poses, (self.limits.sensor_polar_deg, self.limits.light_polar_deg), strict=True
+        ):
+            grids.append(pose[None] if held else ViewingSpace(POSE_STEP, polar).poses)
+        sensors, lights = grids
+        sensors = sensors[self.limits.sensors(self.scene, sensors)]
+        lights = lights[self.limits.lights(lights)]
+        grid = np.array(list(product(sensors.tolist(), lights.tolist())), float).reshape(-1, 2, 2)
+        grid = grid[self.limits.pairs(self.scene, grid[:, 0], grid[:, 1])]
+        given = np.array([poses, *([list(pose) for pose in pair] for pair in others)], float)
+        kept = [
+            all(not h or np.allclose(a, b) for h, a, b in zip(self.held, pair, poses, strict=True)) for pair in given
+        ]
+        both = np.concatenate([given[kept], grid])
+        return both[:, 0], both[:, 1]
+
+    def _best_of(self, choice: Choice, sensors: np.ndarray, lights: np.ndarray) -> list[Place]:
+        """The best pairs; if there are any, of those where no edge's levels are cut off at the end of the scale.
+
+        What is cut off scatters less, so that a plain minimum is led to where every measurement is biased; descents
+        do not go there, either.
+        """
+        world = with_choice(self.scene, choice, self.hold)
+        parts = [slice(at, at + _AT_ONCE) for at in range(0, len(sensors), _AT_ONCE)]
+        found = [self._values(world, sensors[part], lights[part]) for part in parts]
+        least, cut = (np.concatenate(each) for each in zip(*found, strict=True))
+        whole = np.where(cut, np.inf, least)
+        least = whole if np.isfinite(whole).any() else least
+        order = [i for i in np.argsort(least, kind="stable")[:_KEPT] if np.isfinite(least[i])]
+        return [Place(choice, sensors[i], lights[i], float(least[i])) for i in order]
+
+    def _values(self, world: Scene, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
+        found = variance_model(self.model)(Pictures.of(world, sensors, lights))
+        return minimised(found, self.aim), (found.noise_variance < _UNCUT * world.noise.variance).any(-1)
+
+    def _clear(self, found: list[Place]) -> Iterator[Place]:
+        """Clearly different ones, the best first."""
+        clear: list[Place] = []
+        for place in sorted(found, key=_value):
+            if len(clear) == _LOOKED_AT:
+                return
+            if all(place.differs(other) for other in clear):
+                clear.append(place)
+                yield place
+
+    def _lowest(self, found: list[Place], known: Place, most: int, starts: int, **free: bool) -> Place:
+        """The lowest place to which a descent leads from the best ones that can be trusted; ``known`` at worst."""
+        trusted = (place for place in self._clear(found) if self._untrusted(place) <= most)
+        ends = [known, *(self._descended(place, most, **free) for place in islice(trusted, starts))]
+        return min((self._polished(end, most, **free) for end in sorted(ends, key=_value)[:_POLISHED]), key=_value)
+
+    def _polished(self, place: Place, most: int, **free: bool) -> Place:
+        """Descents from where one ended, as long as they gain anything."""
+        for _ in range(_ROUNDS):
+            before, place = place, self._descended(place, most, _POLISH, **free)
+            if place.value > _ENOUGH * before.value:
+                break
+        return place
+
+    def _descended(
+        self, start: Place, most: int, sizes: tuple[float, ...] = _SIZES, *, poses: bool = True, angles: bool = True
+    ) -> Place:
+        """Downhill in the poses that are free and the angles that are varied, as long as it can be trusted."""
+        choice = start.choice
+        turning = [
+            name for vary, name in (("analyser", "analyser_deg"), ("polarisation", "polarisation_deg"))
+            if angles and vary in self.vary and getattr(choice, name) is not None
+        ]  # fmt: skip
+        free = tuple(poses and not held for held in self.held)
+
+        def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> float:
+            if any(free) and not self.limits.allows(self.scene, sensor, light):
+                return np.inf
+            world = with_choice(self.scene, self._turned(choice, turning, turns), self.hold)
+            (found,), (cut,) = self._values(world, sensor[None], light[None])
+            return np.inf if cut else float(found)
+
+        def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> bool:
+            return self._untrusted(Place(self._turned(choice, turning, turns), sensor, light, np.nan)) <= most
+
+        begin = start.sensor, start.light, np.array([getattr(choice, name) for name in turning], float)
+        sensor, light, turns = descend(begin, free, value, trust, sizes, one_mount=self.limits.same_mount)
+        end = self._place(self._turned(choice, turning, turns), sensor, light)
+        return min(self._place(choice, start.sensor, start.light), end, key=_value)
+
+    def _turned(self, choice: Choice, names: list[str], turns: np.ndarray) -> Choice:
+        return replace(choice, **{name: float(turn) % 180 for name, turn in zip(names, turns, strict=True)})
+
+    def _untrusted(self, place: Place) -> int:
+        return untrusted(with_choice(self.scene, place.choice, self.hold), place.sensor, place.light, self.model)
+
+    def _place(self, choice: Choice, sensor: np.ndarray, light: np.ndarray) -> Place:
+        """With what a close look says."""
+        world = with_choice(self.scene, choice, self.hold)
+        return Place(choice, sensor, light, float(variances(world, sensor, light, self.model, self.aim)))
+
+    def _told(self, place: Place) -> Chosen:
+        world = with_choice(self.scene, place.choice, self.hold)
+        poses = Pose(*map(float, place.sensor)), Pose(*map(float, place.light))
+        status = predict(world, *poses, self.model).status
+        time = exposure_time(self.scene, place.choice, self.hold)
+        return Chosen(place.choice, world, *poses, place.value, status, time)
+
+
+_GUARANTEE = (
+    f"none: the lowest end of up to {_STARTS} descents from the best of a grid (angles every {ANGLE_STEP:g} degrees and"
+    f" none, poses every {POSE_STEP:g}, all bands with the best {_BANDS_WITH} angles), at worst the fixed choice"
+)
+
+
+def _value(place: Place) -> float:
+    return place.value

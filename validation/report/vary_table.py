@@ -1,0 +1,138 @@
+"""What ``ice plan --vary`` prints and writes beside the plan."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from planner import Chosen, Plan, Varied
+from scenes import Pose
+from validation.vary_check import Scatter, VaryCheck
+
+_HELD = {
+    "time": "exposure time: a polariser before the lamp and one before the lens each pass half of unpolarised light,"
+    " lamps bring their power, filters what they pass",
+    "white": "the grey level of a white diffuse surface: what polarisers, lamps and filters take is made up for by"
+    " exposure time",
+}
+
+
+def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
+    """Choices, gain, and what noisy pictures of both plans say."""
+    varied = found.varied
+    lines = [
+        f"\nVaried: {', '.join(varied.vary)} ({varied.evaluated} settings in {seconds:.1f} s with the plan)",
+        f"  Equal: {_HELD[varied.hold]}.",
+        f"  Gain over the fixed choice: {varied.gain:.3f} in variance with poses of their own,"
+        f" {varied.gain_same_poses:.3f} at its poses.",
+        f"  Guarantee: {varied.guarantee}.",
+    ]
+    parts = [Text("\n".join(lines)), _choices(varied)]
+    if checked:
+        parts += [_scatters(checked), Text(_judgement(checked))]
+    return Group(*parts)
+
+
+def _choices(varied: Varied) -> Table:
+    columns = ("", "sensor", "light", "analyser", "polarisation", "band", "time", "minimised", "status")
+    table = _table("\nFixed and best choice", *columns)
+    names = ("fixed", "best at its poses", "best")
+    for name, chosen in zip(names, (varied.fixed, varied.same_poses, varied.best), strict=True):
+        choice = chosen.choice
+        angles = (_angle(choice.analyser_deg), _angle(choice.polarisation_deg))
+        last = f"{chosen.exposure_time:.3g}", f"{chosen.variance:.4g}", chosen.status
+        table.add_row(name, _pose(chosen.sensor), _pose(chosen.light), *angles, choice.band, *last)
+    return table
+
+
+def _scatters(checked: VaryCheck) -> Table:
+    title = f"\nBoth plans in {checked.fixed.n} noisy pictures each: variance, with its 95 % chi-square interval"
+    columns = ("", "measurand", "predicted", "propagated", "measured", "interval", "failed", "status")
+    table = _table(title, *columns)
+    for name, row in (("fixed", checked.fixed), ("best", checked.best)):
+        values = (f"{value:.4g}" for value in (row.predicted, row.propagated, row.measured))
+        interval = f"[{row.interval[0]:.4g}, {row.interval[1]:.4g}]"
+        table.add_row(name, row.measurand, *values, interval, str(row.failed), row.status)
+    return table
+
+
+def _judgement(checked: VaryCheck) -> str:
+    low, high = checked.interval
+    return (
+        f"  Gain: predicted {checked.predicted_gain:.3f}, measured {checked.gain:.3f} with the 95 % F interval"
+        f" [{low:.3f}, {high:.3f}].\n  {checked.verdict}"
+    )
+
+
+def facts(varied: Varied | None, checked: VaryCheck | None) -> dict | None:
+    """For JSON; None without."""
+    if varied is None:
+        return None
+    return {
+        "vary": list(varied.vary),
+        "hold": varied.hold,
+        "gain": varied.gain,
+        "gain_same_poses": varied.gain_same_poses,
+        "fixed": _fact(varied.fixed),
+        "same_poses": _fact(varied.same_poses),
+        "best": _fact(varied.best),
+        "evaluated": varied.evaluated,
+        "guarantee": varied.guarantee,
+        "check": None if checked is None else _check(checked),
+    }
+
+
+def _fact(chosen: Chosen) -> dict:
+    return {
+        **dataclasses.asdict(chosen.choice),
+        "band": chosen.choice.band,
+        "sensor": list(chosen.sensor),
+        "light": list(chosen.light),
+        "variance": chosen.variance,
+        "status": chosen.status,
+        "exposure_time": chosen.exposure_time,
+    }
+
+
+def _check(checked: VaryCheck) -> dict:
+    return {
+        "fixed": _row(checked.fixed),
+        "best": _row(checked.best),
+        "predicted_gain": checked.predicted_gain,
+        "gain": _finite(checked.gain),
+        "gain_interval": [_finite(end) for end in checked.interval],
+        "p_value": _finite(checked.p_value),
+        "verdict": checked.verdict,
+    }
+
+
+def _row(row: Scatter) -> dict:
+    values = {name: _finite(getattr(row, name)) for name in ("predicted", "propagated", "measured")}
+    interval = [_finite(end) for end in row.interval]
+    return {
+        "measurand": row.measurand, **values, "interval": interval, "n": row.n, "failed": row.failed,
+        "status": row.status,
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def _pose(pose: Pose) -> str:
+    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
+
+
+def _angle(value: float | None) -> str:
+    return "none" if value is None else f"{value:.1f}"
