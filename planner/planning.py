@@ -71,7 +71,7 @@ class Plan:
         Where the alternating search stopped.
     gap : float or None
         Optimality gap of the alternating search: its variance over the exhaustive one's, less 1; None without
-        exhaustive search.
+        exhaustive search, and where that one passes over settings whose levels are cut off.
     guarantee : str
         What is known about the optimum.
     pairs, evaluated : int
@@ -363,7 +363,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
         prediction=prediction,
         trace=partial.trace if partial else (),
         partial_variance=float(partial.variance) if partial else float("nan"),
-        gap=partial.variance / result.variance - 1 if partial and found else None,
+        gap=partial.variance / result.variance - 1 if partial and found and not found.within_scale else None,
         guarantee=_guarantee(option, found),
         pairs=sum(r.found.pairs for r in results if r.found),
         evaluated=sum(r.found.evaluated for r in results if r.found),
@@ -394,7 +394,8 @@ def _guarantee(option: _Option, found: Found | None) -> str:
         return _of_lights(option, found)
     if found is None:
         return "none: a partial optimum, no neighbour of the sensor and none of the light is better"
-    return f"no pair of the {option.step_deg:g} degree grid is better; between its directions a better one may lie"
+    grid = f"{option.step_deg:g} degree grid" + " whose levels are within the sensor's scale" * found.within_scale
+    return f"no pair of the {grid} is better; between its directions a better one may lie"
 
 
 def _of_lights(option: _Option, found: Found | None) -> str:

@@ -11,6 +11,7 @@ from planner.features.projected_edges import circles
 from planner.imaging.appearance import is_separable
 from planner.imaging.pictures import Pictures
 from planner.models import variance_model
+from planner.models.errors import Errors
 from planner.prediction import minimised
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints
@@ -19,6 +20,7 @@ from planner.search.separable import Separable, separable
 from scenes import Scene
 
 _ROWS = 256  # sensors at a time
+_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
 _PAIRS = 1 << 16  # pairs evaluated exactly at a time
 
 Report = Callable[[str, int, int], None]
@@ -43,7 +45,9 @@ class Found:
     least : ndarray, shape (S,)
         Lower bound of the variance for each sensor (the variance itself where no bound exists).
     guaranteed : bool
-        Whether no other pair of the grid is better.
+        Whether no other pair of the grid is better, or ...
+    within_scale : bool
+        ... no other one whose levels the end of the scale does not cut off.
     """
 
     sensor: int
@@ -54,6 +58,7 @@ class Found:
     best_light: np.ndarray
     least: np.ndarray
     guaranteed: bool
+    within_scale: bool = False
 
 
 def has_bound(scene: Scene, model: str) -> bool:
@@ -72,6 +77,14 @@ def exhaustive(
     """
     search = _by_bound if has_bound(scene, model) else _one_by_one
     return search(scene, sensors, lights, model, objective, constraints, report or (lambda *_: None))
+
+
+def cut_off(errors: Errors, scene: Scene) -> np.ndarray:
+    """In which pictures (...) the end of the scale has cut off levels of an edge.
+
+    What is cut off scatters less, so that a plain minimum is led to where every measurement is biased.
+    """
+    return (errors.noise_variance < _UNCUT * scene.noise.variance).any(-1)
 
 
 def evaluate_pairs(scene: Scene, sensors, lights, model: str, objective: str | Aim) -> np.ndarray:
@@ -135,21 +148,27 @@ def _blocks(table: Separable, scene, sensors, lights, constraints, wanted=None):
 
 
 def _one_by_one(scene, sensors, lights, model, objective, constraints, report) -> Found:
-    least, best = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
+    least, best = (np.full((2, len(sensors)), value) for value in (np.inf, -1))  # of all pairs, and of those within
     evaluate = variance_model(model)
     size = max(1, 20_000 // max(len(lights), 1))
     for at in range(0, len(sensors), size):
         part = sensors[at : at + size]
-        values = minimised(evaluate(Pictures.of(scene, part[:, None], by_light(lights[None]))), objective)
+        errors = evaluate(Pictures.of(scene, part[:, None], by_light(lights[None])))
+        values = minimised(errors, objective)
         if constraints is not None and constraints.on_pairs:
             values = np.where(constraints.pairs(scene, part[:, None], lights[None]), values, np.inf)
-        best[at : at + size] = values.argmin(1)
-        least[at : at + size] = values.min(1)
+        for k, some in enumerate((values, np.where(cut_off(errors, scene), np.inf, values))):
+            best[k, at : at + size] = some.argmin(1)
+            least[k, at : at + size] = some.min(1)
         report("pairs", min(at + size, len(sensors)), len(sensors))
+    within = bool(np.isfinite(least[1]).any())
+    spared = within and bool((least[1] > least[0]).any())
+    best, least = best[int(within)].astype(int), least[int(within)]
     best[~np.isfinite(least)] = -1
     state = _Best.of(np.arange(len(sensors)), best, least)
     pairs = len(sensors) * len(lights)
-    return Found(state.sensor, state.light, state.variance, pairs, pairs, best, least, guaranteed=True)
+    found = state.sensor, state.light, state.variance, pairs, pairs, best, least
+    return Found(*found, guaranteed=True, within_scale=spared)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction
+from planner.models import variance_model
+from planner.prediction import minimised
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import evaluate_pairs
+from planner.search.exhaustive import cut_off
+from planner.search.poses import by_light
 from scenes import InvalidInput, Scene
 
 
@@ -40,9 +44,7 @@ def refine(
     """
     constraints = constraints or Constraints()
     if value is None:
-
-        def value(s, k):
-            return float(evaluate_pairs(scene, s[None], k[None], model, objective)[0])
+        value = _variance(scene, sensor, light, model, objective)
 
     begin = np.concatenate([sensor, light]).reshape(-1, 2)
 
@@ -69,6 +71,22 @@ def refine(
         if found.fun < least:
             x, least = found.x, found.fun
     return *moved(x), float(least * unit)
+
+
+def _variance(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, objective: str):
+    """The variance of one setting; infinite where levels are cut off, unless they are at the beginning."""
+
+    def told(s: np.ndarray, k: np.ndarray) -> tuple[float, bool]:
+        errors = variance_model(model)(Pictures.of(scene, s[None], by_light(k[None])))
+        return float(minimised(errors, objective)[0]), bool(cut_off(errors, scene)[0])
+
+    anyway = told(sensor, light)[1]
+
+    def value(s: np.ndarray, k: np.ndarray) -> float:
+        found, cut = told(s, k)
+        return np.inf if cut and not anyway else found
+
+    return value
 
 
 def shifted(pose: np.ndarray, by_deg: np.ndarray) -> np.ndarray:

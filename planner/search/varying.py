@@ -29,7 +29,7 @@ from planner.search.choices import (
 )
 from planner.search.constraints import Constraints
 from planner.search.descent import descend
-from planner.search.exhaustive import Report
+from planner.search.exhaustive import Report, cut_off
 from planner.search.trusted import DEAREST, untrusted
 from planner.search.varied import Chosen, Place, Varied
 from planner.search.viewing import ViewingSpace
@@ -40,7 +40,6 @@ POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
 _LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are looked at closely, and descents
 _BANDS_WITH = 3  # angles with which all bands are tried
-_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
@@ -188,7 +187,7 @@ class _Search:
     def _values(self, world: Scene, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
         found = variance_model(self.model)(Pictures.of(world, sensors, lights))
-        return minimised(found, self.aim), (found.noise_variance < _UNCUT * world.noise.variance).any(-1)
+        return minimised(found, self.aim), cut_off(found, world)
 
     def _clear(self, found: list[Place]) -> Iterator[Place]:
         """Clearly different ones, the best first."""
