@@ -160,7 +160,7 @@ def plan(
     start : Pose or pair
         Where the alternating search's sensor begins.
     shares : {"best", "given"}
-        Of two lights: search the shares that they have of the sum of their intensities, or keep them.
+        Of two lights: search their shares of the sum of their intensities, or keep them; of more they stay.
     refined : bool
         Whether to descend below the grid step.
     vary : tuple of {"analyser", "polarisation", "band"}
@@ -299,11 +299,8 @@ class _Option:
     def _search_lights(self, aim: Aim, report: Report | None, shares: bool) -> _Result:
         """Several lights at once, or one after the other where their contrasts do not tell of mixtures."""
         how = self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report or (lambda *_: None)
-        if applies(self.scene, self.model):
-            mixed = shares_of_two(self.scene) if shares else (shares_of(self.scene),)
-            shared = search_shared(*how, mixed)
-        else:
-            shared = by_turns(*how)
+        mixed = shares_of_two(self.scene) if shares and len(self.scene.lights) == 2 else (shares_of(self.scene),)
+        shared = (search_shared if applies(self.scene, self.model) else by_turns)(*how, mixed)
         found = shared.found
         return _Result(self.sensors[found.sensor], shared.lights[found.light], found.variance, None, found, shared)
 

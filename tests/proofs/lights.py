@@ -65,8 +65,8 @@ def compare(name: str, scene: Scene, places: int, rays: int, rng: np.random.Gene
         found.append([_by_rays(picture, at, rays // 4, seed) for seed in range(4)])
         ways = _ways(picture, at)
         exact.append(float(seen_by_rays(pictures, ways).mean()))
-        lit = [bool(seen_by_rays(_of_one(pictures, each), ways).any()) for each in pictures.emitters]
-        part.append(any(lit) and not all(lit))
+        lit = np.array([seen_by_rays(_of_one(pictures, each), ways) > 0 for each in pictures.emitters])
+        part.append(bool(lit.any() and not lit.all()))
     top, part = max(exact), np.array(part)
     scatter = np.std(found, 1, ddof=1).mean() / 2 / top
     off = np.abs(np.array(exact) - np.mean(found, 1)) / top

@@ -91,3 +91,15 @@ def test_what_cannot_be_planned(scene):
         planner.plan(scene, light=(10, 10), sensor=(40, 280))
     with pytest.raises(InvalidInput, match="shares must be one of best, given"):
         planner.plan(scene, shares="some")
+
+
+def test_a_backlight_falls_out_for_a_hole():
+    """A bore's lower rim under a lamp from above or before a backlight: the latter gets all of their total."""
+    plate = scenes.load("backlight_plate")
+    both = (scenes.Light(distance=200.0, intensity=0.5), plate.lights[0].model_copy(update={"intensity": 0.5}))
+    bore = plate.model_copy(
+        update={"several_lights": both, "settings": (), "measurands": plate.measurands[:1]},
+    )
+    limits = Constraints(sensor_polar_deg=(0, 1), light_polar_deg=(20, 60))
+    found = planner.plan(bore, step_deg=40, constraints=limits, refined=False)
+    assert found.shares == (0.0, 1.0)
