@@ -15,7 +15,7 @@ from render import bsdf, lights
 from render.meshes import mesh
 from render.rays import SURFACES
 from render.texture import Face, faces, shapes
-from scenes import Floor, Picture, Scene, Solid
+from scenes import Floor, Material, Picture, Scene, Solid
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
@@ -58,8 +58,7 @@ def description(
         **lights.description(mitsuba, picture, active),
     }
     if textures is None:
-        surface = _surface(mitsuba, picture, active)
-        made = [mesh(mitsuba, solid.triangles, surface) for solid in _solids(scene, active)]
+        made = [shape for solid in _solids(scene, active) for shape in _plain(mitsuba, solid, picture, active)]
     else:
         made = [shape for faces in textures for shape in shapes(mitsuba, faces)]
     parts.update((f"part{i}", shape) for i, shape in enumerate(made))
@@ -86,7 +85,7 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
         return None
     found = []
     for solid in _solids(picture.scene, active):
-        found.append(faces(solid, picture))
+        found.append(faces(solid, picture, _materials(picture.scene, solid)))
         if found[-1] is None:
             return None
     return tuple(found)
@@ -97,8 +96,23 @@ def _solids(scene: Scene, active: frozenset[str]) -> list[Solid]:
     return [scene.solid, *(obstacle.solid for obstacle in (scene.obstacles if "cast_shadow" in active else ()))]
 
 
-def _surface(mitsuba, picture: Picture, active: frozenset[str]) -> dict:
-    scene, material = picture.scene, picture.scene.material
+def _materials(scene: Scene, solid: Solid) -> list[Material]:
+    """Of each face of the object, or of an obstacle."""
+    known = scene.surfaces
+    return [known.of(face) if solid is scene.solid else scene.material for face in range(len(solid.faces))]
+
+
+def _plain(mitsuba, solid: Solid, picture: Picture, active: frozenset[str]) -> list[Any]:
+    """A solid's surface as one shape a material."""
+    of_face, made = _materials(picture.scene, solid), []
+    for material in dict.fromkeys(of_face):
+        here = np.array([each == material for each in of_face])[solid.triangle_faces]
+        made.append(mesh(mitsuba, solid.triangles[here], _surface(mitsuba, picture, active, material)))
+    return made
+
+
+def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material) -> dict:
+    scene = picture.scene
     if not active & CUSTOM:
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": diffuse(material)}}
     analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
@@ -106,7 +120,9 @@ def _surface(mitsuba, picture: Picture, active: frozenset[str]) -> dict:
         mitsuba,
         bsdf.Surface(
             material,
-            bands(scene) if "wavelength" in active else (Index(material.refractive_index, material.extinction),),
+            bands(scene, material=material)
+            if "wavelength" in active
+            else (Index(material.refractive_index, material.extinction),),
             tuple(scene.position("sensor", picture.sensor).tolist()),
             lights.lamps(picture, active),
             analyser=None if analyser is None else tuple(analyser.tolist()),

@@ -13,7 +13,7 @@ than _MOST nodes for it has no table: a roughness below about 0.02, a crease at 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,7 @@ from planner.imaging.appearance import signal
 from planner.imaging.irradiance import beam
 from planner.imaging.pictures import Pictures
 from render.meshes import mesh
-from scenes import Picture, Solid
+from scenes import Material, Picture, Solid
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -54,7 +54,7 @@ class Face:
     values: np.ndarray
 
 
-def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
+def faces(solid: Solid, picture: Picture, materials: Sequence[Material] | None = None) -> tuple[Face, ...] | None:
     """The solid's surface in parts, or None where a table would need too many nodes.
 
     Faces that are dark or turned away share one part, of brightness 0.
@@ -64,6 +64,8 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     solid : Solid
     picture : Picture
         Of one light; its parts that are not simulated are neutral.
+    materials : sequence of Material, optional
+        Of each face; the scene's when not given.
     """
     found, dark = [], np.ones(len(solid.triangles), bool)
     pictures = Pictures.of(picture)
@@ -72,7 +74,8 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     distances = [np.linalg.norm(place) for place in places]
     for index in np.flatnonzero((heights[0] > _GRAZING * distances[0]) & (heights[1] > _GRAZING * distances[1])):
         of_face = solid.triangle_faces == index
-        made = _face(solid.triangles[of_face], solid.normals[index], pictures)
+        material = picture.scene.material if materials is None else materials[index]
+        made = _face(solid.triangles[of_face], solid.normals[index], pictures, material)
         if made is None:
             return None
         found.append(made)
@@ -94,7 +97,7 @@ def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
     return made
 
 
-def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures) -> Face | None:
+def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Material) -> Face | None:
     """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
     sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
     first = sides[np.linalg.norm(sides, axis=1).argmax()]
@@ -107,18 +110,18 @@ def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures) -> Face
         """Points of the plane at fractions of the rectangle's sides, shape (down, across, 3)."""
         return origin + np.stack(np.meshgrid(across, down), -1) * (high - low) @ axes
 
-    values = _table(at, normal, pictures)
+    values = _table(at, normal, pictures, material)
     return None if values is None else Face(triangles, (flat - low) / (high - low), values)
 
 
-def _table(at: Points, normal: np.ndarray, pictures: Pictures) -> np.ndarray | None:
+def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Material) -> np.ndarray | None:
     """Values on a grid with as many intervals each way as they need; None if that is too many."""
-    counts = _first_counts(at, normal, pictures)
+    counts = _first_counts(at, normal, pictures, material.roughness)
     while (counts[0] + 1) * (counts[1] + 1) <= _MOST:
         across, down = (np.linspace(0, 1, count + 1) for count in counts)
         share = max(_AT_ONCE // across.size, 1)
         rows = [down[first : first + share] for first in range(0, down.size, share)]
-        values = np.concatenate([shade(pictures, normal, at(across, part)) for part in rows])
+        values = np.concatenate([shade(pictures, normal, at(across, part), material) for part in rows])
         excess = [_excess(part) for part in (values.T, values)]
         if not np.isfinite(excess).all():
             return None
@@ -129,10 +132,10 @@ def _table(at: Points, normal: np.ndarray, pictures: Pictures) -> np.ndarray | N
     return None
 
 
-def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures) -> list[int]:
+def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures, roughness: float) -> list[int]:
     """Intervals across and down with which no lobe falls between two nodes, powers of two."""
     few = np.linspace(0, 1, _FEWEST + 1)
-    slope = _slope(at(few, few), normal, pictures) / (_LOBE * pictures.scene.material.roughness)
+    slope = _slope(at(few, few), normal, pictures) / (_LOBE * roughness)
     steps = [np.linalg.norm(np.diff(slope, axis=axis), axis=-1).max() for axis in (1, 0)]
     return [_FEWEST << max(math.ceil(math.log2(max(step, 1.0))), 0) for step in steps]
 
@@ -150,7 +153,7 @@ def _slope(points: np.ndarray, normal: np.ndarray, pictures: Pictures) -> np.nda
     return half / (half @ normal)[..., None] - normal
 
 
-def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndarray:
+def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: Material | None = None) -> np.ndarray:
     """Brightness over N.L of points of a plane that is lit and seen, shape (...).
 
     Parameters
@@ -160,10 +163,12 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndar
     normal : ndarray, shape (3,)
     points : ndarray, shape (..., 3)
         cm.
+    material : Material, optional
+        The scene's when not given.
     """
     scene, arriving = pictures.scene, beam(pictures.scene.lights[0], pictures.lights_at[0], points)
     white = scene.camera.exposure * arriving.strength * (arriving.to_light @ normal)
-    return signal(pictures, points, normal, points.ndim - 1) / white
+    return signal(pictures, points, normal, points.ndim - 1, material=material) / white
 
 
 def _towards(place: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from scenes.errors import InvalidInput
 from scenes.lens import Lens
 from scenes.lights import Light
 from scenes.load import find, load, names
-from scenes.materials import Material
+from scenes.materials import FaceMaterial, Material
 from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
 from scenes.noise import Noise
 from scenes.parts.block import Block
@@ -18,7 +18,7 @@ from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "Floor", "InvalidInput", "Jitter", "Lens",
-    "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Scene",
-    "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
+    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "FaceMaterial", "Floor", "InvalidInput", "Jitter",
+    "Lens", "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity",
+    "Scene", "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
 ]  # fmt: skip

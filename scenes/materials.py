@@ -6,8 +6,9 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from scenes.model import Model
+from scenes.model import Model, Name
 from scenes.ranges import Fraction, Positive, rising
+from scenes.selection import OnFaces
 
 
 class Material(Model):
@@ -39,3 +40,15 @@ class Material(Model):
         """Whether the specular term is exactly zero."""
         indices = [row[1:] for row in self.index_table] or [(self.refractive_index, self.extinction)]
         return self.specular_fraction == 0 or all(index == (1, 0) for index in indices)
+
+
+class FaceMaterial(Material, OnFaces):
+    """What some faces of the object are made of, instead of `material`."""
+
+    name: Name
+    """For messages and tables."""
+
+    @property
+    def material(self) -> Material:
+        """The material itself."""
+        return Material(**{key: getattr(self, key) for key in Material.model_fields})

@@ -17,7 +17,7 @@ from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
 from scenes.lights import Light
-from scenes.materials import Material
+from scenes.materials import FaceMaterial, Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
 from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
@@ -26,6 +26,7 @@ from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField
 from scenes.ranges import Positive
+from scenes.surfaces import Surfaces, surfaces
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
@@ -76,7 +77,9 @@ class Scene(Model):
     object: Object
     """What is measured."""
     material: Material
-    """Of the object and the obstacles."""
+    """Of the object and the obstacles, where ``materials`` say nothing else."""
+    materials: tuple[FaceMaterial, ...] = ()
+    """Of some faces of the object."""
     camera: Camera
     """The camera."""
     light: Light
@@ -114,6 +117,11 @@ class Scene(Model):
     def bodies(self) -> Solid:
         """The object and the obstacles as one solid: all that hides and shades. The object's faces come first."""
         return _bodies(self.solid, self.obstacles)
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """What each face of `bodies` is made of."""
+        return surfaces(self.material, self.materials, self.solid, len(self.bodies.faces))
 
     @property
     def lights(self) -> tuple[Light, ...]:
@@ -175,6 +183,7 @@ class Scene(Model):
         check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
         self._check_measurands()
         self._check_surroundings()
+        _ = self.surfaces  # names of faces
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")

@@ -43,7 +43,7 @@ def is_plain(scene: Scene) -> bool:
 
 def is_separable(scene: Scene) -> bool:
     """Whether a face's signal is a number times 1 / r^3, r the distance from the light: plain, diffuse, one light."""
-    return is_plain(scene) and scene.material.is_diffuse and len(scene.lights) == 1
+    return is_plain(scene) and scene.surfaces.is_diffuse and len(scene.lights) == 1
 
 
 def signal(
@@ -80,10 +80,45 @@ def signal(
         arriving = beam(light, _widened(light_at, axes), points, fall_off=fall_off)
         fields = polarisation_axis(scene, i, light_at), analyser
         across = (None if axis is None else _widened(axis, axes) for axis in fields)
-        value = reflected(material, bands(scene, light), normals, arriving.to_light, to_sensor, *across)
+        value = reflected(material, bands(scene, light, material), normals, arriving.to_light, to_sensor, *across)
         value = scene.camera.exposure * arriving.strength * value
         total = total + (value if lit is None else np.where(lit[i], value, 0.0))
     return total
+
+
+def face_signal(
+    pictures: Pictures,
+    points: np.ndarray,
+    faces: np.ndarray | int,
+    axes: int,
+    lit: tuple[np.ndarray, ...] | None = None,
+    *,
+    normals: np.ndarray | None = None,
+    fall_off: bool = True,
+) -> np.ndarray:
+    """Signal of points on faces of the bodies, each of its own material; 0 where a surface is turned away.
+
+    Parameters
+    ----------
+    points, axes, lit, fall_off
+        As of `signal`.
+    faces : ndarray of int
+        Indices, broadcast against the points without their last axis.
+    normals : ndarray, optional
+        Unit normals where they are not those of the faces: of a round wall.
+    """
+    surfaces, faces = pictures.scene.surfaces, np.asarray(faces)
+    normals = pictures.scene.bodies.normals[faces] if normals is None else normals
+    kinds = surfaces.kinds[faces]
+    first, *others = np.unique(kinds) if kinds.size else (0,)
+
+    def of_kind(kind: int) -> np.ndarray:
+        return signal(pictures, points, normals, axes, lit, material=surfaces.materials[kind], fall_off=fall_off)
+
+    found = of_kind(first)
+    for kind in others:
+        found = np.where(kinds == kind, of_kind(kind), found)
+    return found
 
 
 def analyser_axis(scene: Scene, sensors: np.ndarray) -> np.ndarray | None:
@@ -128,7 +163,7 @@ def side_signals(
         return np.zeros((*lead, 0, 2, points.shape[-2]))
     faces = np.array([edge.faces for edge in edges])
     if is_plain(scene):
-        level = signal(pictures, points[..., None, :, :], bodies.normals[faces][:, :, None], 3, fall_off=fall_off)
+        level = face_signal(pictures, points[..., None, :, :], faces[:, :, None], 3, fall_off=fall_off)
         return np.where(facing(bodies, pictures.sensor_at)[..., faces, None], level, 0.0)
     return np.stack([_beside(pictures, e, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
 
@@ -202,8 +237,13 @@ def _heights(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
     scene, solid = pictures.scene, pictures.scene.solid
     faces = np.array([solid.edge(name).faces for name in names])
     height = np.maximum(pictures.lights_at[0] @ solid.normals.T - solid.offsets, 0.0)
-    white = scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None)
-    return np.where(facing(solid, pictures.sensor_at), height * white, 0.0)[..., faces]
+    return np.where(facing(solid, pictures.sensor_at), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
+
+
+def whites(scene: Scene) -> np.ndarray:
+    """Signal of each face of the bodies by unit irradiance from everywhere, its diffuse part, grey levels, (F,)."""
+    each = [diffuse(material, scene.camera.analyser_deg is not None) for material in scene.surfaces.materials]
+    return scene.camera.exposure * np.array(each)[scene.surfaces.kinds]
 
 
 def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) -> np.ndarray:
@@ -215,13 +255,12 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
         turned(bodies, edge, at)[..., None] & seen(bodies, edge, at, fractions)[..., None, :]
         for at in pictures.lights_at
     )
-    normals = bodies.normals[list(edge.faces)][:, None]
-    level = signal(pictures, points[..., None, :, :], normals, 2, lit, fall_off=fall_off)
+    level = face_signal(pictures, points[..., None, :, :], np.array(edge.faces)[:, None], 2, lit, fall_off=fall_off)
     level = level + light_between(pictures, points[..., None, :, :], np.array(edge.faces)[:, None])
     looked_at = turned(bodies, edge, pictures.sensor_at)[..., None]
     visible = (looked_at.any(-2) & seen(bodies, edge, pictures.sensor_at, fractions))[..., None, :]
     found = np.where(visible & looked_at, level, 0.0)
-    outward = normals.sum((0, 1))
+    outward = bodies.normals[list(edge.faces)].sum(0)
     for side, face in enumerate(edge.faces):
         # past an outer face that is turned away there is nothing but the floor, for the ray leaves the convex hull
         wanted = visible[..., 0, :] & ~looked_at[..., side, :]
@@ -258,7 +297,7 @@ def behind(
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, at, partial(reaches, bodies)) for at in pictures.lights_at)
-    found = signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off)
+    found = face_signal(pictures, hit, face, 1, lit, fall_off=fall_off)
     found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     if scene.floor is not None and scene.floor.reflectance > 0:
         place, ahead = _on_floor(scene.floor, points, vectors, t)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.appearance import is_plain, side_signals, signal
+from planner.imaging.appearance import face_signal, is_plain, side_signals
 from planner.imaging.between import light_between
 from planner.imaging.blurred_segment import Segments
 from planner.imaging.pictures import Pictures
@@ -201,7 +201,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     heights = solid.offsets[face] - (of_each.sensor_at * normal[:, 0, 0]).sum(-1)
     with np.errstate(all="ignore"):
         met = at[..., None, :] + (heights[:, None, None] / (rays * normal).sum(-1))[..., None] * rays
-        values = signal(of_each, met, normal, 2) + light_between(of_each, met, face[:, None, None])
+        values = face_signal(of_each, met, face[:, None, None], 2) + light_between(of_each, met, face[:, None, None])
         values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
     return np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, with_materials
 from render.phenomena.edges import compare, lever, sides, total_variance
 from scenes import Scene
 
@@ -59,16 +59,16 @@ class SpecularLobe(Effect):
 
     def absent(self, pictures: Pictures) -> str | None:
         scene = pictures.scene
-        if scene.material.specular_fraction == 0:
+        if all(material.specular_fraction == 0 for material in scene.surfaces.used):
             return "specular_fraction is 0"
-        return "n = 1 and k = 0: no Fresnel reflection" if scene.material.is_diffuse else None
+        return "n = 1 and k = 0: no Fresnel reflection" if scene.surfaces.is_diffuse else None
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "material", refractive_index=1.0, extinction=0.0, index_table=())
+        return with_materials(scene, refractive_index=1.0, extinction=0.0, index_table=())
 
 
 class Polarisation(Effect):
@@ -82,7 +82,7 @@ class Polarisation(Effect):
         scene = pictures.scene
         if scene.light.polarisation_deg is None:
             return "the light is unpolarised"
-        return "diffuse reflection forgets polarisation" if scene.material.is_diffuse else None
+        return "diffuse reflection forgets polarisation" if scene.surfaces.is_diffuse else None
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
@@ -120,16 +120,17 @@ class Wavelength(Effect):
 
     def absent(self, pictures: Pictures) -> str | None:
         scene = pictures.scene
-        if scene.material.is_diffuse:
+        if scene.surfaces.is_diffuse:
             return "the diffuse term does not depend on the index"
-        return None if scene.material.index_table else "the material has no table of indices"
+        known = any(material.index_table for material in scene.surfaces.used)
+        return None if known else "the material has no table of indices"
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "material", index_table=())
+        return with_materials(scene, index_table=())
 
 
 class LightSize(Effect):
@@ -157,9 +158,14 @@ class LightSize(Effect):
         sine = np.einsum("sefni,efi->sefn", towards, found.normals) / np.linalg.norm(towards, axis=-1)
         if (np.abs(sine) < 2 * angle).any() or scene.floor is not None or scene.obstacles or not scene.solid.is_convex:
             return EVERYTHING
-        share = 2 * angle**2 + (0 if scene.material.is_diffuse else (angle / scene.material.roughness) ** 2)
+        share = 2 * angle**2 + (0 if scene.surfaces.is_diffuse else (angle / _smoothest(scene)) ** 2)
         moved = np.abs(found.shift(total_variance(scene))).max(-1) * share
         return largest((lever(pictures) * moved).sum(-1), np.array([2 * share]))
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "light", radius=0.0)
+
+
+def _smoothest(scene: Scene) -> float:
+    """The least roughness of what has a lobe."""
+    return min(material.roughness for material in scene.surfaces.used if not material.is_diffuse)
