@@ -11,10 +11,11 @@ from planner.imaging.appearance import analyser_axis
 from planner.imaging.irradiance import bands
 from planner.imaging.projection import frame
 from planner.imaging.reflectance import Index, diffuse
+from planner.imaging.sheets import sheets
 from render import bsdf, lights
 from render.meshes import mesh
 from render.rays import SURFACES
-from render.texture import Face, faces, shapes
+from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
 from scenes import Floor, Material, Picture, Scene, Solid
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
@@ -85,7 +86,8 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
         return None
     found = []
     for solid in _solids(picture.scene, active):
-        found.append(faces(solid, picture, _materials(picture.scene, solid)))
+        uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
+        found.append(faces(solid, picture, _materials(picture.scene, solid), uneven))
         if found[-1] is None:
             return None
     return tuple(found)
@@ -103,17 +105,27 @@ def _materials(scene: Scene, solid: Solid) -> list[Material]:
 
 
 def _plain(mitsuba, solid: Solid, picture: Picture, active: frozenset[str]) -> list[Any]:
-    """A solid's surface as one shape a material."""
+    """A solid's surface as one shape a material, and one a textured face."""
     of_face, made = _materials(picture.scene, solid), []
+    uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
     for material in dict.fromkeys(of_face):
-        here = np.array([each == material for each in of_face])[solid.triangle_faces]
-        made.append(mesh(mitsuba, solid.triangles[here], _surface(mitsuba, picture, active, material)))
+        here = [each == material and face not in uneven for face, each in enumerate(of_face)]
+        here = np.array(here)[solid.triangle_faces]
+        if here.any():
+            made.append(mesh(mitsuba, solid.triangles[here], _surface(mitsuba, picture, active, material)))
+    for face, sheet in uneven.items():
+        part = uneven_part(solid, face, sheet)
+        surface = _surface(mitsuba, picture, active, of_face[face], part)
+        made.append(mesh(mitsuba, part.triangles, surface, texels(part)))
     return made
 
 
-def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material) -> dict:
+def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material, part: Face | None = None) -> dict:
+    """A material as a BSDF; ``part`` has the factors of its diffuse reflectance."""
     scene = picture.scene
     if not active & CUSTOM:
+        if part is not None:
+            return {"type": "diffuse", "reflectance": bitmap(mitsuba, diffuse(material) * part.values)}
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": diffuse(material)}}
     analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
     return bsdf.describe(
@@ -127,6 +139,7 @@ def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Materi
             lights.lamps(picture, active),
             analyser=None if analyser is None else tuple(analyser.tolist()),
             sensor_angle=2 * aperture_radius(scene, active) / scene.camera.distance,
+            texture=part,
         ),
     )
 

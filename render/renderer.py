@@ -145,16 +145,16 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
     textures = textured(picture, sharp) if scalar and active & CUSTOM else None
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
     many = quality.edge_samples or (16 if interpreted else 64 if scalar and textures is None else 256)
-    samples = quality.samples or (1 if scalar else 4)
+    samples = quality.samples or (1 if scalar and not picture.scene.textures else 4)
 
     few = quality.random_samples or 16
     bounces = SURFACES - 1 if "interreflection" in active else 0
     large = is_large(crop, k, sharp != active)
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, *((LARGE_AT_ONCE,) if large else ()))
 
-    def load(active, samples, textures=None, divided=1):
+    def load(active, samples, textures=None, divided=1, shown=picture):
         film = tuple(n // divided for n in size), tuple(slice(p.start // divided, p.stop // divided) for p in crop)
-        parts = description(mitsuba, picture, active, *film, samples, textures)
+        parts = description(mitsuba, shown, active, *film, samples, textures)
         return mitsuba.load_dict(parts, parallel=False)
 
     def rendered(loaded) -> np.ndarray:
@@ -183,7 +183,12 @@ def _fine(picture: Picture, active, crop, quality: Quality, variant: str) -> np.
         return fine_pixels(picture, crop, renders, math.ceil(k * _defocus(picture)), (samples, few, many))
     loaded = load(sharp, samples, textures)
     fine = rendered(loaded)
-    marked = crossed(fine, math.ceil(k * _defocus(picture)))
+    even = fine
+    if picture.scene.textures:  # bilinear, so they need no more rays: edges are sought without them
+        bare = picture.with_scene(picture.scene.model_copy(update={"textures": ()}))
+        plain = textured(bare, sharp) if textures is not None else None
+        even = rendered(load(sharp, 1, plain, shown=bare))
+    marked = crossed(even, math.ceil(k * _defocus(picture)))
     if sharp != active:
         loaded = load(active, few)
         marked |= near_edges(picture, crop, k)

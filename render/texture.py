@@ -13,15 +13,17 @@ than _MOST nodes for it has no table: a roughness below about 0.02, a crease at 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import signal
+from planner.imaging.appearance import matt_part, signal
 from planner.imaging.irradiance import beam
 from planner.imaging.pictures import Pictures
+from planner.imaging.sheets import Sheet
 from render.meshes import mesh
 from scenes import Material, Picture, Solid
 
@@ -54,7 +56,12 @@ class Face:
     values: np.ndarray
 
 
-def faces(solid: Solid, picture: Picture, materials: Sequence[Material] | None = None) -> tuple[Face, ...] | None:
+def faces(
+    solid: Solid,
+    picture: Picture,
+    materials: Sequence[Material] | None = None,
+    uneven: Mapping[int, Sheet] = MappingProxyType({}),
+) -> tuple[Face, ...] | None:
     """The solid's surface in parts, or None where a table would need too many nodes.
 
     Faces that are dark or turned away share one part, of brightness 0.
@@ -66,6 +73,8 @@ def faces(solid: Solid, picture: Picture, materials: Sequence[Material] | None =
         Of one light; its parts that are not simulated are neutral.
     materials : sequence of Material, optional
         Of each face; the scene's when not given.
+    uneven : mapping of int to Sheet
+        Textures of faces.
     """
     found, dark = [], np.ones(len(solid.triangles), bool)
     pictures = Pictures.of(picture)
@@ -75,7 +84,7 @@ def faces(solid: Solid, picture: Picture, materials: Sequence[Material] | None =
     for index in np.flatnonzero((heights[0] > _GRAZING * distances[0]) & (heights[1] > _GRAZING * distances[1])):
         of_face = solid.triangle_faces == index
         material = picture.scene.material if materials is None else materials[index]
-        made = _face(solid.triangles[of_face], solid.normals[index], pictures, material)
+        made = _face(solid.triangles[of_face], solid.normals[index], pictures, material, uneven.get(int(index)))
         if made is None:
             return None
         found.append(made)
@@ -86,18 +95,39 @@ def faces(solid: Solid, picture: Picture, materials: Sequence[Material] | None =
 
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
     """Mitsuba's meshes of the parts that `faces` gives."""
-    made = []
-    for part in parts:
-        if len(part.triangles):
-            picture = mitsuba.Bitmap(part.values.astype(np.float32)[..., None])
-            table = {"type": "bitmap", "bitmap": picture, "raw": True, "format": "variant", "wrap_mode": "clamp"}
-            size = np.array(part.values.shape[::-1])
-            texels = (0.5 + part.places * (size - 1)) / size  # a node is the centre of a texel
-            made.append(mesh(mitsuba, part.triangles, {"type": "diffuse", "reflectance": table}, texels))
-    return made
+    return [
+        mesh(
+            mitsuba,
+            part.triangles,
+            {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)},
+            texels(part),
+        )
+        for part in parts
+        if len(part.triangles)
+    ]
 
 
-def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Material) -> Face | None:
+def bitmap(mitsuba: Any, values: np.ndarray) -> dict:
+    """Mitsuba's description of a table that is interpolated linearly."""
+    picture = mitsuba.Bitmap(values.astype(np.float32)[..., None])
+    return {"type": "bitmap", "bitmap": picture, "raw": True, "format": "variant", "wrap_mode": "clamp"}
+
+
+def texels(part: Face) -> np.ndarray:
+    """Where the triangles' corners lie in the table as Mitsuba counts: a node is the centre of a texel; (T, 3, 2)."""
+    size = np.array(part.values.shape[::-1])
+    return (0.5 + part.places * (size - 1)) / size
+
+
+def uneven_part(solid: Solid, face: int, sheet: Sheet) -> Face:
+    """A textured face with the factors of its diffuse reflectance."""
+    triangles = solid.triangles[solid.triangle_faces == face]
+    return Face(triangles, sheet.places(triangles), sheet.values)
+
+
+def _face(
+    triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet | None
+) -> Face | None:
     """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
     sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
     first = sides[np.linalg.norm(sides, axis=1).argmax()]
@@ -111,7 +141,27 @@ def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, materia
         return origin + np.stack(np.meshgrid(across, down), -1) * (high - low) @ axes
 
     values = _table(at, normal, pictures, material)
+    if values is not None and sheet is not None:
+        values = _uneven(values, at, normal, pictures, material, sheet)
     return None if values is None else Face(triangles, (flat - low) / (high - low), values)
+
+
+def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet):
+    """A table of brightness with the texture's factors on the diffuse part, on nodes that hold those of both."""
+    counts = [
+        (texture - 1) * math.ceil((table - 1) / (texture - 1))
+        for texture, table in zip(sheet.values.shape[::-1], values.shape[::-1], strict=True)
+    ]
+    if (counts[0] + 1) * (counts[1] + 1) > _MOST:
+        return None
+    across, down = (np.linspace(0, 1, count + 1) for count in counts)
+    share = max(_AT_ONCE // across.size, 1)
+    rows = []
+    for first in range(0, down.size, share):
+        points = at(across, down[first : first + share])
+        matt = shade(pictures, normal, points, matt_part(material))
+        rows.append(shade(pictures, normal, points, material) + (sheet.at(points) - 1) * matt)
+    return np.concatenate(rows)
 
 
 def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Material) -> np.ndarray | None:

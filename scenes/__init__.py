@@ -15,10 +15,12 @@ from scenes.picture import Picture
 from scenes.pose import Pose
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.textures import ImageTexture, StatisticalTexture
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "FaceMaterial", "Floor", "InvalidInput", "Jitter",
-    "Lens", "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity",
-    "Scene", "Setting", "Side", "Solid", "Task", "Tolerance", "Unit", "block", "find", "load", "names",
+    "UNITS", "Block", "Camera", "Centre", "Circle", "Corner", "Edge", "FaceMaterial", "Floor", "ImageTexture",
+    "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Material", "Measurand", "Mesh", "Noise", "Obstacle",
+    "Picture", "Pose", "Quantity", "Scene", "Setting", "Side", "Solid", "StatisticalTexture", "Task", "Tolerance",
+    "Unit", "block", "find", "load", "names",
 ]  # fmt: skip

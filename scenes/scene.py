@@ -28,6 +28,7 @@ from scenes.pose import Pose, PoseField
 from scenes.ranges import Positive
 from scenes.surfaces import Surfaces, surfaces
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.textures import Texture, check_textures
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
 
@@ -80,6 +81,8 @@ class Scene(Model):
     """Of the object and the obstacles, where ``materials`` say nothing else."""
     materials: tuple[FaceMaterial, ...] = ()
     """Of some faces of the object."""
+    textures: tuple[Texture, ...] = ()
+    """What is printed on faces, or how unevenly they reflect."""
     camera: Camera
     """The camera."""
     light: Light
@@ -184,6 +187,7 @@ class Scene(Model):
         self._check_measurands()
         self._check_surroundings()
         _ = self.surfaces  # names of faces
+        check_textures(self.textures, self.solid)
         for i, setting in enumerate(self.settings):
             for role in ("sensor", "light"):
                 self.check_pose(role, getattr(setting, role), f"settings[{i}].{role}")

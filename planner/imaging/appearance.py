@@ -18,6 +18,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, facing, frame
 from planner.imaging.rays import first_face, reaches
 from planner.imaging.reflectance import diffuse, reflected
+from planner.imaging.sheets import printed
 from planner.imaging.visibility import seen, turned
 from scenes import Edge, Floor, Material, Scene
 
@@ -42,8 +43,12 @@ def is_plain(scene: Scene) -> bool:
 
 
 def is_separable(scene: Scene) -> bool:
-    """Whether a face's signal is a number times 1 / r^3, r the distance from the light: plain, diffuse, one light."""
-    return is_plain(scene) and scene.surfaces.is_diffuse and len(scene.lights) == 1
+    """Whether a face's signal is a number times 1 / r^3, r the distance from the light.
+
+    One convex body before darkness, diffuse, without print, under one light.
+    """
+    plain = is_plain(scene) and not printed(scene)
+    return plain and scene.surfaces.is_diffuse and len(scene.lights) == 1
 
 
 def signal(
@@ -95,8 +100,11 @@ def face_signal(
     *,
     normals: np.ndarray | None = None,
     fall_off: bool = True,
+    prints: bool = True,
 ) -> np.ndarray:
     """Signal of points on faces of the bodies, each of its own material; 0 where a surface is turned away.
+
+    Of textures it knows those that are the same on every part (`printed`); the others are 1 on average.
 
     Parameters
     ----------
@@ -106,6 +114,8 @@ def face_signal(
         Indices, broadcast against the points without their last axis.
     normals : ndarray, optional
         Unit normals where they are not those of the faces: of a round wall.
+    prints : bool
+        Whether faces show what is printed on them.
     """
     surfaces, faces = pictures.scene.surfaces, np.asarray(faces)
     normals = pictures.scene.bodies.normals[faces] if normals is None else normals
@@ -118,7 +128,31 @@ def face_signal(
     found = of_kind(first)
     for kind in others:
         found = np.where(kinds == kind, of_kind(kind), found)
+    for face, sheet in printed(pictures.scene).items() if prints else ():
+        if (faces == face).any():
+            matt = diffuse_signal(pictures, points, face, axes, lit, fall_off=fall_off)
+            found = found + np.where(faces == face, (sheet.at(points) - 1) * matt, 0.0)
     return found
+
+
+def diffuse_signal(
+    pictures: Pictures,
+    points: np.ndarray,
+    face: int,
+    axes: int,
+    lit: tuple[np.ndarray, ...] | None = None,
+    *,
+    fall_off: bool = True,
+) -> np.ndarray:
+    """The diffuse part of the signal of points on a face, without its texture; parameters as of `signal`."""
+    matt, normal = matt_part(pictures.scene.surfaces.of(face)), pictures.scene.bodies.normals[face]
+    return signal(pictures, points, normal, axes, lit, material=matt, fall_off=fall_off)
+
+
+@lru_cache(maxsize=64)
+def matt_part(material: Material) -> Material:
+    """A material's diffuse term alone."""
+    return Material(diffuse_reflectance=diffuse(material))
 
 
 def analyser_axis(scene: Scene, sensors: np.ndarray) -> np.ndarray | None:

@@ -19,6 +19,7 @@ from render.phenomena.shading import (
     LightSize,
     Polarisation,
     SpecularLobe,
+    Texture,
     Wavelength,
 )
 from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
@@ -28,7 +29,7 @@ REGISTER: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
-        Analyser(), Wavelength(), FallOff(), LightSize(), DepthOfField(),
+        Analyser(), Wavelength(), Texture(), FallOff(), LightSize(), DepthOfField(),
         LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
         FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.features.measurand import measurands
+from planner.models.texture import texture_errors
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, with_materials
 from render.phenomena.edges import compare, lever, sides, total_variance
 from scenes import Scene
@@ -131,6 +133,35 @@ class Wavelength(Effect):
 
     def without(self, scene: Scene) -> Scene:
         return with_materials(scene, index_table=())
+
+
+class Texture(Effect):
+    """Prints and uneven reflectance of faces."""
+
+    name = "texture"
+    cost = 2.0
+    switch = "the diffuse reflectance as a table on each textured face"
+
+    def absent(self, pictures: Pictures) -> str | None:
+        return None if pictures.scene.textures else "the faces are even"
+
+    def influence(self, pictures: Pictures) -> Influence:
+        """Shifts by prints and twice the standard deviation by statistical textures; contrast by both."""
+        scene = pictures.scene
+        variance = compare(pictures, self.without(scene)).variance
+        uneven = max((each.contrast for each in scene.textures if each.kind == "statistical"), default=0.0)
+        poses = (pictures.sensors, *pictures.lights)
+        moved = []
+        for sensor, *lights in zip(*(each.reshape(-1, 2) for each in poses), strict=True):
+            alone = Pictures(scene, sensor, tuple(lights), closely=True)
+            found = texture_errors(alone)
+            spread = 2 * np.sqrt(found.variances[0][0])
+            moved.append(abs(measurands(alone).gradient[0, : found.printed.size] @ found.printed) + spread)
+        found = largest(np.array(moved), np.array([2 * uneven]))
+        return Influence(found.bias_px, found.variance + variance)
+
+    def without(self, scene: Scene) -> Scene:
+        return scene.model_copy(update={"textures": ()})
 
 
 class LightSize(Effect):
