@@ -76,7 +76,7 @@ def _register(variant: str) -> None:
             record.sampled_component = 0
             record.sampled_type = +mi.BSDFFlags.GlossyReflection
             active &= (mi.Frame3f.cos_theta(si.wi) > 0) & (record.pdf > 0)
-            return record, self.eval(ctx, si, wo, active) / record.pdf & active
+            return record, self.eval(ctx, si, wo, active) / dr.maximum(record.pdf, 1e-30) & active
 
         def eval(self, ctx, si, wo, active=True):
             known = self.surface

@@ -34,7 +34,7 @@ _KINDS = {
 
 
 # alternatives of the model, no keys of the file
-_TAGS = ("block", "mesh", "corner", "centre", "side", "statistical", "image")
+_TAGS = ("block", "mesh", "corner", "centre", "side", "statistical", "image", "str", "Where")
 
 
 _MOST = 600  # characters of a message: enough for a path, a key and what was given

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -43,16 +43,14 @@ class Where(Model):
         return found
 
 
-SideName = Literal["top", "bottom", "front", "back", "left", "right"]
-
-
 class OnFaces(Model):
     """What is on some faces of the object."""
 
     faces: tuple[str, ...] = ()
     """Names of faces; ``ice show`` lists them."""
-    where: SideName | Where | None = None
-    """Instead of names: a side of the object (faces that look that way within 1 degree), or a table."""
+    where: str | Where | None = None
+    """Instead of names: a side of the object (top, bottom, front, back, left, right: faces that look that way within 1
+    degree), or a table."""
 
     def chosen(self, solid: Solid, key: str) -> np.ndarray:
         """Indices of the faces that are meant.
@@ -77,6 +75,8 @@ class OnFaces(Model):
         return np.array([solid.face_names.index(name) for name in self.faces])
 
     def _by_place(self, solid: Solid, key: str) -> np.ndarray:
+        if isinstance(self.where, str) and self.where not in _SIDES:
+            raise ValueError(f"{key}.where must be one of {', '.join(_SIDES)}, or a table, got {self.where!r}")
         where = Where(normal=_SIDES[self.where]) if isinstance(self.where, str) else self.where
         if where.normal is None and where.box is None:
             raise ValueError(f"{key}.where must be a side, or have a normal or a box, got neither")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Discriminator, Field, PrivateAttr, Tag, ValidationInfo, field_validator, model_validator
 
+from scenes.errors import InvalidInput
 from scenes.model import Model
 from scenes.parts.solid import Solid
 from scenes.ranges import Length, Positive
@@ -16,6 +17,7 @@ from scenes.selection import OnFaces, Point
 CELLS = 8  # nodes of a statistical texture to a correlation length
 MOST_NODES = 1 << 22  # of the texture of one face
 _FEWEST = 8  # cells along a side
+_SHARP = 32  # pixels that an image has at least each way, as far as its border is concerned
 _OFF = 1e-3  # of the object's size: how far an image's corner may be off its face
 
 
@@ -105,7 +107,11 @@ class ImageTexture(Model):
     def _read(self) -> ImageTexture:
         from scenes.image_file import read  # loads OpenCV
 
-        levels = read(self.file)
+        try:
+            levels = read(self.file)
+        except InvalidInput as error:
+            reason = str(error).rpartition("got: ")[2]
+            raise ValueError(f"file must be a readable image, got {self.file} ({reason})") from None
         if not (np.isfinite(levels).all() and levels.min() >= 0 and levels.max() <= 10 * self.white):
             raise ValueError(f"file must be of levels from 0 to 10 times white, got others in {self.file}")
         self._levels = levels
@@ -118,8 +124,8 @@ class ImageTexture(Model):
 
     @property
     def step(self) -> float:
-        """Half of the lesser side of a pixel, scene units."""
-        rows, columns = self.levels.shape
+        """Between nodes: half of the lesser side of a pixel, or less for a sharp border; scene units."""
+        rows, columns = (max(count, _SHARP) for count in self.levels.shape)
         return min(self.width / columns, self.height / rows) / 2
 
     def check(self, solid: Solid, key: str) -> np.ndarray:
@@ -131,7 +137,7 @@ class ImageTexture(Model):
         length = np.linalg.norm(self.direction)
         if not (length > 0 and abs(normal @ np.array(self.direction)) <= _OFF * length):
             raise ValueError(f"{key}.direction must lie in face {self.face}, got {list(self.direction)}")
-        check_nodes(solid, int(face), self.step, f"{key}.width", 2 * self.levels.shape[1])
+        check_nodes(solid, int(face), self.step, f"{key}.width", round(self.width / self.step))
         return np.array([face])
 
 

@@ -28,7 +28,7 @@ from scenes import Solid
 from scenes.textures import ImageTexture
 
 _FAR = 5.0  # standard deviations of the smoothed edge beyond which a texture is not felt
-_MOST_ALONG, _ACROSS = 4000, (16, 64)  # places
+_MOST_ALONG, _ACROSS = 2000, (16, 64)  # places
 _FARTHEST, _STEEPER = 0.25, 0.1  # px that a print may move a crossing, part by which it may change its slope
 
 
@@ -190,7 +190,13 @@ def _of_edge(pictures: Pictures, e: int, nodes, length: float) -> _OfEdge:
     across, along = (float(np.mean(np.broadcast_to(part, nodes.t.shape)[e])) for part in (nodes.across, nodes.along))
     index = [edge.name for edge in solid.edges].index(name)
     faces = sided(solid)[index].tolist()  # opposite to the normal, and on its side
-    places = _Places.of(length, float(blur) * across, float(blur) / along, _finest(pictures, name, faces))
+    seen = facing(solid, pictures.sensor_at)
+    places = _Places.of(
+        length,
+        float(blur) * across,
+        float(blur) / along,
+        _finest(pictures, name, [face for face in faces if seen[face]]),
+    )
     spatial = np.interp(places.t, nodes.t[e], nodes.spatial[e])
     bare = pictures.with_scene(scene.model_copy(update={"textures": ()}))
     levels = side_signals(bare, (name,), edge_points(solid, (name,), spatial))[0]
@@ -200,7 +206,7 @@ def _of_edge(pictures: Pictures, e: int, nodes, length: float) -> _OfEdge:
     steeper, fields = {"printed": np.zeros(places.t.size), "part": np.zeros(places.t.size)}, []
     for sign, face, level in zip((-1.0, 1.0), faces, levels, strict=True):
         sheet = known.get(face)
-        if sheet is None or not level.max() > 0:
+        if sheet is None or not seen[face] or not level.max() > 0:
             continue
         points = _on_face(pictures, view, e, float(nodes.middle[e, 0]) + places.v, sign * places.u, face)
         bright = diffuse_signal(bare, points.reshape(-1, 3), face, 1).reshape(points.shape[:-1])
