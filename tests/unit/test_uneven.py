@@ -11,6 +11,7 @@ import measure
 import planner
 import render
 import scenes
+import validation
 from planner.features.measurand import measurands
 from planner.imaging.appearance import diffuse_signal, face_signal, is_separable
 from planner.imaging.pictures import Pictures
@@ -279,3 +280,21 @@ def test_measurands_are_joint(task1):
     found = texture_errors(pictures(scene))
     assert found.covariance.shape == (2 * len(measurands(pictures(scene)).view.names),) * 2
     assert np.linalg.eigvalsh(found.covariance).min() > -1e-12 * np.abs(found.covariance).max()
+
+
+@pytest.mark.render
+def test_a_run_tells_the_scatter_over_parts_beside_the_noise(tmp_path, task1):
+    """Only where there are textures; the bias that is judged is the rendered part's."""
+    scene = scenes.load("printed_label")
+    scene = scene.model_copy(update={"settings": scene.settings[:1]})
+    (told,) = validation.run(scene, renders=60, seed=1, workers=1, out=tmp_path / "a").to_json()["settings"]
+    forecast = planner.predict(scene, scene.settings[0].sensor, scene.settings[0].light).measurands[0]
+    assert told["predicted"]["texture"] == pytest.approx(forecast.texture_variance_image, rel=1e-12)
+    assert told["measurands"][0]["texture"] == pytest.approx(forecast.texture_variance_object, rel=1e-12)
+    assert told["predicted_bias"] == pytest.approx(forecast.bias_image, rel=1e-9)
+    assert abs(told["bias"] - told["predicted_bias"]) < 4 * np.sqrt(told["empirical"] / 60)
+    assert abs(told["bias"]) > 4 * np.sqrt(told["empirical"] / 60)
+    even = task1.model_copy(update={"settings": task1.settings[:1]})
+    (plain,) = validation.run(even, renders=10, seed=1, workers=1, out=tmp_path / "b").to_json()["settings"]
+    assert "texture" not in plain["predicted"]
+    assert "texture" not in plain["measurands"][0]
