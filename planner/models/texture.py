@@ -17,7 +17,7 @@ import numpy as np
 
 from planner.features.locator import edge_blur
 from planner.features.measurand import Measurands, measurands, normals
-from planner.imaging.appearance import diffuse_signal, is_plain, side_signals
+from planner.imaging.appearance import diffuse_signal, side_signals
 from planner.imaging.boundaries import sided
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
@@ -152,8 +152,9 @@ def _texture_errors(pictures: Pictures) -> TextureErrors:
     rims = [not known.keys().isdisjoint(_around(scene.solid, name)) for name in told.circles]
     for e in range(count):
         length = float(nodes.length[e, 0])
-        textured = [face for face in scene.solid.edge(view.names[e]).faces if face in known and seen[face]]
-        unknown[e] = not is_plain(scene) and not seen[list(scene.solid.edge(view.names[e]).faces)].all()
+        own = list(scene.solid.edge(view.names[e]).faces)
+        textured = [face for face in own if face in known and seen[face]]
+        unknown[e] = (~seen[own] & ~scene.bodies.outer[own]).any()  # past an outer face there is none
         if not textured or not length > 0 or not view.visible[e]:
             continue
         found = _of_edge(pictures, e, nodes, length)

@@ -37,8 +37,8 @@ def predicted(forecasts: dict[str, planner.Prediction]) -> list[dict[str, Any]]:
 
 
 def texture(variance: float | None) -> dict[str, float]:
-    """Variance over parts by textures under its key, which is absent where there are none."""
-    return {} if variance is None else {"texture": variance}
+    """Variance over parts by textures under its key, which is absent where there are none, or it is not known."""
+    return {} if variance is None or np.isnan(variance) else {"texture": variance}
 
 
 def propagated(method: str, found: PropagatedValues, spread: np.ndarray) -> dict[str, tuple[float, float, str]]:
@@ -56,7 +56,7 @@ class JudgedMeasurand:
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
     ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of
     `Judged`. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
-    ``texture`` is the predicted variance over parts by textures, None where there are none.
+    ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
     """
 
     name: str

@@ -62,12 +62,20 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
 
 def _textures(p: planner.Prediction) -> list[str]:
     """What textures add to each measurand; nothing without textures."""
-    return [
-        f"  Textures: {each.name} is off by {each.texture_variance_object**0.5:.3g} {each.unit} (1 sigma over parts) in"
-        f" all pictures of a part; {each.bias_object:+.3g} {each.unit} on this one"
-        for each in p.measurands
-        if each.texture_variance_object is not None
-    ]
+    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in p.measurands if _is_uneven(each)]
+
+
+def _is_uneven(each: planner.Forecast) -> bool:
+    return each.texture_variance_object is not None
+
+
+def _over_parts(each: planner.Forecast) -> str:
+    if math.isnan(each.texture_variance_object):
+        return "what is not known: a circle, or another face seen past an edge"
+    return (
+        f"{each.texture_variance_object**0.5:.3g} {each.unit} (1 sigma over parts) in all pictures of a part;"
+        f" {each.bias_object:+.3g} {each.unit} on this one"
+    )
 
 
 def _searched(found: planner.Plan, seconds: float) -> str:
