@@ -1,4 +1,4 @@
-"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``parts`` and ``rate``."""
+"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``parts``, ``rate`` and ``uneven``."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.parts import parts
 from tests.proofs.rate import rate
+from tests.proofs.uneven import uneven
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command()(conditions)
@@ -18,6 +19,7 @@ app.command()(kill)
 app.command()(large)
 app.command()(parts)
 app.command()(rate)
+app.command()(uneven)
 
 if __name__ == "__main__":
     app()

@@ -18,8 +18,9 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project
 from planner.imaging.sheets import sheets
 from planner.models.texture import texture_errors
-from scenes import ImageTexture, InvalidInput, Picture, StatisticalTexture
+from scenes import ImageTexture, InvalidInput, Picture, Setting, StatisticalTexture
 from scenes.load import BUNDLED
+from tests.proofs.uneven import shifts
 from validation import picture_file
 from validation.cli import main as cli
 
@@ -158,32 +159,25 @@ def test_rendered_texture_is_that_of_the_sheet(task1, gloss, radius):
 
 @pytest.mark.render
 def test_the_shift_of_a_part_is_that_of_its_rendered_picture(task1):
-    """Noise-free distances of 5 parts less that of an even one: 5 % of the scatter over parts, by two poses."""
-    for sensor, light in ((SENSOR, LIGHT), ((45, 225), (30, 345))):
-        even = small(task1)
-        value = measure.distance(render.image(even, sensor, light), even, sensor, light).value_px
-        missed, sigma = [], None
-        for seed in range(5 if sensor == SENSOR else 2):
-            scene = small(task1, part(seed))
-            found = planner.predict(scene, sensor, light)
-            forecast = found.measurands[0]
-            sigma = forecast.texture_variance_image**0.5
-            shift = forecast.bias_image - planner.predict(even, sensor, light).bias_image
-            moved = measure.distance(render.image(scene, sensor, light), scene, sensor, light).value_px - value
-            missed.append(moved - shift)
-        assert np.std(missed) < 0.1 * sigma
-        assert abs(np.mean(missed)) < 0.1 * sigma
+    """Noise-free distances of parts less that of an even one: a tenth of the scatter over parts, by two poses."""
+    for sensor, light, parts in ((SENSOR, LIGHT, 5), ((45, 225), (30, 345), 2)):
+        scene = small(task1, UNEVEN).model_copy(update={"settings": (Setting(sensor=sensor, light=light),)})
+        found = shifts(scene, 0, parts)
+        sigma = np.sqrt(found.variance)
+        assert np.std(found.measured - found.predicted) < 0.1 * sigma
+        assert abs(np.mean(found.measured - found.predicted)) < 0.1 * sigma
+        assert np.abs(found.measured).max() > 0.5 * sigma
 
 
 def test_scatter_over_parts_is_the_predicted_variance(task1):
     """Shifts of 200 parts against the variance over parts: a chi-square test; others are rejected."""
-    shifts, count = [], 200
+    moved, count = [], 200
     for seed in range(count):
-        shifts.append(texture_errors(pictures(small(task1, part(seed)))).shifts[0][0])
+        moved.append(texture_errors(pictures(small(task1, part(seed)))).shifts[0][0])
 
     def p_value(**values):
         variance = texture_errors(pictures(small(task1, part(0, **values)))).variances[0][0]
-        statistic = np.sum(np.square(shifts)) / variance
+        statistic = np.sum(np.square(moved)) / variance
         return 2 * min(stats.chi2.cdf(statistic, count), stats.chi2.sf(statistic, count))
 
     assert p_value() > 0.01
