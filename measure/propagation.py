@@ -15,8 +15,10 @@ from measure.features.rims import circle_response
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, checked_image
 from measure.quantities import Found, find
+from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.bias import MOST
+from planner.models.texture import TextureErrors, texture_errors
 from scenes import Picture, Scene, Side
 from scenes.arrays import picture as one_picture
 
@@ -35,6 +37,9 @@ class PropagatedValues:
         Joint covariances: edges and circles that share pixels are correlated. Infinite on the diagonal where there is
         no value, NaN beside it.
     status : tuple of str
+    texture_variance, texture_variance_image : ndarray, shape (M,), or None
+        Predicted variances over parts by statistical textures, which are no part of the covariances: they do not
+        average over pictures. None where there are no textures, or the light is not known.
     """
 
     value: np.ndarray
@@ -44,6 +49,8 @@ class PropagatedValues:
     covariance: np.ndarray
     covariance_image: np.ndarray
     status: tuple[str, ...]
+    texture_variance: np.ndarray | None = None
+    texture_variance_image: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,8 @@ class Propagated:
         Derivative of its value by each pixel, px per grey level.
     status : str
         As `measure.distance` says; ``clutter`` too where a classic locator's noise-free value is off by more than 0.3
-        standard deviations for a reason that no formula knows (interreflection).
+        standard deviations for a reason that no formula knows (interreflection); what statistical textures do to this
+        part is known.
     measurands : PropagatedValues
         All of them, in the scene's unit, jointly.
     """
@@ -111,7 +119,8 @@ def propagate(
             state[m] = status.ILL_CONDITIONED
     errors = (noise * rows) @ rows.T
     image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
-    values = _values(found, image, plane, state, estimator)
+    textures = texture_errors(Pictures.of(picture)) if picture.lights else None
+    values = _values(found, image, plane, state, estimator, textures)
     return _of_first(found, rows, errors, values, clean.shape)
 
 
@@ -152,14 +161,18 @@ def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> n
     return np.where(measured[:, None] & measured, gradient @ errors @ gradient.T, lost)
 
 
-def _values(found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], estimator: str) -> PropagatedValues:
+def _values(
+    found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], estimator: str, textures: TextureErrors | None
+) -> PropagatedValues:
     measured = np.isin(state, status.MEASURED)
     value, value_image = (np.where(measured, part.value[0], np.nan) for part in (found.plane, found.image))
     bias, bias_image = value - found.known.value_object, value_image - found.known.value
+    unexplained = bias_image if textures is None else bias_image - np.nan_to_num(textures.shifts[0])
     for m in range(len(state)):
-        if state[m] == status.OK and estimator in PREDICTED and abs(bias_image[m]) > MOST * np.sqrt(image[m, m]):
+        if state[m] == status.OK and estimator in PREDICTED and abs(unexplained[m]) > MOST * np.sqrt(image[m, m]):
             state[m] = status.CLUTTER
-    return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state))
+    over_parts = (None, None) if textures is None else textures.variances[::-1]
+    return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state), *over_parts)
 
 
 def _of_first(

@@ -37,6 +37,9 @@ class Forecast:
     tolerance : Tolerance or None
     status : str
         As of `Prediction`, from the edges and circles that the quantity needs.
+    texture_variance_image, texture_variance_object : float or None
+        Variance over parts by statistical textures, which does not average over pictures of one part; NaN where it is
+        not known, None where there are no textures. The bias is that of the part that the seeds roll.
     """
 
     name: str
@@ -51,6 +54,8 @@ class Forecast:
     nominal: float
     tolerance: Tolerance | None
     status: str
+    texture_variance_image: float | None = None
+    texture_variance_object: float | None = None
 
     @property
     def ratio(self) -> float | None:
@@ -64,9 +69,16 @@ def unit_of(scene: Scene, quantity: Quantity) -> str:
 
 
 def forecasts(
-    scene: Scene, evaluated: Errors, edge_status: dict[str, str], biases: tuple[np.ndarray, np.ndarray]
+    scene: Scene,
+    evaluated: Errors,
+    edge_status: dict[str, str],
+    biases: tuple[np.ndarray, np.ndarray],
+    textures: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Forecast, ...]:
-    """One for each quantity of one picture, from the errors, the edges' statuses, and biases in image and object."""
+    """One for each quantity of one picture, from the errors, the edges' statuses, and biases in image and object.
+
+    ``textures`` are the variances (M,) over parts in image and object; None without textures.
+    """
     known = evaluated.measurands
     crowds = zip(known.circles, evaluated.crowded, strict=False)
     edge_status = edge_status | {name: "clutter" for name, crowded in crowds if crowded}
@@ -87,6 +99,8 @@ def forecasts(
                 nominal=float(nominal),
                 tolerance=quantity.tolerance,
                 status=_status(known, quantity, edge_status, evaluated.variances[m]),
+                texture_variance_image=None if textures is None else float(textures[0][m]),
+                texture_variance_object=None if textures is None else float(textures[1][m]),
             )
         )
     return tuple(found)

@@ -17,6 +17,7 @@ from planner.imaging.projection import jacobian_ideal
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
+from planner.models.texture import texture_errors
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit
 from scenes.units import in_unit
@@ -65,7 +66,8 @@ class Prediction:
         only where an edge is hidden or without any contrast.
     bias_image : float
         Value that the classic locators (``gradient``; ``canny`` nearly) find without noise, less `value_image`; px, or
-        degrees. NaN where it is not known. 0 for the ``bound``, which is about unbiased estimators.
+        degrees. NaN where it is not known. 0 for the ``bound``, which is about unbiased estimators. Statistical
+        textures add that of the part that their seeds roll; `Forecast` has its variance over parts.
     corners : ndarray, shape (2, 2)
         Its two features (x, y), px; (0, 0) is the centre of the first pixel. For an edge, a point on its line; one
         feature twice.
@@ -227,7 +229,16 @@ def predict(
             strict=True,
         )
     )
-    told = forecasts(scene, evaluated, {edge.name: edge.status for edge in edges}, biased)
+    textures = texture_errors(pictures)
+    if textures is not None and model != "bound":
+        biased = tuple(each + shift for each, shift in zip(biased, textures.shifts, strict=True))
+    told = forecasts(
+        scene,
+        evaluated,
+        {edge.name: edge.status for edge in edges},
+        biased,
+        None if textures is None else textures.variances,
+    )
     gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
     covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
     return Prediction(

@@ -7,7 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from planner.imaging.reflectance import Index, Ops, across, brightness
+from planner.imaging.reflectance import Index, Ops, across, brightness, diffuse
+from render.texture import Face, bitmap
 from scenes import Material
 
 NAME = "ice_torrance_sparrow"
@@ -28,6 +29,7 @@ class Surface:
 
     ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
     surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span.
+    ``texture`` has factors of the diffuse reflectance.
     """
 
     material: Material
@@ -36,6 +38,7 @@ class Surface:
     lamps: tuple[Lamp, ...] = ()
     analyser: tuple[float, float, float] | None = None
     sensor_angle: float = 0.0
+    texture: Face | None = None
 
 
 _surfaces: list[Surface] = []  # Mitsuba's properties carry numbers only: a BSDF finds its Surface by place
@@ -61,6 +64,8 @@ def _register(variant: str) -> None:
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
             self.surface = _surfaces[int(props["surface"])]
+            known = self.surface.texture
+            self.texture = None if known is None else mi.load_dict(bitmap(mi, known.values))
             self.m_components = [mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
             self.m_flags = self.m_components[0]
 
@@ -71,31 +76,36 @@ def _register(variant: str) -> None:
             record.sampled_component = 0
             record.sampled_type = +mi.BSDFFlags.GlossyReflection
             active &= (mi.Frame3f.cos_theta(si.wi) > 0) & (record.pdf > 0)
-            return record, self.eval(ctx, si, wo, active) / record.pdf & active
+            return record, self.eval(ctx, si, wo, active) / dr.maximum(record.pdf, 1e-30) & active
 
         def eval(self, ctx, si, wo, active=True):
             known = self.surface
             analyser = None if known.analyser is None else _local(dr, mi, si, known.analyser, si.wi)
             to_sensor = _along(dr, mi, si, known.sensor, si.wi, known.sensor_angle)
-            value = self._seen(dr, wo, si.wi, None, analyser, to_sensor)
+            factor = 1.0 if self.texture is None else self.texture.eval_1(si, active)
+            value = self._seen(dr, wo, si.wi, None, analyser, to_sensor, factor)
             for lamp in known.lamps:
                 polarisation = _local(dr, mi, si, lamp.polarisation, wo)
-                lit = self._seen(dr, wo, si.wi, polarisation, analyser, to_sensor)
+                lit = self._seen(dr, wo, si.wi, polarisation, analyser, to_sensor, factor)
                 value = dr.select(_along(dr, mi, si, lamp.at, wo, lamp.angle), lit, value)
             return mi.Spectrum(value / math.pi) & active
 
-        def _seen(self, dr, wo, wi, polarisation, analyser, to_sensor):
+        def _seen(self, dr, wo, wi, polarisation, analyser, to_sensor, factor):
             """The sensor looks through the analyser, other surfaces do not."""
-            value = self._value(wo, wi, polarisation, None)
-            return (
-                value if analyser is None else dr.select(to_sensor, self._value(wo, wi, polarisation, analyser), value)
-            )
+            value = self._value(wo, wi, polarisation, None, factor)
+            if analyser is None:
+                return value
+            return dr.select(to_sensor, self._value(wo, wi, polarisation, analyser, factor), value)
 
-        def _value(self, wo, wi, polarisation, analyser):
+        def _value(self, wo, wi, polarisation, analyser, factor):
             known = self.surface
             up = (0.0 * wi.x, 0.0 * wi.x, 1.0 + 0.0 * wi.x)
             light, sensor = (wo.x, wo.y, wo.z), (wi.x, wi.y, wi.z)
-            return brightness(known.material, known.index, up, light, sensor, polarisation, analyser, ops)
+            value = brightness(known.material, known.index, up, light, sensor, polarisation, analyser, ops)
+            if self.texture is None:
+                return value
+            matt = (factor - 1) * diffuse(known.material, analyser is not None) * wo.z
+            return value + dr.select((wo.z > 0) & (wi.z > 0), matt, 0.0)
 
         def pdf(self, ctx, si, wo, active=True):
             above = (mi.Frame3f.cos_theta(si.wi) > 0) & (mi.Frame3f.cos_theta(wo) > 0)

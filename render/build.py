@@ -11,12 +11,13 @@ from planner.imaging.appearance import analyser_axis
 from planner.imaging.irradiance import bands
 from planner.imaging.projection import frame
 from planner.imaging.reflectance import Index, diffuse
+from planner.imaging.sheets import sheets
 from render import bsdf, lights
 from render.meshes import mesh
 from render.parts import Part
 from render.rays import SURFACES
-from render.texture import Face, faces, shapes
-from scenes import Floor, Picture, Scene, Solid
+from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
+from scenes import Floor, Material, Picture, Scene, Solid
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
@@ -58,8 +59,7 @@ def description(
         **(lights.seen if part.silhouette else lights.description)(mitsuba, picture),
     }
     if textures is None:
-        surface = lights.BLACK if part.silhouette else _surface(mitsuba, picture, active)
-        made = [mesh(mitsuba, solid.triangles, surface) for solid in _solids(scene, active)]
+        made = [shape for solid in _solids(scene, active) for shape in _shown(mitsuba, solid, part)]
     else:
         made = [shape for faces in textures for shape in shapes(mitsuba, faces)]
     parts.update((f"part{i}", shape) for i, shape in enumerate(made))
@@ -85,7 +85,8 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
         return None
     found = []
     for solid in _solids(picture.scene, active):
-        found.append(faces(solid, picture))
+        uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
+        found.append(faces(solid, picture, _materials(picture.scene, solid), uneven))
         if found[-1] is None:
             return None
     return tuple(found)
@@ -96,20 +97,51 @@ def _solids(scene: Scene, active: frozenset[str]) -> list[Solid]:
     return [scene.solid, *(obstacle.solid for obstacle in (scene.obstacles if "cast_shadow" in active else ()))]
 
 
-def _surface(mitsuba, picture: Picture, active: frozenset[str]) -> dict:
-    scene, material = picture.scene, picture.scene.material
+def _materials(scene: Scene, solid: Solid) -> list[Material]:
+    """Of each face of the object, or of an obstacle."""
+    known = scene.surfaces
+    return [known.of(face) if solid is scene.solid else scene.material for face in range(len(solid.faces))]
+
+
+def _shown(mitsuba, solid: Solid, part: Part) -> list[Any]:
+    """A solid's surface as one shape a material, and one a textured face; black where only a light is seen."""
+    picture, active = part.picture, part.active
+    if part.silhouette:
+        return [mesh(mitsuba, solid.triangles, lights.BLACK)]
+    of_face, made = _materials(picture.scene, solid), []
+    uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
+    for material in dict.fromkeys(of_face):
+        here = [each == material and face not in uneven for face, each in enumerate(of_face)]
+        here = np.array(here)[solid.triangle_faces]
+        if here.any():
+            made.append(mesh(mitsuba, solid.triangles[here], _surface(mitsuba, picture, active, material)))
+    for face, sheet in uneven.items():
+        piece = uneven_part(solid, face, sheet)
+        surface = _surface(mitsuba, picture, active, of_face[face], piece)
+        made.append(mesh(mitsuba, piece.triangles, surface, texels(piece)))
+    return made
+
+
+def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material, part: Face | None = None) -> dict:
+    """A material as a BSDF; ``part`` has the factors of its diffuse reflectance."""
+    scene = picture.scene
     if not active & CUSTOM:
+        if part is not None:
+            return {"type": "diffuse", "reflectance": bitmap(mitsuba, diffuse(material) * part.values)}
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": diffuse(material)}}
     analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
     return bsdf.describe(
         mitsuba,
         bsdf.Surface(
             material,
-            bands(scene) if "wavelength" in active else (Index(material.refractive_index, material.extinction),),
+            bands(scene, material=material)
+            if "wavelength" in active
+            else (Index(material.refractive_index, material.extinction),),
             tuple(scene.position("sensor", picture.sensor).tolist()),
             lights.lamps(picture, active),
             analyser=None if analyser is None else tuple(analyser.tolist()),
             sensor_angle=2 * aperture_radius(scene, active) / scene.camera.distance,
+            texture=part,
         ),
     )
 

@@ -155,13 +155,13 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
     camera = picture.scene.camera
     mitsuba, scalar, k = variants.use(variant), variant.startswith("scalar"), quality.supersample
     size, sharp = (camera.width * k, camera.height * k), active - MANY_WAYS
-    even = _even(part)
-    textures = textured(picture, sharp) if even or (scalar and active & CUSTOM and not part.silhouette) else None
-    if textures is not None and even:
+    smooth = _even(part)
+    textures = textured(picture, sharp) if smooth or (scalar and active & CUSTOM and not part.silhouette) else None
+    if textures is not None and smooth:
         active = sharp
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
     many = quality.edge_samples or (16 if interpreted else 64 if scalar and textures is None else 256)
-    samples = quality.samples or (1 if scalar else 4)
+    samples = quality.samples or (1 if scalar and not picture.scene.textures else 4)
 
     few = quality.random_samples or 16
     bounces = SURFACES - 1 if "interreflection" in active else 0
@@ -169,9 +169,9 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
     at_once = LARGE_AT_ONCE if large else AT_ONCE
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, at_once, part.silhouette)
 
-    def load(active, samples, textures=None, divided=1):
+    def load(active, samples, textures=None, divided=1, shown=picture):
         film = tuple(n // divided for n in size), tuple(slice(p.start // divided, p.stop // divided) for p in crop)
-        made = description(mitsuba, part.reduced(active), *film, samples, textures)
+        made = description(mitsuba, Part(shown, part.active, part.silhouette).reduced(active), *film, samples, textures)
         return mitsuba.load_dict(made, parallel=False)
 
     def rendered(loaded) -> np.ndarray:
@@ -200,7 +200,12 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
         return fine_pixels(picture, crop, renders, math.ceil(k * _defocus(picture)), (samples, few, many))
     loaded = load(sharp, samples, textures)
     fine = rendered(loaded)
-    marked = crossed(fine, math.ceil(k * _defocus(picture)))
+    even = fine
+    if picture.scene.textures:  # bilinear, so they need no more rays: edges are sought without them
+        bare = picture.with_scene(picture.scene.model_copy(update={"textures": ()}))
+        plain = textured(bare, sharp) if textures is not None else None
+        even = rendered(load(sharp, 1, plain, shown=bare))
+    marked = crossed(even, math.ceil(k * _defocus(picture)))
     if sharp != active:
         loaded = load(active, few)
         marked |= near_edges(picture, crop, k)

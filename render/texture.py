@@ -14,18 +14,20 @@ than _MOST nodes for it has no table: a roughness below about 0.02, a crease at 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import signal
+from planner.imaging.appearance import matt_part, signal
 from planner.imaging.emitters import SMOOTH, emitters, is_point
 from planner.imaging.irradiance import beam
 from planner.imaging.pictures import Pictures
+from planner.imaging.sheets import Sheet
 from render.meshes import mesh
-from scenes import Picture, Scene, Solid, as_point
+from scenes import Material, Picture, Scene, Solid, as_point
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -56,7 +58,12 @@ class Face:
     values: np.ndarray
 
 
-def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
+def faces(
+    solid: Solid,
+    picture: Picture,
+    materials: Sequence[Material] | None = None,
+    uneven: Mapping[int, Sheet] = MappingProxyType({}),
+) -> tuple[Face, ...] | None:
     """The solid's surface in parts, or None where a table would need too many nodes or a light's middle is too low.
 
     Faces that are dark or turned away share one part, of brightness 0.
@@ -66,6 +73,10 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
     solid : Solid
     picture : Picture
         Of one light, which is rendered as a point in its middle; parts that are not simulated are neutral.
+    materials : sequence of Material, optional
+        Of each face; the scene's when not given.
+    uneven : mapping of int to Sheet
+        Textures of faces.
     """
     found, dark = [], np.ones(len(solid.triangles), bool)
     pictures = Pictures.of(picture)
@@ -78,7 +89,9 @@ def faces(solid: Solid, picture: Picture) -> tuple[Face, ...] | None:
         return None  # lit from the rim of a light whose middle is below the horizon
     for index in np.flatnonzero(lit & seen):
         of_face = solid.triangle_faces == index
-        made = _face(solid.triangles[of_face], solid.normals[index], smooth if above[:, index].all() else pictures)
+        material = picture.scene.material if materials is None else materials[index]
+        under = smooth if above[:, index].all() else pictures
+        made = _face(solid.triangles[of_face], solid.normals[index], under, material, uneven.get(int(index)))
         if made is None:
             return None
         found.append(made)
@@ -94,18 +107,39 @@ def _over(solid: Solid, place: np.ndarray, sine: float = _GRAZING) -> np.ndarray
 
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
     """Mitsuba's meshes of the parts that `faces` gives."""
-    made = []
-    for part in parts:
-        if len(part.triangles):
-            picture = mitsuba.Bitmap(part.values.astype(np.float32)[..., None])
-            table = {"type": "bitmap", "bitmap": picture, "raw": True, "format": "variant", "wrap_mode": "clamp"}
-            size = np.array(part.values.shape[::-1])
-            texels = (0.5 + part.places * (size - 1)) / size  # a node is the centre of a texel
-            made.append(mesh(mitsuba, part.triangles, {"type": "diffuse", "reflectance": table}, texels))
-    return made
+    return [
+        mesh(
+            mitsuba,
+            part.triangles,
+            {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)},
+            texels(part),
+        )
+        for part in parts
+        if len(part.triangles)
+    ]
 
 
-def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures) -> Face | None:
+def bitmap(mitsuba: Any, values: np.ndarray) -> dict:
+    """Mitsuba's description of a table that is interpolated linearly."""
+    picture = mitsuba.Bitmap(values.astype(np.float32)[..., None])
+    return {"type": "bitmap", "bitmap": picture, "raw": True, "format": "variant", "wrap_mode": "clamp"}
+
+
+def texels(part: Face) -> np.ndarray:
+    """Where the triangles' corners lie in the table as Mitsuba counts: a node is the centre of a texel; (T, 3, 2)."""
+    size = np.array(part.values.shape[::-1])
+    return (0.5 + part.places * (size - 1)) / size
+
+
+def uneven_part(solid: Solid, face: int, sheet: Sheet) -> Face:
+    """A textured face with the factors of its diffuse reflectance."""
+    triangles = solid.triangles[solid.triangle_faces == face]
+    return Face(triangles, sheet.places(triangles), sheet.values)
+
+
+def _face(
+    triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet | None
+) -> Face | None:
     """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
     sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
     first = sides[np.linalg.norm(sides, axis=1).argmax()]
@@ -118,18 +152,38 @@ def _face(triangles: np.ndarray, normal: np.ndarray, pictures: Pictures) -> Face
         """Points of the plane at fractions of the rectangle's sides, shape (down, across, 3)."""
         return origin + np.stack(np.meshgrid(across, down), -1) * (high - low) @ axes
 
-    values = _table(at, normal, pictures)
+    values = _table(at, normal, pictures, material)
+    if values is not None and sheet is not None:
+        values = _uneven(values, at, normal, pictures, material, sheet)
     return None if values is None else Face(triangles, (flat - low) / (high - low), values)
 
 
-def _table(at: Points, normal: np.ndarray, pictures: Pictures) -> np.ndarray | None:
+def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet):
+    """A table of brightness with the texture's factors on the diffuse part, on nodes that hold those of both."""
+    counts = [
+        (texture - 1) * math.ceil((table - 1) / (texture - 1))
+        for texture, table in zip(sheet.values.shape[::-1], values.shape[::-1], strict=True)
+    ]
+    if (counts[0] + 1) * (counts[1] + 1) > _MOST:
+        return None
+    across, down = (np.linspace(0, 1, count + 1) for count in counts)
+    share = max(_AT_ONCE // across.size, 1)
+    rows = []
+    for first in range(0, down.size, share):
+        points = at(across, down[first : first + share])
+        matt = shade(pictures, normal, points, matt_part(material))
+        rows.append(shade(pictures, normal, points, material) + (sheet.at(points) - 1) * matt)
+    return np.concatenate(rows)
+
+
+def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Material) -> np.ndarray | None:
     """Values on a grid with as many intervals each way as they need; None if that is too many."""
-    counts = _first_counts(at, normal, pictures)
+    counts = _first_counts(at, normal, pictures, material.roughness)
     while (counts[0] + 1) * (counts[1] + 1) <= _MOST:
         across, down = (np.linspace(0, 1, count + 1) for count in counts)
         share = max(_AT_ONCE // across.size, 1)
         rows = [down[first : first + share] for first in range(0, down.size, share)]
-        values = np.concatenate([shade(pictures, normal, at(across, part)) for part in rows])
+        values = np.concatenate([shade(pictures, normal, at(across, part), material) for part in rows])
         excess = [_excess(part) for part in (values.T, values)]
         if not np.isfinite(excess).all():
             return None
@@ -140,10 +194,10 @@ def _table(at: Points, normal: np.ndarray, pictures: Pictures) -> np.ndarray | N
     return None
 
 
-def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures) -> list[int]:
+def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures, roughness: float) -> list[int]:
     """Intervals across and down with which no lobe falls between two nodes, powers of two."""
     few = np.linspace(0, 1, _FEWEST + 1)
-    slope = _slope(at(few, few), normal, pictures) / (_LOBE * pictures.scene.material.roughness)
+    slope = _slope(at(few, few), normal, pictures) / (_LOBE * roughness)
     steps = [np.linalg.norm(np.diff(slope, axis=axis), axis=-1).max() for axis in (1, 0)]
     return [_FEWEST << max(math.ceil(math.log2(max(step, 1.0))), 0) for step in steps]
 
@@ -161,7 +215,7 @@ def _slope(points: np.ndarray, normal: np.ndarray, pictures: Pictures) -> np.nda
     return half / (half @ normal)[..., None] - normal
 
 
-def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndarray:
+def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: Material | None = None) -> np.ndarray:
     """Brightness over N.L of points of a plane that is lit and seen, shape (...).
 
     Parameters
@@ -171,11 +225,13 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray) -> np.ndar
     normal : ndarray, shape (3,)
     points : ndarray, shape (..., 3)
         cm.
+    material : Material, optional
+        The scene's when not given.
     """
     scene = pictures.scene
     arriving = beam(pictures.with_scene(pointed(scene)).emitters[0], points)
     white = scene.camera.exposure * arriving.strength * (arriving.to_light @ normal)
-    return signal(pictures, points, normal, points.ndim - 1) / white
+    return signal(pictures, points, normal, points.ndim - 1, material=material) / white
 
 
 def pointed(scene: Scene) -> Scene:

@@ -6,7 +6,7 @@ from scenes.filters import Filter, Lamp
 from scenes.lens import Lens
 from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
-from scenes.materials import Material
+from scenes.materials import FaceMaterial, Material
 from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
 from scenes.noise import Noise
 from scenes.parts.block import Block
@@ -16,12 +16,13 @@ from scenes.picture import Picture, mounted
 from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.textures import ImageTexture, StatisticalTexture
 from scenes.units import UNITS, Unit
 
 __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
-    "Filter", "Floor", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator", "Luminaire", "Material",
-    "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side",
-    "Solid", "Task", "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several",
-    "shown",
+    "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator",
+    "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene",
+    "Setting", "Side", "Solid", "StatisticalTexture", "Task", "Tolerance", "Unit", "as_point", "block", "find", "load",
+    "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

@@ -30,23 +30,13 @@ _KINDS = {
     "model_type": "a table of keys",
     "model_attributes_type": "a table of keys",
     "dict_type": "a table of keys",
-    "union_tag_invalid": "a known kind (block, mesh)",
 }
 
 
 _TAGS = (
-    "block",
-    "mesh",
-    "corner",
-    "centre",
-    "side",
-    "point",
-    "disc",
-    "bar",
-    "ring",
-    "dome",
-    "backlight",
-)  # alternatives of the model, no keys of the file
+    "block", "mesh", "corner", "centre", "side", "statistical", "image", "str", "Where",
+    "point", "disc", "bar", "ring", "dome", "backlight",
+)  # fmt: skip  # alternatives of the model, no keys of the file
 
 
 _MOST = 600  # characters of a message: enough for a path, a key and what was given
@@ -95,6 +85,9 @@ def _requirement(problem: Any) -> str:
         return f"{words} {context[name]:g}"
     if kind in ("literal_error", "enum"):
         return f"one of {context['expected']}"
+    if kind == "union_tag_invalid":
+        known = context["expected_tags"].replace("'", "")
+        return f"a known kind ({known})"
     return _KINDS.get(kind, f"valid ({problem['msg']})")
 
 

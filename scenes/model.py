@@ -23,4 +23,5 @@ def _file_name(name: str) -> str:
 
 
 FileName = Annotated[str, Field(max_length=100), AfterValidator(_file_name)]
+Name = Annotated[str, Field(min_length=1, max_length=100)]
 Title = Annotated[str, Field(max_length=1000)]

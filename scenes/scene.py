@@ -18,7 +18,7 @@ from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
 from scenes.filters import Filter, Lamp, check_names
 from scenes.lights import AnyLight
-from scenes.materials import Material
+from scenes.materials import FaceMaterial, Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
 from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
@@ -27,7 +27,9 @@ from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
+from scenes.surfaces import Surfaces, surfaces
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.textures import Texture, check_textures
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
 
@@ -99,7 +101,11 @@ class Scene(Model):
     object: Object
     """What is measured."""
     material: Material
-    """Of the object and the obstacles."""
+    """Of the object and the obstacles, where ``materials`` say nothing else."""
+    materials: tuple[FaceMaterial, ...] = ()
+    """Of some faces of the object."""
+    textures: tuple[Texture, ...] = ()
+    """What is printed on faces, or how unevenly they reflect."""
     camera: Camera
     """The camera."""
     light: AnyLight | None = None
@@ -143,6 +149,11 @@ class Scene(Model):
     def bodies(self) -> Solid:
         """The object and the obstacles as one solid: all that hides and shades. The object's faces come first."""
         return _bodies(self.solid, self.obstacles)
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """What each face of `bodies` is made of."""
+        return surfaces(self.material, self.materials, self.solid, len(self.bodies.faces))
 
     @property
     def lights(self) -> tuple[AnyLight, ...]:
@@ -215,6 +226,8 @@ class Scene(Model):
         self._check_lights()
         check_names("lamps", self.lamps)
         check_names("filters", self.filters)
+        _ = self.surfaces  # names of faces
+        check_textures(self.textures, self.solid)
         for i, setting in enumerate(self.settings):
             self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
             self.check_lights(setting.lights, f"settings[{i}].light")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.appearance import signal
+from planner.imaging.appearance import face_signal
 from planner.imaging.arrangement import spread
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project_ideal
@@ -46,9 +46,9 @@ class Shading:
 def face_shadings(pictures: Pictures) -> list[Shading | None]:
     """The shading of each face of object and obstacles; None for one that the lights or the sensor do not reach."""
     scene, found = pictures.scene, []
-    for normal, face in zip(scene.bodies.normals, scene.bodies.faces, strict=True):
+    for number, face in enumerate(scene.bodies.faces):
         points = spread(scene.bodies.vertices[list(face)])
-        levels = signal(pictures, points, normal, 1)
+        levels = face_signal(pictures, points, number, 1)
         image = project_ideal(points, pictures.sensors, scene.camera)
         found.append(Shading(image, levels) if levels.min() > 0 and np.isfinite(image).all() else None)
     return found

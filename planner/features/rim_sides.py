@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.features.locator import edge_blur
 from planner.features.seen import plane_axes
-from planner.imaging.appearance import behind, of_sides, signal
+from planner.imaging.appearance import behind, face_signal, of_sides
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import from_axis, jacobian_ideal
 from planner.imaging.rays import first_face
@@ -69,8 +69,9 @@ def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.n
     wall_at = circle.centre + circle.radius * spokes - wall_step[..., 1:] * circle.axis
     levels = _sides_at(pictures, circle, angle, True)
     slopes = []
-    for level, at, facing in ((levels[..., 0, :], face_at, circle.axis), (levels[..., 1, :], wall_at, -sense * spokes)):
-        there = signal(pictures, at, np.broadcast_to(facing, at.shape), 1)
+    both = zip((levels[..., 0, :], levels[..., 1, :]), (face_at, wall_at), (circle.axis, -sense * spokes), strict=True)
+    for (level, at, facing), face in zip(both, sided(scene.solid, circle), strict=True):
+        there = face_signal(pictures, at, face, 1, normals=np.broadcast_to(facing, at.shape))
         towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), pictures.sensor_at[..., None, :] - at)
         slopes.append(np.where((level > 0) & (there > 0) & (towards > 0), (there - level) / _STEP, 0.0))
     contrast = levels[..., 0, :] - levels[..., 1, :]  # face less wall; outside less inside, or the other way round
@@ -226,9 +227,10 @@ def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.n
     probe = _probe(pictures, circle, points)
     lit = tuple(_free(bodies, probe, emitter.at[..., None, :]) for emitter in pictures.emitters)
     sides = []
-    for normal in (np.broadcast_to(circle.axis, points.shape), wall):
+    normals = np.broadcast_to(circle.axis, points.shape), wall
+    for face, normal in zip(sided(pictures.scene.solid, circle), normals, strict=True):
         turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
-        sides.append((turned, signal(pictures, points, normal, 1, lit, fall_off=fall_off)))
+        sides.append((turned, face_signal(pictures, points, face, 1, lit, normals=normal, fall_off=fall_off)))
     seen = _free(bodies, probe, sensor_at) & (sides[0][0] | sides[1][0])
     levels = []
     for turned, level in sides:
@@ -236,6 +238,11 @@ def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.n
         past = behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off)
         levels.append(np.where(seen, np.where(wanted, past, level), 0.0))
     return np.stack(np.broadcast_arrays(*levels), -2)
+
+
+def sided(solid: Solid, circle: Circle) -> tuple[int, int]:
+    """The plane face of a rim, and one of its wall, which is of one material all round."""
+    return circle.face, next(face for face in solid.edge(circle.edges[0]).faces if face != circle.face)
 
 
 def _free(bodies: Solid, probe, position) -> np.ndarray:

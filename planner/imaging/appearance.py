@@ -20,6 +20,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, facing, frame
 from planner.imaging.rays import first_face, reaches
 from planner.imaging.reflectance import diffuse, reflected
+from planner.imaging.sheets import printed
 from planner.imaging.visibility import seen, turned
 from scenes import Edge, Floor, Material, Scene
 
@@ -49,8 +50,12 @@ def has_background(scene: Scene) -> bool:
 
 
 def is_separable(scene: Scene) -> bool:
-    """Whether a face's signal is a number times 1 / r^3, r the distance from the light: plain, diffuse, one point."""
-    return is_plain(scene) and scene.material.is_diffuse and is_point(scene.lights)
+    """Whether a face's signal is a number times 1 / r^3, r the distance from the light.
+
+    One convex body before darkness, diffuse, without print, under one point of light.
+    """
+    plain = is_plain(scene) and not printed(scene)
+    return plain and scene.surfaces.is_diffuse and is_point(scene.lights)
 
 
 def signal(
@@ -87,10 +92,75 @@ def signal(
         arriving = beam(emitter, points, axes, fall_off=fall_off)
         fields = polarisation_axis(scene, emitter.which, pictures.lights_at[emitter.which]), analyser
         across = (None if axis is None else widened(axis, axes) for axis in fields)
-        value = reflected(material, bands(scene, emitter.light), normals, arriving.to_light, to_sensor, *across)
+        index = bands(scene, emitter.light, material)
+        value = reflected(material, index, normals, arriving.to_light, to_sensor, *across)
         value = scene.camera.exposure * arriving.strength * value
         total = total + (value if lit is None else np.where(lit[i], value, 0.0))
     return total
+
+
+def face_signal(
+    pictures: Pictures,
+    points: np.ndarray,
+    faces: np.ndarray | int,
+    axes: int,
+    lit: tuple[np.ndarray, ...] | None = None,
+    *,
+    normals: np.ndarray | None = None,
+    fall_off: bool = True,
+    prints: bool = True,
+) -> np.ndarray:
+    """Signal of points on faces of the bodies, each of its own material; 0 where a surface is turned away.
+
+    Of textures it knows those that are the same on every part (`printed`); the others are 1 on average.
+
+    Parameters
+    ----------
+    points, axes, lit, fall_off
+        As of `signal`.
+    faces : ndarray of int
+        Indices, broadcast against the points without their last axis.
+    normals : ndarray, optional
+        Unit normals where they are not those of the faces: of a round wall.
+    prints : bool
+        Whether faces show what is printed on them.
+    """
+    surfaces, faces = pictures.scene.surfaces, np.asarray(faces)
+    normals = pictures.scene.bodies.normals[faces] if normals is None else normals
+    kinds = surfaces.kinds[faces]
+    first, *others = np.unique(kinds) if kinds.size else (0,)
+
+    def of_kind(kind: int) -> np.ndarray:
+        return signal(pictures, points, normals, axes, lit, material=surfaces.materials[kind], fall_off=fall_off)
+
+    found = of_kind(first)
+    for kind in others:
+        found = np.where(kinds == kind, of_kind(kind), found)
+    for face, sheet in printed(pictures.scene).items() if prints else ():
+        if (faces == face).any():
+            matt = diffuse_signal(pictures, points, face, axes, lit, fall_off=fall_off)
+            found = found + np.where(faces == face, (sheet.at(points) - 1) * matt, 0.0)
+    return found
+
+
+def diffuse_signal(
+    pictures: Pictures,
+    points: np.ndarray,
+    face: int,
+    axes: int,
+    lit: tuple[np.ndarray, ...] | None = None,
+    *,
+    fall_off: bool = True,
+) -> np.ndarray:
+    """The diffuse part of the signal of points on a face, without its texture; parameters as of `signal`."""
+    matt, normal = matt_part(pictures.scene.surfaces.of(face)), pictures.scene.bodies.normals[face]
+    return signal(pictures, points, normal, axes, lit, material=matt, fall_off=fall_off)
+
+
+@lru_cache(maxsize=64)
+def matt_part(material: Material) -> Material:
+    """A material's diffuse term alone."""
+    return Material(diffuse_reflectance=diffuse(material))
 
 
 def analyser_axis(scene: Scene, sensors: np.ndarray) -> np.ndarray | None:
@@ -135,7 +205,7 @@ def side_signals(
         return np.zeros((*lead, 0, 2, points.shape[-2]))
     faces = np.array([edge.faces for edge in edges])
     if is_plain(scene):
-        level = signal(pictures, points[..., None, :, :], bodies.normals[faces][:, :, None], 3, fall_off=fall_off)
+        level = face_signal(pictures, points[..., None, :, :], faces[:, :, None], 3, fall_off=fall_off)
         return np.where(facing(bodies, pictures.sensor_at)[..., faces, None], level, 0.0)
     return np.stack([_beside(pictures, e, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
 
@@ -209,8 +279,13 @@ def _heights(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
     scene, solid = pictures.scene, pictures.scene.solid
     faces = np.array([solid.edge(name).faces for name in names])
     height = np.maximum(pictures.lights_at[0] @ solid.normals.T - solid.offsets, 0.0)
-    white = scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None)
-    return np.where(facing(solid, pictures.sensor_at), height * white, 0.0)[..., faces]
+    return np.where(facing(solid, pictures.sensor_at), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
+
+
+def whites(scene: Scene) -> np.ndarray:
+    """Signal of each face of the bodies by unit irradiance from everywhere, its diffuse part, grey levels, (F,)."""
+    each = [diffuse(material, scene.camera.analyser_deg is not None) for material in scene.surfaces.materials]
+    return scene.camera.exposure * np.array(each)[scene.surfaces.kinds]
 
 
 def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) -> np.ndarray:
@@ -222,13 +297,12 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
         turned(bodies, edge, at)[..., None] & seen(bodies, edge, at, fractions)[..., None, :]
         for at in (emitter.at for emitter in pictures.emitters)
     )
-    normals = bodies.normals[list(edge.faces)][:, None]
-    level = signal(pictures, points[..., None, :, :], normals, 2, lit, fall_off=fall_off)
+    level = face_signal(pictures, points[..., None, :, :], np.array(edge.faces)[:, None], 2, lit, fall_off=fall_off)
     level = level + light_between(pictures, points[..., None, :, :], np.array(edge.faces)[:, None])
     looked_at = turned(bodies, edge, pictures.sensor_at)[..., None]
     visible = (looked_at.any(-2) & seen(bodies, edge, pictures.sensor_at, fractions))[..., None, :]
     found = np.where(visible & looked_at, level, 0.0)
-    outward = normals.sum((0, 1))
+    outward = bodies.normals[list(edge.faces)].sum(0)
     for side, face in enumerate(edge.faces):
         # past an outer face that is turned away there is nothing but the background, for the ray leaves the convex hull
         wanted = visible[..., 0, :] & ~looked_at[..., side, :]
@@ -265,7 +339,7 @@ def behind(
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
-    found = signal(pictures, hit, bodies.normals[face], 1, lit, fall_off=fall_off)
+    found = face_signal(pictures, hit, face, 1, lit, fall_off=fall_off)
     found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     if scene.floor is not None and scene.floor.reflectance > 0:
         place, ahead = _on_floor(scene.floor, points, vectors, t)

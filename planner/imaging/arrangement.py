@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.features.projected_edges import corner_features, straight
-from planner.imaging.appearance import is_plain, signal
+from planner.imaging.appearance import face_signal, is_plain
 from planner.imaging.lens import recorded, signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
@@ -235,7 +235,7 @@ def _region(pictures: Pictures, solid: Solid, face: int) -> Region | None:
         return None
     if not pictures.lights:
         return Region.flat(places[good], _order(places[good]))
-    levels = signal(pictures, points, solid.normals[face], 1)
+    levels = face_signal(pictures, points, face, 1)
     if not levels.max() > _FAINT * camera.exposure:
         return None
     return Region.shaded(places[good], levels[good])

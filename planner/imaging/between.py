@@ -32,7 +32,9 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
         inside = np.isin(faces, bore.faces)
         if inside.any():
             found[inside] = _of_wall(scene, shining, bore).ev(*place_in(bore, points[inside]))
-    return scene.camera.exposure * diffuse(scene.material, scene.camera.analyser_deg is not None) * found
+    analysed = scene.camera.analyser_deg is not None
+    white = np.array([diffuse(material, analysed) for material in scene.surfaces.materials])
+    return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
 
 
 def _plain(emitter: Emitter) -> Emitter:

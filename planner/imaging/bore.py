@@ -67,7 +67,7 @@ def light_in_bore(
 
     Irradiance in units of the signal of a white face. ``others`` sends what comes from outside.
     """
-    white = diffuse(scene.material)
+    white = diffuse(scene.surfaces.of(bore.faces[0]))
     form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
     outside = 0.0, 0.0
     if others is not None:

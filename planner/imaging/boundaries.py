@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.appearance import is_plain, side_signals, signal
+from planner.imaging.appearance import face_signal, is_plain, side_signals
 from planner.imaging.between import light_between
 from planner.imaging.blurred_segment import Segments
 from planner.imaging.pictures import Pictures
@@ -155,7 +155,7 @@ def _turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other: np.ndarray, nearest: np.ndarray):
     """Levels (P, 2) on both sides of edges ``other`` and their gradients (P, 2, 2) in the axes of the places ``at``."""
     solid, (picture, edge, which) = pictures.scene.solid, at
-    faces = _sided(solid)[other]
+    faces = sided(solid)[other]
     seen = facing(solid, pictures.sensor_at)[picture[:, None], faces]
     found = np.zeros((*faces.shape, 3))
     for side in (0, 1):
@@ -201,12 +201,14 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     heights = solid.offsets[face] - (of_each.sensor_at * normal[:, 0, 0]).sum(-1)
     with np.errstate(all="ignore"):
         met = at[..., None, :] + (heights[:, None, None] / (rays * normal).sum(-1))[..., None] * rays
-        values = signal(of_each, met, normal, 2) + light_between(of_each, met, face[:, None, None])
+        values = face_signal(of_each, met, face[:, None, None], 2, prints=False) + light_between(
+            of_each, met, face[:, None, None]
+        )
         values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
     return np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
 
 
-def _sided(solid: Solid) -> np.ndarray:
+def sided(solid: Solid) -> np.ndarray:
     """Faces on both sides of each edge, (J, 2): opposite to the normal (-t_y, t_x) of its image, and on the normal's.
 
     Seen from outside, a face lies to the left of an edge that runs around it counter-clockwise: opposite to that normal
@@ -230,13 +232,13 @@ def _interpolation(fractions: np.ndarray) -> np.ndarray:
 def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
     """Levels (P, 2) beside edges ``other`` at fractions of their images, as the sensor sees them."""
     scene, solid = pictures.scene, pictures.scene.solid
-    sided, levels = _sided(solid), np.empty((other.size, 2))
+    beside, levels = sided(solid), np.empty((other.size, 2))
     for which in np.unique(other):
         edge, rows = solid.edges[which], np.flatnonzero(other == which)
         spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
         alone = Pictures(scene, *_of_each(pictures, picture[rows]), pictures.closely)
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
-        levels[rows] = found if sided[which, 0] == edge.faces[0] else found[:, ::-1]
+        levels[rows] = found if beside[which, 0] == edge.faces[0] else found[:, ::-1]
     return levels
 
 

@@ -232,9 +232,11 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     exchange = exchange_of(scene.solid, without)
     if exchange is None:
         return None
-    white = diffuse(scene.material)
+    white = np.concatenate(
+        [np.full(len(sheet.patches), diffuse(scene.surfaces.of(sheet.face))) for sheet in exchange.sheets]
+    )
     direct = _direct(scene, exchange.patches, emitters)
-    sent = np.linalg.solve(np.eye(direct.size) - white * exchange.between, white * direct)
+    sent = np.linalg.solve(np.eye(direct.size) - white[:, None] * exchange.between, white * direct)
     told = {
         sheet.face: RectBivariateSpline(sheet.u, sheet.v, (factors @ sent).reshape(sheet.u.size, sheet.v.size))
         for sheet, factors in zip(exchange.sheets, exchange.at_nodes, strict=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.imaging.emitters import Emitter
 from planner.imaging.reflectance import Index
-from scenes import Luminaire, Scene
+from scenes import Luminaire, Material, Scene
 
 
 class Beam(NamedTuple):
@@ -78,13 +78,13 @@ def electric_field(beam_axis: np.ndarray, angle_deg: float) -> np.ndarray:
     return np.cos(angle) * down + np.sin(angle) * right
 
 
-def bands(scene: Scene, light: Luminaire | None = None) -> tuple[Index, ...]:
+def bands(scene: Scene, light: Luminaire | None = None, material: Material | None = None) -> tuple[Index, ...]:
     """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the material's table.
 
     Shares add up to 1, so that the exposure keeps its meaning: the grey level of a white diffuse surface.
     One band without a table, for then nothing depends on the wavelength.
     """
-    material = scene.material
+    material = material or scene.material
     if not material.index_table:
         return (Index(material.refractive_index, material.extinction, 1.0),)
     wavelength, n, k = np.array(material.index_table).T

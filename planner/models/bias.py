@@ -24,8 +24,10 @@ from planner.imaging.lens import recorded as recorded_at
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points
 from planner.imaging.sensor import recorded
+from planner.imaging.sheets import printed
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
 from planner.models.calibrated import calibrated
+from planner.models.texture import texture_errors
 from scenes import Corner, Scene
 
 _BLOCK = 256  # pictures at a time, so that their places stay in the processor's cache
@@ -120,6 +122,8 @@ def _bias(pictures: Pictures) -> Bias:
     by_pixels = _sampled(pictures, nodes)
     mean, turn = mean + by_pixels[0], turn + by_pixels[1]
     start = mean - turn * nodes.middle[..., 0]
+    by_prints = _by_prints(pictures)
+    start, turn = start + by_prints[0], turn + by_prints[1]
     shares, shares_object = (
         offset * start[..., None, :] + tilt * turn[..., None, :]
         for offset, tilt in (known.of_lines(known.gradient), known.of_lines(known.gradient_object))
@@ -128,10 +132,24 @@ def _bias(pictures: Pictures) -> Bias:
     needed = known.depends()[:, : len(known.view.names)]
     values, values_object = (np.where(needed, each, 0.0).sum(-1) for each in (shares, shares_object))
     disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
+    disturbed |= by_prints[2]
     if pictures.closely and not pictures.scene.solid.is_convex:
         disturbed |= _by_other_faces(pictures, known.view.names)
     corners = _corners(pictures.scene, known.view, lines)
     return Bias(values, values_object, lines, corners, shares, disturbed)
+
+
+def _by_prints(pictures: Pictures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Displacement and rotation of each line by images on faces, and where that is not to be trusted, (N, E) each."""
+    edges, parts = len(measurands(pictures).view.names), []
+    lead = np.broadcast_shapes(*(poses.shape[:-1] for poses in (pictures.sensors, *pictures.lights)))
+    if not printed(pictures.scene):
+        return np.zeros((*lead, edges)), np.zeros((*lead, edges)), np.zeros((*lead, edges), bool)
+    poses = [np.broadcast_to(each, (*lead, 2)) for each in (pictures.sensors, *pictures.lights)]
+    for sensor, *lights in zip(*poses, strict=True):
+        found = texture_errors(Pictures(pictures.scene, sensor, tuple(lights), pictures.closely))
+        parts.append((found.printed[0::2], found.printed[1::2], found.disturbed))
+    return tuple(np.array(part) for part in zip(*parts, strict=True))
 
 
 def _by_other_faces(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:

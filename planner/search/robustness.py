@@ -14,7 +14,7 @@ from planner.search.candidates import edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
 from planner.search.refinement import refine, shifted
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Material, Pose, Scene
 
 
 @dataclass(frozen=True)
@@ -98,15 +98,22 @@ class Robust:
 
 def altered(scene: Scene, factors: dict[str, float]) -> Scene:
     """The scene with some values multiplied; fractions and reflectances stop at 1, the refractive index at 1."""
-    material = {}
+    noise = scene.noise.model_copy(update={"sigma": scene.noise.sigma * factors.get("noise", 1.0)})
+    materials = tuple(_altered(each, factors) for each in scene.materials)
+    return scene.model_copy(
+        update={"material": _altered(scene.material, factors), "materials": materials, "noise": noise}
+    )
+
+
+def _altered(material: Material, factors: dict[str, float]) -> Material:
+    found = {}
     for name, factor in factors.items():
         if name != "noise":
-            value = getattr(scene.material, name) * factor
+            value = getattr(material, name) * factor
             limits = (1.0, np.inf) if name == "refractive_index" else (0.0, np.inf if name == "roughness" else 1.0)
-            keep = name == "refractive_index" and scene.material.refractive_index < 1
-            material[name] = value if keep else float(np.clip(value, *limits))
-    noise = scene.noise.model_copy(update={"sigma": scene.noise.sigma * factors.get("noise", 1.0)})
-    return scene.model_copy(update={"material": scene.material.model_copy(update=material), "noise": noise})
+            keep = name == "refractive_index" and material.refractive_index < 1
+            found[name] = value if keep else float(np.clip(value, *limits))
+    return material.model_copy(update=found)
 
 
 def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None = None) -> Robust:

@@ -96,6 +96,12 @@ def relit(scene: Scene, change: Callable[[Luminaire], Luminaire]) -> Scene:
     return scene.model_copy(update={"light": one, "several_lights": more})
 
 
+def with_materials(scene: Scene, **values) -> Scene:
+    """The scene with values of all its materials replaced."""
+    others = tuple(each.model_copy(update=values) for each in scene.materials)
+    return changed(scene, "material", **values).model_copy(update={"materials": others})
+
+
 def largest(bias: np.ndarray, variance: np.ndarray) -> Influence:
     """Bound over settings, with the safety factor; what is not a number counts as infinite."""
     finite = (np.nan_to_num(part, nan=np.inf, posinf=np.inf) for part in (bias, variance))

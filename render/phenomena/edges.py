@@ -15,7 +15,7 @@ from planner import Pictures
 from planner.features.locator import edge_blur
 from planner.features.measurand import measurands
 from planner.features.projected_edges import circles, straight
-from planner.imaging.appearance import signal
+from planner.imaging.appearance import face_signal
 from planner.imaging.projection import edge_points, facing, project_ideal
 from render.phenomena.base import Influence, largest
 from scenes import Scene
@@ -62,7 +62,7 @@ def _sides(pictures: Pictures, fall_off: bool) -> Sides:
     inner = points[:, None] + _inward(scene, faces)[:, :, None]
     seen = facing(solid, pictures.sensor_at)[..., faces, None]
     here = [
-        np.where(seen, signal(pictures, p, solid.normals[faces][:, :, None], 3, fall_off=fall_off), 0.0)
+        np.where(seen, face_signal(pictures, p, faces[:, :, None], 3, fall_off=fall_off), 0.0)
         for p in (np.broadcast_to(points[:, None], inner.shape), inner)
     ]
     there = (project_ideal(p.reshape(-1, 3), pictures.sensors, scene.camera) for p in (inner, points))

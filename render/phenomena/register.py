@@ -21,6 +21,7 @@ from render.phenomena.shading import (
     Polarisation,
     SpecularLobe,
     Spill,
+    Texture,
     Wavelength,
 )
 from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
@@ -30,7 +31,7 @@ REGISTER: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
-        Analyser(), Wavelength(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
+        Analyser(), Wavelength(), Texture(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
         LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
         FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
     )

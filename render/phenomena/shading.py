@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner import Pictures
+from planner.features.measurand import measurands
 from planner.imaging.backlight import backlights
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit
+from planner.models.texture import texture_errors
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit, with_materials
 from render.phenomena.edges import NEAR_STEP, compare, lever, sides, total_variance
 from render.phenomena.transport import albedo
 from scenes import Backlight, Luminaire, Scene, as_point
@@ -58,16 +60,16 @@ class SpecularLobe(Effect):
 
     def absent(self, pictures: Pictures) -> str | None:
         scene = pictures.scene
-        if scene.material.specular_fraction == 0:
+        if all(material.specular_fraction == 0 for material in scene.surfaces.used):
             return "specular_fraction is 0"
-        return "n = 1 and k = 0: no Fresnel reflection" if scene.material.is_diffuse else None
+        return "n = 1 and k = 0: no Fresnel reflection" if scene.surfaces.is_diffuse else None
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "material", refractive_index=1.0, extinction=0.0, index_table=())
+        return with_materials(scene, refractive_index=1.0, extinction=0.0, index_table=())
 
 
 class Polarisation(Effect):
@@ -81,7 +83,7 @@ class Polarisation(Effect):
         scene = pictures.scene
         if all(light.polarisation_deg is None for light in scene.lights):
             return "the light is unpolarised"
-        return "diffuse reflection forgets polarisation" if scene.material.is_diffuse else None
+        return "diffuse reflection forgets polarisation" if scene.surfaces.is_diffuse else None
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
@@ -119,16 +121,46 @@ class Wavelength(Effect):
 
     def absent(self, pictures: Pictures) -> str | None:
         scene = pictures.scene
-        if scene.material.is_diffuse:
+        if scene.surfaces.is_diffuse:
             return "the diffuse term does not depend on the index"
-        return None if scene.material.index_table else "the material has no table of indices"
+        known = any(material.index_table for material in scene.surfaces.used)
+        return None if known else "the material has no table of indices"
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "material", index_table=())
+        return with_materials(scene, index_table=())
+
+
+class Texture(Effect):
+    """Prints and uneven reflectance of faces."""
+
+    name = "texture"
+    cost = 2.0
+    switch = "the diffuse reflectance as a table on each textured face"
+
+    def absent(self, pictures: Pictures) -> str | None:
+        return None if pictures.scene.textures else "the faces are even"
+
+    def influence(self, pictures: Pictures) -> Influence:
+        """Shifts by prints and twice the standard deviation by statistical textures; contrast by both."""
+        scene = pictures.scene
+        variance = compare(pictures, self.without(scene)).variance
+        uneven = max((each.contrast for each in scene.textures if each.kind == "statistical"), default=0.0)
+        poses = (pictures.sensors, *pictures.lights)
+        moved = []
+        for sensor, *lights in zip(*(each.reshape(-1, 2) for each in poses), strict=True):
+            alone = Pictures(scene, sensor, tuple(lights), closely=True)
+            found = texture_errors(alone)
+            spread = 2 * np.sqrt(found.variances[0][0])
+            moved.append(abs(measurands(alone).gradient[0, : found.printed.size] @ found.printed) + spread)
+        found = largest(np.array(moved), np.array([2 * uneven]))
+        return Influence(found.bias_px, found.variance + variance)
+
+    def without(self, scene: Scene) -> Scene:
+        return scene.model_copy(update={"textures": ()})
 
 
 class LightSize(Effect):

@@ -90,8 +90,9 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
 
     Coplanar triangles become faces, collinear pieces one edge. Vertices where sharp edges meet are named v1, v2, ... in
     the order of their (x, y, z), sharp edges e1, e2, ... in the order of their ends, circles c1, c2, ... in that of
-    their centres. The rest is there to hide, shade and be seen, but to measure nothing by: pieces of a circle c1.1,
-    c1.2, ..., of other curved edges r1, ..., edges inside curved surfaces s1, ..., their vertices p1, ...
+    their centres, plane faces f1, f2, ... in that of their centroids. The rest is there to hide, shade and be seen, but
+    to measure nothing by: pieces of a circle c1.1, c1.2, ..., of other curved edges r1, ..., edges inside curved
+    surfaces s1, ..., their vertices p1, ...
 
     Raises
     ------
@@ -143,8 +144,21 @@ def _assembled(mesh, group: np.ndarray, chains: list[Chain], loops, circular: li
         edges=edges,
         triangles=np.array(mesh.triangles),
         triangle_faces=group,
+        face_names=_face_names(mesh, group),
     )
     return replace(bare, circles=_circles(bare, number, circular))
+
+
+def _face_names(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[str, ...]:
+    """f1, f2, ... in the order of the faces' centroids (x, y, z), then of their normals."""
+    weights = np.bincount(group, mesh.area_faces)[:, None]
+    sums = [np.zeros((len(weights), 3)) for _ in range(2)]
+    for total, each in zip(sums, (mesh.triangles_center, mesh.face_normals), strict=True):
+        np.add.at(total, group, each * mesh.area_faces[:, None])
+    places = np.round(np.concatenate([sums[0] / weights / mesh.extents.max(), sums[1] / weights], 1), 6)
+    names = np.empty(len(places), object)
+    names[np.lexsort(places.T[::-1])] = [f"f{i}" for i in range(1, len(places) + 1)]
+    return tuple(names.tolist())
 
 
 def _edges(chains: list[Chain], number: np.ndarray, circular: list[Rim], known: Facets) -> tuple[Edge, ...]:

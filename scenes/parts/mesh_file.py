@@ -16,7 +16,7 @@ from scenes.units import Unit, in_unit
 class Mesh(Model):
     """A part from a mesh file (STL, PLY or OBJ).
 
-    Vertices, edges and circles get the names that `scenes.parts.mesh.solid` gives; ``ice show`` lists them.
+    Vertices, edges, circles and faces get the names that `scenes.parts.mesh.solid` gives; ``ice show`` lists them.
     """
 
     kind: Literal["mesh"]

@@ -79,6 +79,8 @@ class Solid:
     circles : tuple of Circle
     holes : tuple of tuple of tuple of int
         Vertex indices of each face's inner boundaries, clockwise seen from outside; empty where no face has any.
+    face_names : tuple of str
+        One name a face; f1, f2, ... when not given.
     """
 
     vertex_names: tuple[str, ...]
@@ -89,8 +91,11 @@ class Solid:
     triangle_faces: np.ndarray | None = None
     circles: tuple[Circle, ...] = ()
     holes: tuple[tuple[tuple[int, ...], ...], ...] = ()
+    face_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.face_names:
+            object.__setattr__(self, "face_names", tuple(f"f{i}" for i in range(1, len(self.faces) + 1)))
         if self.triangles is None:
             fans = np.array([(f, face[0], *pair) for f, face in enumerate(self.faces) for pair in pairwise(face[1:])])
             object.__setattr__(self, "triangles", self.vertices[fans[:, 1:]])
@@ -159,6 +164,13 @@ class Solid:
         """The sharp edges: those of the part itself, by which it can be measured."""
         return tuple(edge for edge in self.edges if edge.kind == "sharp")
 
+    @cached_property
+    def plane(self) -> np.ndarray:
+        """Faces that are no facets of a curved surface: none of their edges lies inside one; bool, shape (F,)."""
+        found = np.ones(len(self.faces), bool)
+        found[[face for edge in self.edges if edge.kind == "smooth" for face in edge.faces]] = False
+        return found
+
     def edges_at(self, vertex: str) -> tuple[Edge, ...]:
         """All sharp edges that end in the named vertex."""
         index = self.vertex_names.index(vertex)
@@ -202,7 +214,8 @@ def block(size: tuple[float, float, float]) -> Solid:
     """Block with one corner at the origin and its sides along the axes.
 
     Vertices are v1 to v8, edges e1 to e12, numbered so that the paper's names hold: v3 and v6 are
-    opposite corners of the top face, whose sides are e4, e9, e7 and e11.
+    opposite corners of the top face, whose sides are e4, e9, e7 and e11. Faces are top, bottom, front (least y), back,
+    left (least x) and right.
 
     Parameters
     ----------
@@ -225,6 +238,7 @@ def block(size: tuple[float, float, float]) -> Solid:
             Edge(f"e{i}", ends, tuple(f for f, face in enumerate(faces) if set(ends) <= set(face)))
             for i, ends in enumerate(_BLOCK_EDGES, 1)
         ),
+        face_names=tuple(_BLOCK_FACES),
     )
 
 
@@ -240,10 +254,12 @@ def assembled(first: Solid, *others: Solid) -> Solid:
     if not others:
         return first
     names, vertices, faces, edges = list(first.vertex_names), [first.vertices], list(first.faces), list(first.edges)
+    face_names = list(first.face_names)
     triangles, owners = [first.triangles], [first.triangle_faces]
     for number, other in enumerate(others, 1):
         corner, face = sum(map(len, vertices)), len(faces)
         names += [f"{name}@{number}" for name in other.vertex_names]
+        face_names += [f"{name}@{number}" for name in other.face_names]
         edges += [
             Edge(
                 f"{e.name}@{number}",
@@ -266,4 +282,5 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         triangles=np.concatenate(triangles),
         triangle_faces=np.concatenate(owners),
         circles=first.circles,
+        face_names=tuple(face_names),
     )

@@ -16,6 +16,8 @@ NEEDED = {
     "polarised": {"polarisation", "analyser", "specular_lobe"},
     "grey_floor": {"floor", "cast_shadow", "interreflection"},
     "macro": {"depth_of_field"},
+    "anodised": {"specular_lobe"},
+    "printed_label": {"texture"},
     "low_light": {"shot_noise", "fixed_pattern"},
 }
 
@@ -28,7 +30,7 @@ def test_register_has_every_effect_once():
     wanted = (
         "attached_shadow cast_shadow interreflection floor specular_lobe polarisation analyser wavelength fall_off "
         "light_size backlight spill depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern "
-        "quantisation saturation pose_jitter"
+        "quantisation saturation pose_jitter texture"
     )
     assert set(REGISTER) == set(wanted.split())
 

@@ -60,8 +60,8 @@ def test_albedo_and_gain(task1):
     """No more is sent on than the diffuse part and all of the specular one; light is nearest at the farthest corner."""
     dull = Material(specular_fraction=0.2, diffuse_reflectance=0.5)
     glossy = Material(specular_fraction=0.2, diffuse_reflectance=0.5, refractive_index=1.5)
-    assert albedo(SimpleNamespace(material=dull)) == pytest.approx(0.4)
-    assert albedo(SimpleNamespace(material=glossy)) == pytest.approx(0.6)
+    assert albedo(SimpleNamespace(surfaces=SimpleNamespace(used=(dull,)))) == pytest.approx(0.4)
+    assert albedo(SimpleNamespace(surfaces=SimpleNamespace(used=(dull, glossy)))) == pytest.approx(0.6)
     far = max(np.linalg.norm(v - np.array(task1.camera.look_at)) for v in task1.solid.vertices)
     assert _gain(task1) == pytest.approx((task1.light.distance / (task1.light.distance - far)) ** 2)
 

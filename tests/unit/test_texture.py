@@ -77,7 +77,7 @@ def test_creases_and_grazing_angles_are_within_the_bound(seed):
 
 def test_a_lobe_is_not_lost_between_the_first_nodes(monkeypatch):
     """Nodes are at least as close as the facets' slopes ask for, whatever the values say at the first ones."""
-    monkeypatch.setattr(texture, "shade", lambda surface, normal, points: np.ones(points.shape[:-1]))
+    monkeypatch.setattr(texture, "shade", lambda surface, normal, points, material: np.ones(points.shape[:-1]))
     poses = (30, 135), (30, 315)
     assert len(made(glossy(0.3), *poses)[0].values) == 17
     assert len(made(glossy(0.005), *poses)[0].values) > 17

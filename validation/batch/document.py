@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from validation.batch.measurands import JudgedMeasurand
 from validation.batch.rows import Row
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def _frame(found: Validation) -> dict[str, Any]:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    main = asdict(row.main)
+    main, texture = asdict(row.main), {} if row.texture is None else {"texture": row.texture}
     return {
         "index": row.index,
         "scene": row.scene,
@@ -79,12 +80,22 @@ def _row(row: Row) -> dict[str, Any]:
         "value_px": row.value_px,
         "paper_ice": row.paper_ice,
         "paper_real": row.paper_real,
-        "predicted": {"paper": row.paper, "calibrated": row.calibrated, "propagated": main.pop("propagated")},
+        "predicted": {
+            "paper": row.paper,
+            "calibrated": row.calibrated,
+            "propagated": main.pop("propagated"),
+            **texture,
+        },
         **main,
         "bound": row.bound,
         "classic": [asdict(judged) for judged in row.classic],
-        "measurands": [asdict(each) for each in row.measurands],
+        "measurands": [_measurand(each) for each in row.measurands],
     }
+
+
+def _measurand(each: JudgedMeasurand) -> dict[str, Any]:
+    """With ``texture`` only where there are textures."""
+    return {key: value for key, value in asdict(each).items() if key != "texture" or value is not None}
 
 
 def _finite(value: Any) -> Any:

@@ -58,6 +58,7 @@ class _PredictedMeasurand(BaseModel):
     calibrated: _Variance
     bound: _Variance
     predicted_bias: _Length
+    texture: _Variance | None = None
 
 
 class _Predicted(BaseModel):
@@ -70,6 +71,7 @@ class _Predicted(BaseModel):
     bound: _Variance
     value_px: _Length
     predicted_bias: _Length
+    texture: _Variance | None = None
     measurands: Annotated[list[_PredictedMeasurand], Field(min_length=1, max_length=1000)]
 
 

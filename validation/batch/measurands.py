@@ -32,8 +32,13 @@ def predicted(forecasts: dict[str, planner.Prediction]) -> list[dict[str, Any]]:
     for k, each in enumerate(forecasts["calibrated"].measurands):
         variances = {model: forecasts[model].measurands[k].variance_object for model in FIELDS}
         about = {"name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object}
-        told.append({**about, "predicted_bias": each.bias_object, **variances})
+        told.append({**about, "predicted_bias": each.bias_object, **texture(each.texture_variance_object), **variances})
     return told
+
+
+def texture(variance: float | None) -> dict[str, float]:
+    """Variance over parts by textures under its key, which is absent where there are none, or it is not known."""
+    return {} if variance is None or np.isnan(variance) else {"texture": variance}
 
 
 def propagated(method: str, found: PropagatedValues, spread: np.ndarray) -> dict[str, tuple[float, float, str]]:
@@ -51,6 +56,7 @@ class JudgedMeasurand:
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
     ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of
     `Judged`. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
     """
 
     name: str
@@ -70,9 +76,22 @@ class JudgedMeasurand:
     bound: float
     status: str
     independent: float
+    texture: float | None = None
 
 
-_NUMBERS = ("value", *FIELDS, "predicted_bias", "predicted", "empirical", "ratio", "bias", "independent", "low", "high")
+_NUMBERS = (
+    "value",
+    *FIELDS,
+    "texture",
+    "predicted_bias",
+    "predicted",
+    "empirical",
+    "ratio",
+    "bias",
+    "independent",
+    "low",
+    "high",
+)
 _RECORD = np.dtype(
     [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
 )
@@ -101,6 +120,7 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
             record["about"] = self._about.setdefault(key, len(self._about))
             for name in ("value", *FIELDS, "predicted_bias"):
                 record[name] = about[name]
+            record["texture"] = about.get("texture", np.nan)
             record["predicted"], record["independent"] = each.propagated, share
             for name, number in each.scatter(about["value"]).items():
                 record[name] = number
@@ -138,7 +158,9 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
 
 def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:
     name, kind, unit = texts[record["about"]]
-    known = {key: None if np.isnan(record[key]) else float(record[key]) for key in ("empirical", "ratio", "bias")}
+    known = {
+        key: None if np.isnan(record[key]) else float(record[key]) for key in ("empirical", "ratio", "bias", "texture")
+    }
     return JudgedMeasurand(
         name=name, kind=kind, unit=unit, n=int(record["n"]), failed=int(record["failed"]),
         status=STATUSES[record["status"]],

@@ -48,7 +48,8 @@ class Row:
     They are about the first measurand, in the image; ``measurands`` are all of them by the verdict's method, in the
     scene's unit.
 
-    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene.
+    ``value_px`` is the model's distance; ``parameters`` are the values that a campaign gave to keys of the scene;
+    ``texture`` is the predicted variance over parts by textures, None where there are none.
     """
 
     index: int
@@ -65,9 +66,10 @@ class Row:
     main: Judged
     classic: tuple[Judged, ...]
     measurands: tuple[JudgedMeasurand, ...]
+    texture: float | None = None
 
 
-MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias")
+MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture")
 
 
 def _record(methods: int) -> np.dtype:
@@ -112,7 +114,7 @@ class Rows(Sequence[Row]):
         record = self._records[self._size]
         record["index"], record["kind"] = index, kind
         for name in MODEL:
-            record[name] = model[name]
+            record[name] = model.get(name, math.nan)
         for place, one in zip(record["judged"], found.values(), strict=False):
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
             for name, number in one.scatter(model["value_px"]).items():
@@ -193,7 +195,7 @@ class Rows(Sequence[Row]):
         index = int(record["index"])
         setting, parameters = self._campaign.at(index)
         scene, names = self._kinds[int(record["kind"])]
-        numbers = {name: float(record[name]) for name in MODEL}
+        numbers = {name: float(record[name]) for name in MODEL} | {"texture": _known(record["texture"])}
         bias = numbers.pop("predicted_bias")
         judged = [_judged(name, place, bias) for name, place in zip(names, record["judged"], strict=False)]
         return Row(

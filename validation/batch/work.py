@@ -200,6 +200,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
     numbers = {model: found.variance_image for model, found in predicted.items()}
     numbers |= {"value_px": predicted["calibrated"].value_image, "predicted_bias": predicted["calibrated"].bias_image}
+    numbers |= measurands.texture(predicted["calibrated"].measurands[0].texture_variance_image)
     numbers["measurands"] = measurands.predicted(predicted)
     clock.lap("predict")
     image = render.image(picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance)

@@ -340,7 +340,17 @@ def _measurand(each: planner.Forecast) -> dict:
         "sigma_image": sigma_image,
         "ratio": each.ratio if sigma is not None else None,
         "status": each.status,
+        **_texture(each),
     }
+
+
+def _texture(each: planner.Forecast) -> dict:
+    """Standard deviations over parts by textures, and the bias of this part; nothing without textures."""
+    if each.texture_variance_object is None:
+        return {}
+    names = ("sigma_texture", "sigma_texture_image", "bias")
+    values = each.texture_variance_object**0.5, each.texture_variance_image**0.5, each.bias_object
+    return {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}
 
 
 def _with_poses(found) -> dict:

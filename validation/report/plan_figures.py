@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 
 from planner import Pictures, Plan, ViewingSpace, variance_map
 from planner.features.projected_edges import circles, projected_edges
-from planner.imaging.appearance import is_separable, signal
+from planner.imaging.appearance import face_signal, is_separable
 from planner.imaging.lens import recorded
 from planner.imaging.projection import direction, facing, project
 from planner.imaging.visibility import visible_spans
@@ -155,7 +155,7 @@ def draw_seen(axis, scene, sensor, light, points) -> None:
     solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
     axis.set_facecolor("0.05")
     shown = facing(solid, position)
-    levels = signal(pictures, solid.triangles.mean(1), solid.normals[solid.triangle_faces], 1)
+    levels = face_signal(pictures, solid.triangles.mean(1), solid.triangle_faces, 1)
     brightest = max(levels.max(), np.finfo(float).tiny)
     corners = project(solid.triangles.reshape(-1, 3), pose, camera).reshape(-1, 3, 2)
     away = np.linalg.norm(solid.triangles.mean(1) - position, axis=1)

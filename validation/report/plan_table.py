@@ -39,6 +39,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}\n"
         f"  standard deviation {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]},"
         f" {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]} in the image\n"
+        + "".join(f"{line}\n" for line in _textures(p))
         + _searched(found, seconds)
     )
 
@@ -56,7 +57,25 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
         ratio = "" if each.ratio is None else f", {each.ratio:.3g} of +-{each.tolerance.half:g}"
         sigma = f"{each.variance_object**0.5:.3g} {each.unit}"
         lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{ratio}, {each.status}")
-    return "\n".join([*lines, _searched(found, seconds)])
+    return "\n".join([*lines, *_textures(p), _searched(found, seconds)])
+
+
+def _textures(p: planner.Prediction) -> list[str]:
+    """What textures add to each measurand; nothing without textures."""
+    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in p.measurands if _is_uneven(each)]
+
+
+def _is_uneven(each: planner.Forecast) -> bool:
+    return each.texture_variance_object is not None
+
+
+def _over_parts(each: planner.Forecast) -> str:
+    if math.isnan(each.texture_variance_object):
+        return "what is not known: a circle, or another face seen past an edge"
+    return (
+        f"{each.texture_variance_object**0.5:.3g} {each.unit} (1 sigma over parts) in all pictures of a part;"
+        f" {each.bias_object:+.3g} {each.unit} on this one"
+    )
 
 
 def _searched(found: planner.Plan, seconds: float) -> str:

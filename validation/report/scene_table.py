@@ -39,6 +39,16 @@ def facts(scene: Scene) -> dict[str, Any]:
             }
             for circle in solid.circles
         ],
+        "faces": [
+            {
+                "name": solid.face_names[f],
+                "at": solid.vertices[list(face)].mean(0).tolist(),
+                "normal": solid.normals[f].tolist(),
+                "material": _material(scene, f),
+            }
+            for f, face in enumerate(solid.faces)
+            if solid.plane[f]
+        ],
     }
 
 
@@ -63,8 +73,18 @@ def report(scene: Scene) -> Group:
     for circle in known["circles"]:
         row = circle["name"], *map(_number, circle["centre"]), _number(circle["diameter"])
         circles.add_row(*row, "hole" if circle["hole"] else "outer")
-    tables = (t for t in (corners, edges, circles) if t.row_count)
+    faces = _table(f"\nPlane faces, by their middles, {unit}", "name", "x", "y", "z", "normal", "material")
+    for face in known["faces"]:
+        normal = " ".join(f"{x + 0.0:.2f}" for x in face["normal"])
+        faces.add_row(face["name"], *map(_number, face["at"]), normal, face["material"] or "")
+    tables = (t for t in (corners, edges, circles, faces) if t.row_count)
     return Group(*parts, *tables, Text(_smooth(scene)))
+
+
+def _material(scene: Scene, face: int) -> str | None:
+    """Name of a face's own material; None where it is the scene's."""
+    kind = scene.surfaces.kinds[face]
+    return scene.materials[kind - 1].name if kind else None
 
 
 def _smooth(scene: Scene) -> str:

@@ -120,6 +120,12 @@ def _paper(row: Row) -> list[str]:
     return [number(row.paper_ice), number(row.paper), against, *map(number, row.paper_real or (None, None))]
 
 
+_PARTS = (
+    "parts: the textures' standard deviation over parts. It does not average over pictures; pred. and meas. have the\n"
+    "shift of the one part that the seeds roll, and the difference of the two is judged."
+)
+
+
 def _ratios(found: Validation) -> Table:
     rows, which = far(found)
     headings, cells = names(found, rows)
@@ -128,17 +134,18 @@ def _ratios(found: Validation) -> Table:
         f"* : 1 lies outside the interval. failed: one number a method.\nThe verdict is about {main}, as are bias "
         "(mean error) and rmse, sqrt(variance + bias^2)."
     )
+    uneven = any(row.texture is not None for row in rows)
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
-        *headings, main, *others, "n", "failed", "bias px\npred.", "\nmeas.", "rmse px", "status",
-        caption="\n".join(filter(None, [caption, which])),
+        *headings, main, *others, "n", "failed", *["parts px\nsigma"] * uneven, "bias px\npred.", "\nmeas.", "rmse px",
+        "status", caption="\n".join(filter(None, [caption, _PARTS * uneven, which])),
     )  # fmt: skip
     for row in rows:
         judged = {j.method: j for j in (row.main, *row.classic)}
-        table.add_row(
-            *cells[row.index], *(ratio(judged[name]) if name in judged else "-" for name in (main, *others)),
-            str(row.main.n), failed(row), shift(row.main.predicted_bias), *errors(row.main), row.main.status,
-        )  # fmt: skip
+        each = [ratio(judged[name]) if name in judged else "-" for name in (main, *others)]
+        parts = [small_sigma(row.texture)] * uneven
+        shifts = shift(row.main.predicted_bias), *errors(row.main)
+        table.add_row(*cells[row.index], *each, str(row.main.n), failed(row), *parts, *shifts, row.main.status)
     return table
 
 
