@@ -160,7 +160,8 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
     if textures is not None and smooth:
         active = sharp
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
-    many = quality.edge_samples or (16 if interpreted else 64 if scalar and textures is None else 256)
+    plain = scalar and (textures is None or not active & CUSTOM)
+    many = quality.edge_samples or (16 if interpreted else 64 if plain else 256)
     samples = quality.samples or (1 if scalar and not picture.scene.textures else 4)
 
     few = quality.random_samples or 16

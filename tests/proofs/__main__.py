@@ -1,4 +1,4 @@
-"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``lights``, ``parts``, ``rate`` and ``uneven``."""
+"""``python -m tests.proofs`` and one of conditions, crowded, kill, large, lights, parts, rate and uneven."""
 
 from __future__ import annotations
 
