@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 from planner import Pictures, Plan, ViewingSpace, variance_map
 from planner.features.projected_edges import circles, projected_edges
 from planner.imaging.appearance import face_signal, is_separable
+from planner.imaging.backlight import backlights
 from planner.imaging.lens import recorded
 from planner.imaging.projection import direction, facing, project
 from planner.imaging.visibility import visible_spans
@@ -153,7 +154,7 @@ def draw_seen(axis, scene, sensor, light, points) -> None:
     """Draw the object from a sensor: faces by brightness, required edges in colour, points (px) as rings."""
     pictures = Pictures.of(Picture.of(scene, sensor, light))
     solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
-    axis.set_facecolor("0.05")
+    axis.set_facecolor("0.95" if backlights(scene) else "0.05")
     shown = facing(solid, position)
     levels = face_signal(pictures, solid.triangles.mean(1), solid.triangle_faces, 1)
     brightest = max(levels.max(), np.finfo(float).tiny)

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes import Scene
+from scenes import Luminaire, Scene
 
 
 def facts(scene: Scene) -> dict[str, Any]:
@@ -49,6 +49,7 @@ def facts(scene: Scene) -> dict[str, Any]:
             for f, face in enumerate(solid.faces)
             if solid.plane[f]
         ],
+        "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
     }
 
 
@@ -77,8 +78,16 @@ def report(scene: Scene) -> Group:
     for face in known["faces"]:
         normal = " ".join(f"{x + 0.0:.2f}" for x in face["normal"])
         faces.add_row(face["name"], *map(_number, face["at"]), normal, face["material"] or "")
-    tables = (t for t in (corners, edges, circles, faces) if t.row_count)
+    lights = _table(f"\nLights, {unit}", "kind", "mount", "distance", "intensity", "half size")
+    for light in scene.lights:
+        numbers = light.distance, light.intensity, light.half_size
+        lights.add_row(light.kind, light.mount, *(f"{value:.4g}" for value in numbers))
+    tables = (t for t in (corners, edges, circles, faces, lights) if t.row_count)
     return Group(*parts, *tables, Text(_smooth(scene)))
+
+
+def _kind(light: Luminaire) -> dict[str, str]:
+    return {"kind": light.kind, "mount": light.mount}
 
 
 def _material(scene: Scene, face: int) -> str | None:
@@ -103,5 +112,5 @@ def _number(value: float) -> str:
 def _table(title: str, *columns: str) -> Table:
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
     for name in columns:
-        table.add_column(name, justify="left" if name in ("name", "") else "right", no_wrap=True)
+        table.add_column(name, justify="left" if name in ("name", "kind", "mount", "") else "right", no_wrap=True)
     return table
