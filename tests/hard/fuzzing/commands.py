@@ -35,7 +35,8 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--sensor-polar": ("50,50", "10,20", "20,10"), "--light-polar": ("0,90",), "--min-edge": ("5", "1e9"),
         "--min-clearance": ("1",), "--separation": ("20", "400"), "--tolerance": ("noise=0.1", "noise=2", "x=1"),
         "--check": ("0", "10000"), "--map": ("OUT/map.jpg", "OUT"), "--out": ("FILE/x",), "--json": (),
-        "--light-out-of-view": (), "--same-mount": (),
+        "--light-out-of-view": (), "--same-mount": (), "--shares": ("given", "best"), "--views": ("1", "2", "13"),
+        "--views-share": ("sensor",), "--vary": ("analyser", "band", "analyser,polarisation"), "--hold": ("white",),
     }),
     "render": (["SCENE", "--sensor", "30,135", "--light", "15,315", "-o", "OUT.png"], {
         "--sensor": _POSE, "--light": _POSE, "-o": ("OUT.npy", "OUT.tif", "OUT.gif", "FILE/x.png"),

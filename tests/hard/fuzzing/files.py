@@ -52,7 +52,8 @@ def _use_scene(rng: np.random.Generator, path: Path, folder: Path) -> str:
     finally:
         for name in ("bracket.obj", "plate.ply", "wedge.stl"):
             (folder / name).unlink(missing_ok=True)
-    sensor, light = (POSES[rng.choice(len(POSES), p=[0.73] + [0.03] * 9)] for _ in range(2))
+    sensor, *lights = (POSES[rng.choice(len(POSES), p=[0.73] + [0.03] * 9)] for _ in range(1 + len(loaded.free)))
+    light = lights[0] if len(lights) == 1 else tuple(lights)
     found = planner.predict(loaded, sensor, light, rng.choice(["paper", "calibrated", "bound"]))
     variances = np.array([found.variance_image, found.variance_object])
     positive = (variances > 0).all() or (loaded.noise.variance == 0 and (variances >= 0).all())
