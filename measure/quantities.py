@@ -153,6 +153,7 @@ def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
     whole = np.where(lost[:, :, None] | lost[:, None, :], 0.0, errors)
     used = np.where((rows == 0) | lost[:, None], 0.0, rows)
     spread = used @ whole @ np.swapaxes(used, -1, -2)
+    spread = (spread + np.swapaxes(spread, -1, -2)) / 2  # a product's rounding is not symmetric
     missing = ((rows != 0) & lost[:, None]).any(-1)
     return np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread)
 
