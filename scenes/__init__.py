@@ -15,11 +15,13 @@ from scenes.picture import Picture, mounted
 from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.uncertain import Uncertain, UncertainNumber
+from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 
 __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
     "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh",
     "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "Task",
-    "Tolerance", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
+    "Tolerance", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

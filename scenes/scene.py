@@ -27,6 +27,8 @@ from scenes.parts.solid import Solid, assembled
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.surroundings import Floor, Jitter, Obstacle
+from scenes.uncertain import UncertainNumber, check_uncertain, taken_out
+from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
 
@@ -123,6 +125,10 @@ class Scene(Model):
     """What stands beside it."""
     jitter: Jitter = Jitter()
     """How exactly poses are set."""
+    uncertain: tuple[UncertainNumber, ...] = ()
+    """Numbers with an uncertainty; also written in their places, as `{ value = 25, sd = 0.05 }`."""
+    uncertainty: Uncertainty = Uncertainty()
+    """The same of what is no number of a scene."""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -201,6 +207,12 @@ class Scene(Model):
             return data
         return {**data, "camera": completed(camera, unit)}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _with_plain_numbers(cls, data: Any) -> Any:
+        """First of all: numbers that carry an uncertainty become plain ones, for whatever looks at them next."""
+        return taken_out(data) if isinstance(data, dict) else data
+
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         mesh = self.object if isinstance(self.object, Mesh) else None
@@ -208,6 +220,8 @@ class Scene(Model):
         self._check_measurands()
         self._check_surroundings()
         self._check_lights()
+        check_uncertain(self, self.uncertain)
+        self.uncertainty.check_once(self.uncertain)
         for i, setting in enumerate(self.settings):
             self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
             self.check_lights(setting.lights, f"settings[{i}].light")
