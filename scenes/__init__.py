@@ -23,5 +23,6 @@ __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
     "Floor", "InvalidInput", "Jitter", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh",
     "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "Task",
-    "Tolerance", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "as_point", "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
+    "Tolerance", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "as_point", "block", "find", "load",
+    "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

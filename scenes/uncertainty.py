@@ -56,9 +56,9 @@ class Uncertainty(Model):
     """Of its turns about axes through ``look_at`` along x, y and z, independently [degrees]."""
     principal_point_px: Deviation = None
     """Of the place at which the optical axis meets the sensor, along x and y independently [px]."""
-    temperature_K: Deviation = None
+    temperature_K: Deviation = None  # noqa: N815 - the unit
     """Of the part less 20 degrees Celsius; its value is corrected for [K]."""
-    expansion_per_K: Deviation = None
+    expansion_per_K: Deviation = None  # noqa: N815
     """Coefficient of linear thermal expansion of the part; give its value too [1/K]."""
     fixed_pattern: bool = True
     """Whether the fixed pattern that ``noise.prnu`` and ``noise.dsnu`` tell of counts."""

@@ -104,5 +104,5 @@ def test_covariance_files(tmp_path) -> None:
 
 def test_a_wrong_covariance_file_is_named(tmp_path) -> None:
     (tmp_path / "one.toml").write_text('names = ["fx", "q"]\nmatrix = [[1, 0], [0, 1]]\n')
-    with pytest.raises(scenes.InvalidInput, match="one.toml: names.1. must be one of"):
+    with pytest.raises(scenes.InvalidInput, match=r"one.toml: names.1. must be one of"):
         _scene(tmp_path, uncertainty={"covariance": "one.toml"})
