@@ -43,7 +43,7 @@ class Features:
     def errors(self, station: Station) -> np.ndarray:
         """Errors of lines and circles, as numbered in `planner.features.seen`, shape (2 E + 3 C,).
 
-        Displacement of each line at its first end (ideal px) and rotation (rad); shifts of each circle's centre in its
+        Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each circle's centre in its
         plane and change of its radius (the scene's unit). NaN where a feature is not seen.
         """
         parts = [self._lines(station).ravel()]
@@ -59,15 +59,19 @@ class Features:
         return nodes, edge_points(solid, view.names, nodes.spatial[..., 1:-1])
 
     def _lines(self, station: Station) -> np.ndarray:
-        """(d, theta) of each edge, shape (E, 2)."""
+        """(d, tan theta) of each edge, shape (E, 2): of the line through the points where they are found."""
         view = self.known.view
         if not view.names:
             return np.zeros((0, 2))
         nodes, points = self._nodes
-        off = np.einsum("eni,ei->en", self._displaced(station, points), normals(view))
-        mean = off @ NODE_WEIGHTS / 2
-        turn = 6 / nodes.length[..., 0] ** 2 * ((off * nodes.t[..., 1:-1]) @ NODE_WEIGHTS)
-        return np.stack([mean - turn * nodes.middle[..., 0], turn], -1)
+        moved, normal = self._displaced(station, points), normals(view)
+        off = np.einsum("eni,ei->en", moved, normal)
+        tangent = np.stack([normal[:, 1], -normal[:, 0]], -1)
+        along = nodes.middle + nodes.t[..., 1:-1] + np.einsum("eni,ei->en", moved, tangent)
+        middle, mean = (part @ NODE_WEIGHTS / 2 for part in (along, off))
+        lever = along - middle[:, None]
+        turn = ((off * lever) @ NODE_WEIGHTS) / (lever**2 @ NODE_WEIGHTS)
+        return np.stack([mean - turn * middle, turn], -1)
 
     @cached_property
     def _rims(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
