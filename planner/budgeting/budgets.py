@@ -12,14 +12,15 @@ import numpy as np
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.budgeting.terms import Term, terms
+from planner.budgeting.terms import Term, as_input, terms
 from planner.imaging.appearance import is_plain
 from planner.imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
-from planner.uncertainty.inputs import Group, Input
-from scenes import InvalidInput, Picture, Scene, Uncertain
+from planner.uncertainty.groups import Group
+from planner.uncertainty.groups import Source as EngineInput
+from scenes import InvalidInput, Picture, Scene
 
 CALIBRATION = "camera calibration"
 
@@ -61,7 +62,7 @@ class SceneBudget:
         return Features(Pictures.of(self.picture))
 
     @cached_property
-    def shared(self) -> tuple[Input | Group, ...]:
+    def shared(self) -> tuple[EngineInput, ...]:
         """The inputs of all measurands: single ones, and the calibration's as one group."""
         return shared_inputs(self.picture.scene, self.sources)
 
@@ -72,6 +73,7 @@ def budget(
     light: Any = None,
     *,
     variances: np.ndarray | None = None,
+    biases: np.ndarray | None = None,
     biased: bool | None = None,
     p: float = 0.95,
 ) -> SceneBudget:
@@ -85,6 +87,8 @@ def budget(
     variances : ndarray, shape (M,), optional
         Of the values by pixel noise, the scene's unit squared or degrees^2, where a picture tells them better than the
         ``calibrated`` model.
+    biases : ndarray, shape (M,), optional
+        Of the values without noise, measured in a noise-free picture, in place of the predicted ones.
     biased : bool, optional
         Whether straight edges are found by the classic locators, whose bias the planner predicts; by default where
         `measure.best_estimator` is one of them.
@@ -115,43 +119,21 @@ def budget(
     given = sources(picture.scene)
     slopes = sensitivities(features, given, biased=biased)
     noise = np.array([each.variance_object for each in prediction.measurands]) if variances is None else variances
-    beside = terms(features.pictures, prediction.measurands, noise, biased=biased)
-    inputs = shared_inputs(picture.scene, given)
-    ordered = _in_order(inputs, given)
-    budgets = []
-    for m, each in enumerate(prediction.measurands):
-        rows = beside[m]
-        budgets.append(
-            combined(
-                each.name,
-                each.unit,
-                each.value_object,
-                (*inputs, *(as_input(r.name, r.value, r.told, r.unit) for r in rows)),
-                (*(float(slopes[m, k]) for k in ordered), *(r.sensitivity for r in rows)),
-                p,
-                noise=tuple(r.name for r in rows if r.kind == "noise"),
-            )
-        )
+    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased)
+    inputs, budgets = shared_inputs(picture.scene, given), []
+    for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
+        told = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
+        told |= {row.name: row.sensitivity for row in rows}
+        whole = (*inputs, *(row.as_input for row in rows))
+        budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
 
 
-def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[Input | Group, ...]:
+def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[EngineInput, ...]:
     """The sources as the engine's inputs: single ones first, then those of the calibration as a group."""
     names = () if scene.uncertainty.covariance is None else scene.uncertainty.covariance.names
     single = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name not in names)
     if not names:
         return single
     correlated = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name in names)
-    return (*single, Group(correlated, scene.uncertainty.covariance.correlation))
-
-
-def as_input(name: str, value: float, told: Uncertain, unit: str) -> Input:
-    """One input of the engine."""
-    return Input(name, value, told.u, told.distribution_name, told.dof or np.inf, told.type, unit)
-
-
-def _in_order(inputs: tuple[Input | Group, ...], given: tuple[Source, ...]) -> list[int]:
-    """Which source each of the engine's inputs is."""
-    flat = [one for each in inputs for one in (each.inputs if isinstance(each, Group) else (each,))]
-    places = {source.name: k for k, source in enumerate(given)}
-    return [places[one.name] for one in flat]
+    return (*single, Group(correlated, scene.uncertainty.covariance.correlation, CALIBRATION))

@@ -43,8 +43,8 @@ class Features:
     def errors(self, station: Station) -> np.ndarray:
         """Errors of lines and circles, as numbered in `planner.features.seen`, shape (2 E + 3 C,).
 
-        Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each circle's centre in its
-        plane and change of its radius (the scene's unit). NaN where a feature is not seen.
+        Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
+        circle's centre in its plane and change of its radius (the scene's unit). NaN where a feature is not seen.
         """
         parts = [self._lines(station).ravel()]
         parts += [self._circle(station, c) for c in range(len(self.known.circles))]

@@ -13,8 +13,10 @@ from scenes.numbers import number_at, with_number
 Kind = Literal["geometry", "brightness"]
 _GEOMETRY = ("focal_px", "focal_length_mm", "pixel_pitch_um", "distance", "working_distance_mm", "look_at",
              "lens.distortion")  # fmt: skip
-_UNITS = {"focal_px": "px", "focal_length_mm": "mm", "pixel_pitch_um": "um", "working_distance_mm": "mm",
-          "blur_px": "px", "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels"}  # fmt: skip
+_UNITS = {
+    "focal_px": "px", "focal_length_mm": "mm", "pixel_pitch_um": "um", "working_distance_mm": "mm", "blur_px": "px",
+    "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
+}  # fmt: skip
 _LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
 
 
@@ -76,9 +78,9 @@ def _number_moved(key: str) -> Callable[[Station, float], Station]:
 
 def _poses(scene: Scene) -> Iterator[Source]:
     said, near = scene.uncertainty, scene.camera.distance
-    for name, told in (("sensor_deg", _or_jitter(said.sensor_deg, scene.jitter.sensor_deg)),):
-        for i, part in enumerate(("polar", "azimuth")):
-            yield from _one(f"{name}.{part}", told, "deg", "geometry", 1.0, lambda s, d, i=i: s.sensor_moved(d, i))
+    told = _or_jitter(said.sensor_deg, scene.jitter.sensor_deg)
+    for i, part in enumerate(("polar", "azimuth")):
+        yield from _one(f"sensor_deg.{part}", told, "deg", "geometry", 1.0, lambda s, d, i=i: s.sensor_moved(d, i))
     told = _or_jitter(said.light_deg, scene.jitter.light_deg)
     for k in scene.free:
         label = f"light_deg[{k}]" if len(scene.lights) > 1 else "light_deg"
@@ -92,7 +94,9 @@ def _poses(scene: Scene) -> Iterator[Source]:
     for i, axis in enumerate("xyz"):
         yield from _one(f"part_shift.{axis}", said.part_shift, scene.units, "geometry", near, _tuple_moved("shift", i))
     for i, axis in enumerate("xyz"):
-        yield from _one(f"part_tilt_deg.{axis}", said.part_tilt_deg, "deg", "geometry", 1.0, _tuple_moved("tilt_deg", i))
+        yield from _one(
+            f"part_tilt_deg.{axis}", said.part_tilt_deg, "deg", "geometry", 1.0, _tuple_moved("tilt_deg", i)
+        )
     for i, axis in enumerate("xy"):
         move = _tuple_moved("principal_px", i)
         yield from _one(f"principal_point_px.{axis}", said.principal_point_px, "px", "geometry", 100.0, move)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points
 from planner.models import variance_model
 from planner.models.bias import MOST
+from planner.uncertainty.inputs import Input, Kind
 from scenes import Centre, Noise, Scene, Uncertain
 
 NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error", "rounding"
@@ -44,10 +44,27 @@ class Term:
     told: Uncertain
     unit: str
     sensitivity: float
-    kind: Literal["noise", "systematic"] = "systematic"
+    kind: Kind = "systematic"
+
+    @property
+    def as_input(self) -> Input:
+        """The engine's."""
+        return as_input(self.name, self.value, self.told, self.unit, self.kind)
 
 
-def terms(pictures: Pictures, forecasts: tuple[Forecast, ...], variances: np.ndarray, *, biased: bool) -> list[list[Term]]:
+def as_input(name: str, value: float, told: Uncertain, unit: str, kind: Kind = "systematic") -> Input:
+    """One input of the engine, from how well it is known."""
+    return Input(name, value, told.u, told.distribution_name, told.dof or np.inf, told.type, unit, kind)
+
+
+def terms(
+    pictures: Pictures,
+    forecasts: tuple[Forecast, ...],
+    variances: np.ndarray,
+    biases: np.ndarray | None = None,
+    *,
+    biased: bool,
+) -> list[list[Term]]:
     """Of each of M quantities.
 
     Parameters
@@ -56,6 +73,8 @@ def terms(pictures: Pictures, forecasts: tuple[Forecast, ...], variances: np.nda
         What is predicted of the quantities.
     variances : ndarray, shape (M,)
         Of the values by pixel noise, the scene's unit squared or degrees^2.
+    biases : ndarray, shape (M,), optional
+        Of the values, where a noise-free picture tells them.
     biased : bool
         Whether straight edges have the classic locators' bias.
     """
@@ -65,7 +84,8 @@ def terms(pictures: Pictures, forecasts: tuple[Forecast, ...], variances: np.nda
     for m, each in enumerate(forecasts):
         noise = float(np.sqrt(variances[m]))
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
-        rows.append(Term(MODEL, 0.0, Uncertain(half_width=_model_error(known, m, each, noise, biased)), each.unit, 1.0))
+        limit = _model_error(known, m, each, noise, biased) if biases is None else abs(float(biases[m]))
+        rows.append(Term(MODEL, 0.0, Uncertain(half_width=limit), each.unit, 1.0))
         if pattern[m] > 0:
             rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
         found.append(rows + _stated(scene, each))

@@ -1,4 +1,5 @@
-"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``lights``, ``parts`` and ``rate``."""
+"""``python -m tests.proofs conditions``, ``crowded``, ``kill``, ``large``, ``lights``, ``parts``, ``rate`` and
+``stations``."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.parts import parts
 from tests.proofs.rate import rate
+from tests.proofs.stations import stations
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command()(conditions)
@@ -20,6 +22,7 @@ app.command()(large)
 app.command()(lights)
 app.command()(parts)
 app.command()(rate)
+app.command()(stations)
 
 if __name__ == "__main__":
     app()
