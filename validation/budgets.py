@@ -18,7 +18,7 @@ from scenes import InvalidInput, Picture, Tolerance
 from validation.chain import Chain
 
 _SHOWN = 3  # sources that are named as worth an improvement
-_BLOCK, _MOST_DRAWS = 100_000, 5_000_000
+_BLOCK, _MOST_DRAWS = 100_000, 10_000_000
 _LEAST_GAIN = 0.01  # part of U below which an improvement is not worth its line
 
 
