@@ -6,7 +6,7 @@ GUM (JCGM 100) for the budget, JCGM 101 for Monte Carlo and the comparison, JCGM
 >>> focal = Input.from_half_width("focal length", 25.0, 0.002, unit="mm")
 >>> found = budget("diameter", "um", 12004.0, [repeats, focal], {"repeats": 1.0, "focal length": 480.0})
 >>> print(f"{found.value:.0f} um +- {found.U:.1f} um, k = {found.k:.2f}")
-12004 um +- 2.9 um, k = 2.18
+12004 um +- 2.9 um, k = 2.16
 """
 
 from planner.uncertainty.budget import Budget, Contribution, budget, coverage_factor, effective_dof

@@ -169,7 +169,7 @@ def budget(
     >>> scale = Input.from_half_width("scale", 1.0, 0.04)
     >>> found = budget("width", "um", 200.0, [repeats, scale], {"repeats": 1.0, "scale": 200.0})
     >>> [round(x, 3) for x in (found.u, found.dof, found.k, found.U, found.of("scale").share)]
-    [5.508, 102.235, 1.983, 10.926, 0.703]
+    [5.508, 102.235, 1.983, 10.924, 0.703]
     """
     sources, sensitivities = tuple(inputs), {key: float(c) for key, c in dict(sensitivities).items()}
     _check(sources, sensitivities, value, p)

@@ -95,7 +95,7 @@ def needed(budget: Budget, U_wanted: float, source: str) -> Needed:
     >>> found = budget("width", "um", 0.0, [Input("noise", 0, 3), Input("scale", 0, 4)], {"noise": 1, "scale": 2})
     >>> answer = needed(found, 10.0, "scale")
     >>> round(answer.u, 3), answer.reason
-    (2.064, 'u(scale) of at most 2.06 reaches U = 10 um')
+    (2.063, 'u(scale) of at most 2.06 reaches U = 10 um')
     >>> needed(found, 5.0, "scale").reason
     'not reachable: U is 5.88 um with scale exactly known'
     """

@@ -98,7 +98,7 @@ class Input:
 
     @property
     def sd(self) -> float:
-        """Standard deviation of the distribution that is drawn: u, but for finite `dof` more; infinite for t up to 2."""
+        """Standard deviation of what is drawn: u, but of t and rectangular of finite `dof` more; inf for t up to 2."""
         if math.isinf(self.dof) or self.distribution not in ("t", "rectangular") or self.u == 0:
             return self.u
         if self.distribution == "rectangular":  # JCGM 101 6.4.3.3 with d = half width / sqrt(2 dof)

@@ -24,7 +24,8 @@ class Validation:
     delta : float
         Numerical tolerance of u_c at the stated number of digits.
     verdict : {"agree", "differ", "undecided"}
-        ``undecided`` where Monte Carlo ended before its own tolerance was met.
+        ``undecided`` where twice the standard deviation of Monte Carlo's ends is more than delta and could be the
+        difference.
     reason : str
         In words; empty where they agree.
     interval : (float, float)
@@ -65,11 +66,12 @@ def validate(
     ends = mc.symmetric if interval == "symmetric" else mc.shortest
     d_low, d_high = (abs(a - b) for a, b in zip(gum.interval, ends, strict=True))
     delta = numerical_tolerance(gum.u, digits)
-    if max(d_low, d_high) <= delta and mc.converged:
-        return Validation(d_low, d_high, delta, "agree", "", gum.interval)
-    if not mc.converged:
-        reason = f"{mc.draws} draws are too few for a tolerance of {mc.tolerance:.2g}"
+    noise = 2 * max(mc.spread[2:])
+    if noise > delta and max(d_low, d_high) <= delta + noise:
+        reason = f"{mc.draws} draws tell the ends to {noise:.2g} only, which is more than delta"
         return Validation(d_low, d_high, delta, "undecided", reason, ends)
+    if max(d_low, d_high) <= delta:
+        return Validation(d_low, d_high, delta, "agree", "", gum.interval)
     return Validation(d_low, d_high, delta, "differ", "; ".join(_reasons(gum, mc, delta)), ends)
 
 
