@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.budgeting.terms import Term, as_input, terms
+from planner.budgeting.terms import EXPANSION, TEMPERATURE, Term, as_input, terms
 from planner.imaging.appearance import is_plain
 from planner.imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
@@ -20,6 +20,7 @@ from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
 from planner.uncertainty.groups import Group
 from planner.uncertainty.groups import Source as EngineInput
+from planner.uncertainty.ufloats import as_ufloats
 from scenes import InvalidInput, Picture, Scene
 
 CALIBRATION = "camera calibration"
@@ -55,6 +56,13 @@ class SceneBudget:
 
     def __getitem__(self, name: str) -> Budget:
         return next(each for each in self.measurands if each.name == name)
+
+    def ufloats(self) -> dict[str, Any]:
+        """Values as numbers of the `uncertainties` package by name; they share the station's inputs and temperature.
+
+        Noise, model error, fixed pattern and rounding are each measurand's own.
+        """
+        return as_ufloats(_with_own_terms(each, rows) for each, rows in zip(self, self.terms, strict=True))
 
     @cached_property
     def features(self) -> Features:
@@ -127,6 +135,14 @@ def budget(
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
+
+
+def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:
+    """The same budget, the terms that are its own named after it."""
+    own = {row.name: f"{row.name} of {made.name}" for row in rows if row.name not in (TEMPERATURE, EXPANSION)}
+    sources = tuple(replace(s, name=own[s.name]) if s.name in own else s for s in made.sources)
+    slopes = {own.get(name, name): slope for name, slope in made.sensitivities.items()}
+    return combined(made.name, made.unit, made.value, sources, slopes, made.p)
 
 
 def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[EngineInput, ...]:

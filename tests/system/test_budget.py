@@ -93,6 +93,16 @@ def test_calibrated_parameters_count_as_one_group() -> None:
     assert row.share == pytest.approx(sum(each.share for each in row.members))
 
 
+def test_numbers_know_what_measurands_share() -> None:
+    """A scale that is wrong is wrong for both lengths: of their ratio less is uncertain than of either."""
+    found = _found("bracket_station")
+    numbers = found.ufloats()
+    for each in found:
+        assert numbers[each.name].s == pytest.approx(each.u)
+    ratio = numbers["step"] / numbers["across"]
+    assert ratio.s < 0.3 * numbers["step"].s / 40
+
+
 def test_what_is_needed_reaches_it() -> None:
     (found,) = _found("calibrated_rig")
     wanted = 0.97 * found.U
