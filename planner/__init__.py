@@ -1,5 +1,7 @@
 """The analytic expert: from a scene and poses to the precision of the measurement, without an image."""
 
+from planner.budgeting.budgets import SceneBudget, budget
+from planner.budgeting.plans import CapabilityPlan, plan_capability
 from planner.combining import Combination, combine
 from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
@@ -22,8 +24,9 @@ from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
 
 __all__ = [
-    "Aim", "Candidate", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction", "Forecast", "Pictures",
-    "Plan", "PoseSpread", "Prediction", "Robust", "Tolerances", "Varied", "View", "ViewSet", "ViewingSpace", "Views",
-    "alternate", "combine", "edges_of", "exhaustive", "local_minima", "plan", "plan_views", "pose_scatter",
-    "pose_spread", "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
+    "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied", "View",
+    "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "edges_of", "exhaustive", "local_minima",
+    "plan", "plan_capability", "plan_views", "pose_scatter", "pose_spread", "predict", "projected_edges",
+    "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

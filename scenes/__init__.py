@@ -17,12 +17,15 @@ from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.textures import ImageTexture, StatisticalTexture
+from scenes.uncertain import Uncertain, UncertainNumber
+from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 
 __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
     "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator",
     "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene",
-    "Setting", "Side", "Solid", "StatisticalTexture", "Task", "Tolerance", "Unit", "as_point", "block", "find", "load",
+    "Setting", "Side", "Solid", "StatisticalTexture", "Task", "Tolerance", "Uncertain", "UncertainNumber",
+    "Uncertainty", "Unit", "as_point", "block", "find", "load",
     "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

@@ -30,6 +30,8 @@ from scenes.ranges import Positive
 from scenes.surfaces import Surfaces, surfaces
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.textures import Texture, check_textures
+from scenes.uncertain import UncertainNumber, check_uncertain, taken_out
+from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 from scenes.view import check_view
 
@@ -134,6 +136,10 @@ class Scene(Model):
     """Lamps that a plan may choose instead of the light's own (`ice plan --vary band`)."""
     filters: tuple[Filter, ...] = ()
     """Filters that a plan may put before the lens."""
+    uncertain: tuple[UncertainNumber, ...] = ()
+    """Numbers with an uncertainty; also written in their places, as `{ value = 25, sd = 0.05 }`."""
+    uncertainty: Uncertainty = Uncertainty()
+    """The same of what is no number of a scene."""
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -217,6 +223,12 @@ class Scene(Model):
             return data
         return {**data, "camera": completed(camera, unit)}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _with_plain_numbers(cls, data: Any) -> Any:
+        """First of all: numbers that carry an uncertainty become plain ones, for whatever looks at them next."""
+        return taken_out(data) if isinstance(data, dict) else data
+
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         mesh = self.object if isinstance(self.object, Mesh) else None
@@ -228,6 +240,8 @@ class Scene(Model):
         check_names("filters", self.filters)
         _ = self.surfaces  # names of faces
         check_textures(self.textures, self.solid)
+        check_uncertain(self, self.uncertain)
+        self.uncertainty.check_once(self.uncertain)
         for i, setting in enumerate(self.settings):
             self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
             self.check_lights(setting.lights, f"settings[{i}].light")

@@ -1,4 +1,4 @@
-"""``python -m tests.proofs`` and one of conditions, crowded, kill, large, lights, parts, rate and uneven."""
+"""``python -m tests.proofs`` with conditions, crowded, kill, large, lights, parts, rate, stations or uneven."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.parts import parts
 from tests.proofs.rate import rate
+from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -22,6 +23,7 @@ app.command()(lights)
 app.command()(parts)
 app.command()(rate)
 app.command()(uneven)
+app.command()(stations)
 
 if __name__ == "__main__":
     app()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
-    from validation.conformity import decide
+    from planner.uncertainty.conformity import decide
 
     rows = []
     sigma, sigma_image = found.sigma, np.sqrt(np.einsum("mm->m", found.covariance_image))

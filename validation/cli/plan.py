@@ -25,7 +25,9 @@ commands = commands()
 _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 
-Objective = Annotated[str, typer.Option(help="object (the scene's unit, squared) or image (px^2)")]
+Objective = Annotated[
+    str, typer.Option(help="object (the scene's unit, squared), image (px^2), or capability (U over tolerance).")
+]
 Over = Annotated[str, typer.Option(help="Of several measurands: minimax (worst sigma / tolerance) or sum (weighted).")]
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
 Model = Annotated[str, typer.Option(help="calibrated or paper")]
@@ -135,6 +137,18 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
+    if objective == "capability":
+        from validation.cli import plan_capability
+
+        plan_capability.check_options({
+            "--over": (over, "minimax"), "--search": (search, "exhaustive"), "--model": (model, "calibrated"),
+            "--edges": (edges, "given"), "--start": (start, "40,41"), "--shares": (shares, "best"),
+            "--tolerance": (" ".join(tolerance or []), ""), "--check": (check, None), "--map": (map_file, None),
+            "--out": (out, None), "--views": (views, None), "--views-share": (views_share, None),
+        })  # fmt: skip
+        poses.pop("start")
+        plan_capability.run(loaded, {"step_deg": step, "constraints": limits} | poses, as_json)
+        return
     how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
     how["shares"] = shares
     count = 0 if no_check else _renders(loaded) if check is None else check

@@ -1,0 +1,49 @@
+"""What lines and circles that are off give as values to who believes the scene: not linear in how far they are off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from measure.features.layout import layout_of
+from measure.quantities import found_in_images, values
+from planner.features.kinds import on_plane
+from planner.features.measurand import measurands
+from planner.features.seen import unit_normals
+from planner.imaging.lens import image_centre
+from planner.imaging.pictures import Pictures
+from scenes import Picture
+
+
+def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
+    """Values of all M quantities in the object, shape (n, M).
+
+    Parameters
+    ----------
+    picture : Picture
+        As it is believed to be taken.
+    errors : ndarray, shape (n, 2 E + 3 C)
+        Of lines and circles, as numbered in `planner.features.seen`.
+
+    Returns
+    -------
+    ndarray
+        The scene's unit, or degrees; NaN where a feature that is needed is.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> picture = Picture.of(scenes.load("task1"), (30, 135), (15, 315))
+    >>> believed(picture, np.zeros((1, 8))).round(4).tolist()
+    [[14.5774]]
+    """
+    known, errors = measurands(Pictures.of(picture)), np.asarray(errors, float)
+    edges = len(known.view.names)
+    offset, turn = errors[:, 0 : 2 * edges : 2, None], errors[:, 1 : 2 * edges : 2, None]
+    along = np.broadcast_to(known.seen.along, (len(errors), edges, 2))
+    normal = np.broadcast_to(known.seen.normals, along.shape)
+    points = known.seen.start + offset * normal + image_centre(known.seen.camera)
+    turned = unit_normals(along + turn * np.linalg.norm(along, axis=-1, keepdims=True) * normal)
+    circles = errors[:, 2 * edges :].reshape(len(errors), -1, 3).swapaxes(0, 1)
+    seen = found_in_images(known, layout_of(picture), turned, points, circles)
+    none = np.zeros((len(errors), errors.shape[1], errors.shape[1]))
+    return values(seen, known.quantities, on_plane, none).value

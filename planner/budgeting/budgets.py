@@ -1,0 +1,155 @@
+"""The uncertainty budget of every measurand of a scene, in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from planner.budgeting.features import Features
+from planner.budgeting.sensitivities import sensitivities
+from planner.budgeting.sources import Source, sources
+from planner.budgeting.terms import EXPANSION, TEMPERATURE, Term, as_input, terms
+from planner.imaging.appearance import is_plain
+from planner.imaging.pictures import Pictures
+from planner.prediction import Prediction, predict
+from planner.uncertainty.budget import Budget
+from planner.uncertainty.budget import budget as combined
+from planner.uncertainty.groups import Group
+from planner.uncertainty.groups import Source as EngineInput
+from planner.uncertainty.ufloats import as_ufloats
+from scenes import InvalidInput, Picture, Scene
+
+CALIBRATION = "camera calibration"
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBudget:
+    """Budgets of all M measurands, and what they are made of.
+
+    Attributes
+    ----------
+    picture : Picture
+    prediction : Prediction
+    sources : tuple of Source
+        The n inputs that move what the picture shows.
+    sensitivities : ndarray, shape (M, n)
+        Derivatives of the values in the object by them.
+    terms : list of list of Term
+        Of each measurand, what is added beside.
+    measurands : tuple of Budget
+        In the scene's unit, or degrees.
+    """
+
+    picture: Picture
+    prediction: Prediction
+    sources: tuple[Source, ...]
+    sensitivities: np.ndarray
+    terms: list[list[Term]]
+    measurands: tuple[Budget, ...]
+
+    def __iter__(self) -> Iterator[Budget]:
+        return iter(self.measurands)
+
+    def __getitem__(self, name: str) -> Budget:
+        return next(each for each in self.measurands if each.name == name)
+
+    def ufloats(self) -> dict[str, Any]:
+        """Values as numbers of the `uncertainties` package by name; they share the station's inputs and temperature.
+
+        Noise, model error, fixed pattern and rounding are each measurand's own.
+        """
+        return as_ufloats(_with_own_terms(each, rows) for each, rows in zip(self, self.terms, strict=True))
+
+    @cached_property
+    def features(self) -> Features:
+        """The lines and circles of the picture, to be found in those of other stations."""
+        return Features(Pictures.of(self.picture))
+
+    @cached_property
+    def shared(self) -> tuple[EngineInput, ...]:
+        """The inputs of all measurands: single ones, and the calibration's as one group."""
+        return shared_inputs(self.picture.scene, self.sources)
+
+
+def budget(
+    scene: Scene | Picture,
+    sensor: Any = None,
+    light: Any = None,
+    *,
+    variances: np.ndarray | None = None,
+    biases: np.ndarray | None = None,
+    biased: bool | None = None,
+    p: float = 0.95,
+) -> SceneBudget:
+    """The uncertainty of every measurand in one picture: pixel noise and all that the scene says is not exact.
+
+    Parameters
+    ----------
+    scene : Scene or Picture
+    sensor, light : Pose or pair of float
+        Polar angle and azimuth, degrees; not with a picture, which has its own.
+    variances : ndarray, shape (M,), optional
+        Of the values by pixel noise, the scene's unit squared or degrees^2, where a picture tells them better than the
+        ``calibrated`` model.
+    biases : ndarray, shape (M,), optional
+        Of the values without noise, measured in a noise-free picture, in place of the predicted ones.
+    biased : bool, optional
+        Whether straight edges are found by the classic locators, whose bias the planner predicts; by default where
+        `measure.best_estimator` is one of them.
+    p : float
+        Coverage probability of the expanded uncertainties.
+
+    Raises
+    ------
+    InvalidInput
+        If a measurand cannot be measured there.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> task1 = scenes.load("task1")
+    >>> known = scenes.Uncertainty(sensor_distance=0.1)
+    >>> found = budget(task1.model_copy(update={"uncertainty": known}), (30, 135), (15, 315)).measurands[0]
+    >>> [row.source for row in found.contributions]
+    ['sensor_distance', 'pixel noise', 'model error']
+    """
+    picture = Picture.of(scene, sensor, light)
+    prediction = predict(picture)
+    for each in prediction.measurands:
+        if not np.isfinite(each.variance_object):
+            raise InvalidInput(f"{each.name} must be measurable for a budget, got {each.status} in this picture")
+    features = Features(Pictures.of(picture))
+    biased = not is_plain(picture.scene) if biased is None else biased
+    given = sources(picture.scene)
+    slopes = sensitivities(features, given, biased=biased)
+    noise = np.array([each.variance_object for each in prediction.measurands]) if variances is None else variances
+    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased)
+    inputs, budgets = shared_inputs(picture.scene, given), []
+    for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
+        told = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
+        told |= {row.name: row.sensitivity for row in rows}
+        whole = (*inputs, *(row.as_input for row in rows))
+        budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
+    return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
+
+
+def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:
+    """The same budget, the terms that are its own named after it."""
+    own = {row.name: f"{row.name} of {made.name}" for row in rows if row.name not in (TEMPERATURE, EXPANSION)}
+    sources = tuple(replace(s, name=own[s.name]) if s.name in own else s for s in made.sources)
+    slopes = {own.get(name, name): slope for name, slope in made.sensitivities.items()}
+    return combined(made.name, made.unit, made.value, sources, slopes, made.p)
+
+
+def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[EngineInput, ...]:
+    """The sources as the engine's inputs: single ones first, then those of the calibration as a group."""
+    names = () if scene.uncertainty.covariance is None else scene.uncertainty.covariance.names
+    single = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name not in names)
+    if not names:
+        return single
+    correlated = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name in names)
+    return (*single, Group(correlated, scene.uncertainty.covariance.correlation, CALIBRATION))

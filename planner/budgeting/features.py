@@ -1,0 +1,113 @@
+"""What a picture of another station does to the lines and circles that are found in it by who believes the scene.
+
+Every point of a feature is recorded elsewhere; the believed camera's model takes it back to ideal coordinates, and the
+least-squares line or circle through all points of the feature follows. It is found as the estimators find it: densely
+along the part of an edge that is used, weighted by contrast around a rim.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.budgeting.station import Station
+from planner.features.circles import Rim, rim
+from planner.features.locator import MIN_CONTRAST
+from planner.features.measurand import Measurands, measurands, normals
+from planner.features.rim_sides import equal_angles, outward_normals, radials
+from planner.imaging.lens import undistorted
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import edge_points, project_ideal
+from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """The lines and circles of one picture as the scene says it, ready to be found in pictures of other stations.
+
+    Attributes
+    ----------
+    pictures : Pictures
+        One picture.
+    """
+
+    pictures: Pictures
+
+    @cached_property
+    def known(self) -> Measurands:
+        """Values and derivatives by the features' errors."""
+        return measurands(self.pictures)
+
+    def errors(self, station: Station) -> np.ndarray:
+        """Errors of lines and circles, as numbered in `planner.features.seen`, shape (2 E + 3 C,).
+
+        Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
+        circle's centre in its plane and change of its radius (the scene's unit). NaN where a feature is not seen.
+        """
+        parts = [self._lines(station).ravel()]
+        parts += [self._circle(station, c) for c in range(len(self.known.circles))]
+        return np.concatenate(parts)
+
+    @cached_property
+    def _nodes(self) -> tuple[Nodes, np.ndarray]:
+        """Along the edges, and their points in space (E, n, 3)."""
+        view = self.known.view
+        nodes = place_nodes(self.pictures, view, used_trims(self.pictures, view, trimmed=True))
+        solid = self.pictures.scene.solid
+        return nodes, edge_points(solid, view.names, nodes.spatial[..., 1:-1])
+
+    def _lines(self, station: Station) -> np.ndarray:
+        """(d, tan theta) of each edge, shape (E, 2): of the line through the points where they are found."""
+        view = self.known.view
+        if not view.names:
+            return np.zeros((0, 2))
+        nodes, points = self._nodes
+        moved, normal = self._displaced(station, points), normals(view)
+        off = np.einsum("eni,ei->en", moved, normal)
+        tangent = np.stack([normal[:, 1], -normal[:, 0]], -1)
+        along = nodes.middle + nodes.t[..., 1:-1] + np.einsum("eni,ei->en", moved, tangent)
+        middle, mean = (part @ NODE_WEIGHTS / 2 for part in (along, off))
+        lever = along - middle[:, None]
+        turn = ((off * lever) @ NODE_WEIGHTS) / (lever**2 @ NODE_WEIGHTS)
+        return np.stack([mean - turn * middle, turn], -1)
+
+    @cached_property
+    def _rims(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (3, n)."""
+        found = []
+        for name in self.known.circles:
+            circle = self.pictures.scene.solid.circle(name)
+            seen = rim(self.pictures, circle)
+            angle = equal_angles(seen.design.shape[-2])
+            normal, _, _ = outward_normals(self.pictures, circle, angle)
+            points = circle.centre + circle.radius * radials(circle, angle)
+            found.append((points, normal, _fit(seen)))
+        return found
+
+    def _circle(self, station: Station, c: int) -> np.ndarray:
+        points, normal, fit = self._rims[c]
+        off = np.einsum("ni,ni->n", self._displaced(station, points), normal)
+        return fit @ off
+
+    def _displaced(self, station: Station, points: np.ndarray) -> np.ndarray:
+        """How far off points (..., 3) are found, ideal px of the believed camera, shape (..., 2)."""
+        flat, camera = points.reshape(-1, 3), self.pictures.scene.camera
+        found = undistorted(station.record(flat), camera) - project_ideal(flat, self.pictures.sensors, camera)
+        return found.reshape(*points.shape[:-1], 2)
+
+
+def _fit(seen: Rim) -> np.ndarray:
+    """Weighted least squares from offsets around a rim to its circle, (3, n); NaN where it is not found."""
+    ratio = seen.squared / seen.noise_variance
+    used = (seen.clear | seen.crowded[..., None]) & (ratio >= MIN_CONTRAST**2)
+    weight = np.where(used, ratio * seen.arc, 0.0)
+    size = np.sqrt(np.einsum("n,ni,ni->i", weight, seen.design, seen.design))
+    if not (size > 0).all():
+        return np.full((3, len(weight)), np.nan)
+    design = seen.design / size
+    gram = np.einsum("n,ni,nj->ij", weight, design, design)
+    if np.linalg.eigvalsh(gram)[0] < 1e-10:
+        return np.full((3, len(weight)), np.nan)
+    return np.linalg.solve(gram, (design * weight[:, None]).T) / size[:, None]

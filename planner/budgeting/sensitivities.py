@@ -1,0 +1,66 @@
+"""What each input does to the measured values: derivatives of what a picture evaluated as the scene says would give.
+
+A value is g(features(true station), believed scene). The features' errors by an input are central differences of the
+closed-form projection over 1e-5 of the input's own size, in which 1e-9 of them is lost; g is linear in small errors,
+and its derivative by them is exact (`planner.features.kinds`). No picture is rendered. An input that changes levels
+alone moves no feature; it changes the classic locators' bias, whose closed form is differenced over one standard
+uncertainty to both sides. What a geometric input does to that bias, a small part of a small part, is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.budgeting.features import Features
+from planner.budgeting.sources import Source
+from planner.budgeting.station import Station
+from planner.models.bias import bias
+
+_STEP = 1e-5  # of an input's scale
+
+
+def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool) -> np.ndarray:
+    """Derivatives of all M values in the object by n inputs, shape (M, n).
+
+    Parameters
+    ----------
+    features : Features
+    given : tuple of Source
+    biased : bool
+        Whether the values have the classic locators' bias, so that brightness counts.
+
+    Returns
+    -------
+    ndarray
+        The scene's unit, or degrees, for an input's unit; NaN where a quantity is not seen.
+    """
+    here = Station.nominal(features.pictures)
+    count = len(features.known.quantities)
+    columns = [
+        _by_geometry(features, here, each)
+        if each.kind == "geometry"
+        else _by_brightness(here, each)
+        if biased
+        else np.zeros(count)
+        for each in given
+    ]
+    return np.stack(columns, -1) if columns else np.zeros((count, 0))
+
+
+def _by_geometry(features: Features, here: Station, source: Source) -> np.ndarray:
+    step = _STEP * source.scale
+    ahead, behind = (features.errors(source.moved(here, sign * step)) for sign in (1, -1))
+    return pulled(features.known.gradient_object, (ahead - behind) / (2 * step))
+
+
+def pulled(gradient: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """gradient (M, q) . errors (q,), where only what a quantity depends on has to be known, shape (M,)."""
+    return np.where(gradient == 0, 0.0, gradient * np.where(gradient == 0, 0.0, errors)).sum(-1)
+
+
+def _by_brightness(here: Station, source: Source) -> np.ndarray:
+    step = source.told.u or 1e-3 * source.scale
+    if source.value != 0:
+        step = min(step, abs(source.value) / 2)
+    ahead, behind = (bias(source.moved(here, sign * step).pictures).values_object for sign in (1, -1))
+    return (ahead - behind) / (2 * step)

@@ -1,0 +1,151 @@
+"""The inputs of a scene that are uncertain: what each is called, how well it is known, what it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from planner.budgeting.station import Station
+from scenes import Scene, Uncertain
+from scenes.numbers import number_at, with_number
+
+Kind = Literal["geometry", "brightness"]
+_GEOMETRY = ("focal_px", "focal_length_mm", "pixel_pitch_um", "distance", "working_distance_mm", "look_at",
+             "lens.distortion")  # fmt: skip
+_UNITS = {
+    "focal_px": "px", "focal_length_mm": "mm", "pixel_pitch_um": "um", "working_distance_mm": "mm", "blur_px": "px",
+    "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
+}  # fmt: skip
+_LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
+
+
+@dataclass(frozen=True)
+class Source:
+    """One uncertain input of a station.
+
+    Attributes
+    ----------
+    name : str
+        A key of the scene, or of its table ``uncertainty`` with the component: ``part_shift.x``.
+    value : float
+        What it is believed to be; 0 for a deviation.
+    told : Uncertain
+        How well it is known.
+    unit : str
+        Empty for a pure number.
+    kind : {"geometry", "brightness"}
+        Whether it moves places in the image, or levels alone.
+    scale : float
+        Size of a change that is small to it: what derivatives are taken over.
+    moved : callable
+        The station with this input changed by a step.
+    """
+
+    name: str
+    value: float
+    told: Uncertain
+    unit: str
+    kind: Kind
+    scale: float
+    moved: Callable[[Station, float], Station]
+
+
+def sources(scene: Scene) -> tuple[Source, ...]:
+    """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
+    return (*_numbers(scene), *_poses(scene), *_calibrated(scene))
+
+
+def _numbers(scene: Scene) -> Iterator[Source]:
+    for each in scene.uncertain:
+        value = number_at(scene, each.key)
+        name = each.key.split("[")[0].split(".", 1)[1]
+        kind: Kind = "geometry" if each.key.startswith("camera.") and name in _GEOMETRY else "brightness"
+        last = name.rsplit(".", 1)[-1]
+        unit = scene.units if last in _LENGTHS else _UNITS.get(last, "deg" if last.endswith("_deg") else "")
+        scale = 1e-2 if name == "lens.distortion" else abs(value) or 1.0
+        if last == "look_at":
+            scale = scene.camera.distance
+        yield Source(each.key, value, each, unit, kind, scale, _number_moved(each.key))
+
+
+def _number_moved(key: str) -> Callable[[Station, float], Station]:
+    def moved(station: Station, step: float) -> Station:
+        return replace(station, scene=with_number(station.scene, key, number_at(station.scene, key) + step))
+
+    return moved
+
+
+def _poses(scene: Scene) -> Iterator[Source]:
+    said, near = scene.uncertainty, scene.camera.distance
+    told = _or_jitter(said.sensor_deg, scene.jitter.sensor_deg)
+    for i, part in enumerate(("polar", "azimuth")):
+        yield from _one(f"sensor_deg.{part}", told, "deg", "geometry", 1.0, lambda s, d, i=i: s.sensor_moved(d, i))
+    told = _or_jitter(said.light_deg, scene.jitter.light_deg)
+    for k in scene.free:
+        label = f"light_deg[{k}]" if len(scene.lights) > 1 else "light_deg"
+        for i, part in enumerate(("polar", "azimuth")):
+            move = _light_moved(k, i)
+            yield from _one(f"{label}.{part}", told, "deg", "brightness", 1.0, move)
+    yield from _one("sensor_roll_deg", said.sensor_roll_deg, "deg", "geometry", 1.0,
+                    lambda s, d: replace(s, roll_deg=s.roll_deg + d))  # fmt: skip
+    yield from _one("sensor_distance", said.sensor_distance, scene.units, "geometry", near,
+                    _number_moved("camera.distance"))  # fmt: skip
+    for i, axis in enumerate("xyz"):
+        yield from _one(f"part_shift.{axis}", said.part_shift, scene.units, "geometry", near, _tuple_moved("shift", i))
+    for i, axis in enumerate("xyz"):
+        yield from _one(
+            f"part_tilt_deg.{axis}", said.part_tilt_deg, "deg", "geometry", 1.0, _tuple_moved("tilt_deg", i)
+        )
+    for i, axis in enumerate("xy"):
+        move = _tuple_moved("principal_px", i)
+        yield from _one(f"principal_point_px.{axis}", said.principal_point_px, "px", "geometry", 100.0, move)
+
+
+def _calibrated(scene: Scene) -> Iterator[Source]:
+    """The parameters of a calibration's covariance; ``fx`` alone stands for both focal lengths."""
+    given = scene.uncertainty.covariance
+    if given is None:
+        return
+    camera = scene.camera
+    for name, sd in zip(given.names, given.sd, strict=True):
+        told = Uncertain(sd=float(sd))
+        if name in ("fx", "fy"):
+            both = "fy" not in given.names
+            move = _stretched(camera.focal_px, (0, 1) if both else (int(name == "fy"),))
+            yield Source(name, camera.focal_px, told, "px", "geometry", camera.focal_px, move)
+        elif name in ("cx", "cy"):
+            move = _tuple_moved("principal_px", int(name == "cy"))
+            yield Source(name, 0.0, told, "px", "geometry", 100.0, move)
+        else:
+            place = ("k1", "k2", "p1", "p2", "k3").index(name)
+            move = _number_moved(f"camera.lens.distortion[{place}]")
+            yield Source(name, camera.lens.coefficients[place], told, "", "geometry", 1e-2, move)
+
+
+def _stretched(focal: float, axes: tuple[int, ...]) -> Callable[[Station, float], Station]:
+    def moved(station: Station, step: float) -> Station:
+        for axis in axes:
+            station = station.changed("stretch", axis, step / focal)
+        return station
+
+    return moved
+
+
+def _tuple_moved(name: str, which: int) -> Callable[[Station, float], Station]:
+    return lambda station, step: station.changed(name, which, step)
+
+
+def _light_moved(light: int, which: int) -> Callable[[Station, float], Station]:
+    return lambda station, step: station.light_moved(light, step, which)
+
+
+def _one(
+    name: str, told: Uncertain | None, unit: str, kind: Kind, scale: float, moved: Callable[[Station, float], Station]
+) -> Iterator[Source]:
+    if told is not None:
+        yield Source(name, 0.0, told, unit, kind, scale, moved)
+
+
+def _or_jitter(told: Uncertain | None, jitter: float) -> Uncertain | None:
+    return Uncertain(sd=jitter) if told is None and jitter > 0 else told

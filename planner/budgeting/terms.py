@@ -1,0 +1,132 @@
+"""What adds to a measured value beside the station's inputs: pixel noise, fixed pattern, model error, temperature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.features.measurand import Measurands, measurands
+from planner.forecast import Forecast
+from planner.imaging.appearance import side_signals
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import edge_points
+from planner.models import variance_model
+from planner.models.bias import MOST
+from planner.uncertainty.inputs import Input, Kind
+from scenes import Centre, Noise, Scene, Uncertain
+
+NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error", "rounding"
+TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
+_LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
+
+
+@dataclass(frozen=True)
+class Term:
+    """One addend of a measured value.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        What its input is believed to be.
+    told : Uncertain
+        How well that is known.
+    unit : str
+    sensitivity : float
+        Derivative of the value by the input.
+    kind : {"noise", "systematic"}
+        Whether it differs from picture to picture, or stays.
+    """
+
+    name: str
+    value: float
+    told: Uncertain
+    unit: str
+    sensitivity: float
+    kind: Kind = "systematic"
+
+    @property
+    def as_input(self) -> Input:
+        """The engine's."""
+        return as_input(self.name, self.value, self.told, self.unit, self.kind)
+
+
+def as_input(name: str, value: float, told: Uncertain, unit: str, kind: Kind = "systematic") -> Input:
+    """One input of the engine, from how well it is known."""
+    return Input(name, value, told.u, told.distribution_name, told.dof or np.inf, told.type, unit, kind)
+
+
+def terms(
+    pictures: Pictures,
+    forecasts: tuple[Forecast, ...],
+    variances: np.ndarray,
+    biases: np.ndarray | None = None,
+    *,
+    biased: bool,
+) -> list[list[Term]]:
+    """Of each of M quantities.
+
+    Parameters
+    ----------
+    forecasts : tuple of Forecast
+        What is predicted of the quantities.
+    variances : ndarray, shape (M,)
+        Of the values by pixel noise, the scene's unit squared or degrees^2.
+    biases : ndarray, shape (M,), optional
+        Of the values, where a noise-free picture tells them.
+    biased : bool
+        Whether straight edges have the classic locators' bias.
+    """
+    scene, known = pictures.scene, measurands(pictures)
+    pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
+    found = []
+    for m, each in enumerate(forecasts):
+        noise = float(np.sqrt(variances[m]))
+        rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
+        limit = _model_error(known, m, each, noise, biased) if biases is None else abs(float(biases[m]))
+        rows.append(Term(MODEL, 0.0, Uncertain(half_width=limit), each.unit, 1.0))
+        if pattern[m] > 0:
+            rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
+        found.append(rows + _stated(scene, each))
+    return found
+
+
+def _model_error(known: Measurands, m: int, each: Forecast, sigma: float, biased: bool) -> float:
+    """Largest error of the estimator's model: the predicted bias, or where no formula tells it what `ok` allows."""
+    circular = any(isinstance(feature, Centre) for feature in known.quantities[m].features)
+    if biased and not circular and np.isfinite(each.bias_object):
+        return abs(each.bias_object)
+    return MOST * sigma
+
+
+def _stated(scene: Scene, each: Forecast) -> list[Term]:
+    """Rounding and temperature, as the scene says them."""
+    said, angle = scene.uncertainty, each.unit == "degrees"
+    step = said.rounding_deg if angle else said.rounding
+    rows = [Term(ROUNDING, 0.0, Uncertain(half_width=step / 2), each.unit, 1.0)] if step > 0 else []
+    if angle or said.expansion_per_K is None:
+        return rows
+    excess = said.temperature_K or Uncertain(sd=0.0)
+    away, per_k = excess.value or 0.0, said.expansion_per_K.value
+    rows.append(Term(TEMPERATURE, away, excess, "K", -each.value_object * per_k))
+    rows.append(Term(EXPANSION, per_k, said.expansion_per_K, "1/K", -each.value_object * away))
+    return rows
+
+
+def _pattern(pictures: Pictures, known: Measurands) -> np.ndarray:
+    """Standard uncertainty by the fixed pattern, (M,): what noise of that size does, once, and then in all pictures.
+
+    Its part that grows with the level is taken at the root mean square level beside the straight edges, or at the level
+    of a white surface where there are none.
+    """
+    scene, noise = pictures.scene, pictures.scene.noise
+    if noise.prnu == 0 and noise.dsnu == 0:
+        return np.zeros(len(known.quantities))
+    signal = scene.camera.exposure
+    if known.view.names:
+        sides = side_signals(pictures, known.view.names, edge_points(scene.solid, known.view.names, _LOOKED))
+        signal = float(np.sqrt(np.nanmean(np.square(sides))))
+    still = Noise(sigma=float(np.hypot(noise.dsnu, noise.prnu * signal)), dark_level=noise.dark_level)
+    changed = Pictures(scene.model_copy(update={"noise": still}), pictures.sensors, pictures.lights, pictures.closely)
+    return np.sqrt(variance_model("calibrated")(changed).variances_object)

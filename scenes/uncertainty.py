@@ -1,0 +1,104 @@
+"""What is not exactly as a scene says and is no number of it: poses as they are set, temperature, rounding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, ValidationInfo, model_validator
+
+from scenes.covariance import ORDER, Covariance, of_document
+from scenes.model import Model
+from scenes.ranges import NotNegative
+from scenes.uncertain import Uncertain, UncertainNumber
+
+
+def _or_sd(value: Any) -> Any:
+    """A number alone is a standard uncertainty."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"sd": value} if number else value
+
+
+def _read(value: Any, info: ValidationInfo) -> Any:
+    return value if value is None else of_document(value, (info.context or {}).get("directory", Path()))
+
+
+Deviation = Annotated[
+    Uncertain | None, BeforeValidator(_or_sd, json_schema_input_type=float | Uncertain | None)
+]  # 0 is expected, or what its value says
+
+
+_SAME = {
+    "camera.focal_px": ("fx", "fy"), "camera.focal_length_mm": ("fx", "fy"), "camera.pixel_pitch_um": ("fx", "fy"),
+    **{f"camera.lens.distortion[{i}]": (name,) for i, name in enumerate(ORDER[4:])},
+}  # fmt: skip
+_WITH_VALUE = ("temperature_K", "expansion_per_K")
+
+
+class Uncertainty(Model):
+    """Standard uncertainties of what is no number of the scene; a number alone is one, a table says more.
+
+    Each is a deviation from what the scene says, whose expectation is 0.
+    """
+
+    sensor_deg: Deviation = None
+    """Of the sensor's place on its sphere, along the meridian and, independently, along the circle of latitude; that of
+    ``jitter`` where not given [degrees]."""
+    sensor_roll_deg: Deviation = None
+    """Of the sensor's turn about its own axis [degrees]."""
+    sensor_distance: Deviation = None
+    """Of the sensor's distance from ``look_at`` [length]."""
+    light_deg: Deviation = None
+    """Of every free light's place, in both directions as the sensor's; that of ``jitter`` where not given [degrees]."""
+    part_shift: Deviation = None
+    """Of the part's place, along x, y and z independently [length]."""
+    part_tilt_deg: Deviation = None
+    """Of its turns about axes through ``look_at`` along x, y and z, independently [degrees]."""
+    principal_point_px: Deviation = None
+    """Of the place at which the optical axis meets the sensor, along x and y independently [px]."""
+    temperature_K: Deviation = None  # noqa: N815 - the unit
+    """Of the part less 20 degrees Celsius; its value is corrected for [K]."""
+    expansion_per_K: Deviation = None  # noqa: N815
+    """Coefficient of linear thermal expansion of the part; give its value too [1/K]."""
+    fixed_pattern: bool = True
+    """Whether the fixed pattern that ``noise.prnu`` and ``noise.dsnu`` tell of counts."""
+    rounding: NotNegative = 0.0
+    """Step to which lengths are rounded when they are reported [length]."""
+    rounding_deg: NotNegative = 0.0
+    """Step to which angles are rounded [degrees]."""
+    process_sd: NotNegative | None = None
+    """Standard deviation with which the manufacture scatters, for risks [length]."""
+    covariance: Annotated[Covariance | None, BeforeValidator(_read, json_schema_input_type=str | Covariance | None)] = (
+        None
+    )
+    """Of a camera calibration: a file's name, relative to the scene's file, or names and matrix."""
+
+    @model_validator(mode="after")
+    def _deviations(self) -> Uncertainty:
+        for name in type(self).model_fields:
+            given = getattr(self, name)
+            if isinstance(given, Uncertain) and given.value and name not in _WITH_VALUE:
+                raise ValueError(f"{name}.value must be 0, as of every deviation, got {given.value:g}")
+        if self.expansion_per_K is not None and self.expansion_per_K.value is None:
+            raise ValueError("expansion_per_K.value must be given, got nothing")
+        return self
+
+    def check_once(self, numbers: tuple[UncertainNumber, ...]) -> None:
+        """See that the calibration's covariance and the other uncertainties are about different things.
+
+        Raises
+        ------
+        ValueError
+            If not.
+        """
+        names = () if self.covariance is None else self.covariance.names
+        for each in numbers:
+            twice = [name for name in _SAME.get(each.key, ()) if name in names]
+            if twice:
+                raise ValueError(
+                    f"{each.key} must be without an uncertainty where the covariance has {twice[0]}, got one"
+                )
+        if self.principal_point_px is not None and {"cx", "cy"} & set(names):
+            raise ValueError(
+                "uncertainty.principal_point_px must be left out where the covariance has cx or cy, got it"
+            )

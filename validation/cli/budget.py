@@ -1,0 +1,135 @@
+"""``ice budget``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import scenes
+from validation.cli.common import Json, SceneName, Seed, check_number, check_seed, commands, parse_pose, parse_poses
+from validation.cli.outputs import check_directory, check_file
+from validation.defaults import DEFAULT_SEED
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    from planner.budgeting.budgets import SceneBudget
+    from planner.uncertainty.budget import Budget
+
+commands = commands()
+_MOST_DRAWS, _FEWEST_PICTURES, _MOST_PICTURES = 10_000_000, 50, 100_000
+
+Pair = Annotated[
+    str | None, typer.Option(metavar="P,A", help="Polar angle and azimuth; the first setting's if left out.")
+]
+
+
+@commands.command("budget")
+def budget_command(
+    scene: SceneName,
+    sensor: Pair = None,
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
+    p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95,
+    render: Annotated[bool, typer.Option("--render", help="Pixel noise and bias from a rendered picture.")] = False,
+    monte_carlo: Annotated[
+        bool, typer.Option("--monte-carlo", help="Draw all inputs, and compare as JCGM 101 clause 8 asks.")
+    ] = False,
+    stations: Annotated[
+        int, typer.Option(metavar="N", help="Measure pictures of N drawn stations, too; plain scenes only.")
+    ] = 0,
+    reach: Annotated[
+        float | None, typer.Option(metavar="U", help="Which input would have to be how well known for this U?")
+    ] = None,
+    csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write budget.json, budget.csv and budget.png.")
+    ] = None,
+    seed: Seed = DEFAULT_SEED,
+    as_json: Json = False,
+) -> None:
+    """The uncertainty of every measurand: each source, its share, and the expanded uncertainty."""
+    check_number("--p", p, 0.5, 0.9999)
+    check_number("--stations", stations, 0, _MOST_PICTURES)
+    if 0 < stations < _FEWEST_PICTURES:
+        raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {stations}")
+    if reach is not None and not (reach > 0 and math.isfinite(reach)):
+        raise scenes.InvalidInput(f"--reach must be greater than 0, got {reach}")
+    check_seed(seed)
+    check_file("--csv", csv_file, ".csv")
+    check_directory("--out", out)
+    poses = _poses(sensor, light)
+    loaded = scenes.load(scene)
+    from validation import budgets
+
+    picture = _picture(loaded, *poses)
+    found = budgets.budget_of(picture, p, rendered=render)
+    drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
+    shown = budgets.pictured(found, stations, seed) if stations else None
+    facts = budgets.facts(found, drawn, shown, reach)
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "budget.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
+        write_csv(found, out / "budget.csv")
+        from validation.report import budget_figure
+
+        budget_figure.draw(found.measurands, out / "budget.png")
+    if csv_file:
+        write_csv(found, csv_file)
+    if as_json:
+        print(json.dumps(facts, indent=1))
+        return
+    _show(found, drawn, shown, reach)
+    if out:
+        console().print(f"budget.json, budget.csv and budget.png: {out}", highlight=False)
+
+
+def _poses(sensor: str | None, light: str | None) -> tuple[Any, Any]:
+    return None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
+
+
+def _picture(scene: scenes.Scene, sensor: Any, light: Any) -> scenes.Picture:
+    """Of the poses that are given, the others as in the scene's first setting."""
+    first = scene.settings[0] if scene.settings else None
+    if first is None and (sensor is None or (light is None and scene.free)):
+        raise scenes.InvalidInput("--sensor and --light must be given for a scene without settings, got none")
+    sensor = first.sensor if sensor is None else sensor
+    light = first.light if light is None and first is not None else light
+    return scenes.Picture.of(scene, sensor, () if light is None else light)
+
+
+def write_csv(found: SceneBudget, path: Path) -> None:
+    """One row a measurand and contribution."""
+    rows = [{"measurand": each.name, "unit": each.unit, **row} for each in found for row in each.as_rows()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: float | None) -> None:
+    from validation import budgets
+    from validation.report import budget_table
+
+    terminal = console()
+    for each, quantity in zip(found, found.picture.scene.quantities, strict=True):
+        terminal.print(budget_table.table(each))
+        terminal.print(f" {budget_table.summary(each)}", highlight=False)
+        for line in _further(found, each, drawn, reach):
+            terminal.print(f" {line}", highlight=False)
+        terminal.print(f" {budget_table.sentence(each, quantity.kind)}\n", style="bold", highlight=False)
+    if shown:
+        for line in budgets.said_of_pictures(shown):
+            terminal.print(line, highlight=False)
+
+
+def _further(found: SceneBudget, each: Budget, drawn: list[dict], reach: float | None) -> list[str]:
+    from validation import budgets
+
+    lines = [budgets.said_of_draws(row) for row in drawn if row["name"] == each.name]
+    lines += budgets.said_of_tolerance(found, each)
+    lines += budgets.said_of_improvement(each)
+    return lines + (budgets.said_of_reach(each, reach) if reach is not None else [])

@@ -1,0 +1,101 @@
+"""``ice plan --objective capability``: the poses of the smallest expanded uncertainty against the tolerance."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import TYPE_CHECKING
+
+import scenes
+from validation.cli.common import progress
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    from planner.budgeting.plans import CapabilityPlan, Placed
+
+
+def check_options(others: dict[str, tuple[object, object]]) -> None:
+    """See that options that this objective has no use for say nothing.
+
+    Parameters
+    ----------
+    others : dict
+        Of each such option its value, and the value that says nothing.
+    """
+    for option, (value, none) in others.items():
+        if value != none:
+            raise scenes.InvalidInput(f"{option} must be left out with --objective capability, got {value}")
+
+
+def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
+    """Plan and show."""
+    from planner.budgeting.plans import STEP_DEG, plan_capability
+
+    began = time.perf_counter()
+    step = how.pop("step_deg") or STEP_DEG
+    with progress(f"{scene.name}: searching", "steps") as shown:
+        found = plan_capability(scene, step_deg=step, **how, report=shown or (lambda *_: None))
+    seconds = time.perf_counter() - began
+    if as_json:
+        print(json.dumps(facts(scene, found, step, seconds), indent=1))
+        return
+    from rich.table import Table
+
+    shown_on = console()
+    table = Table(
+        title=f"{scene.title or scene.name}: poses of the smallest worst U / T", title_justify="left", box=None
+    )
+    for name in ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T"):
+        table.add_column(name, no_wrap=True)
+    for words, placed in (("U / T", found.best), ("noise alone", found.quiet)):
+        for row in _rows(placed):
+            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.3f}"
+            numbers = (f"{row[key]:.3g}" for key in ("repeatability", "u", "U"))
+            table.add_row(
+                words, str(placed.sensor), scenes.shown(scenes.pairs(placed.light)), row["name"], *numbers, ratio
+            )
+    shown_on.print(table)
+    shown_on.print(f"T: half of the tolerance zone. {_guarantee(found, step)}. {seconds:.1f} s.", highlight=False)
+
+
+def facts(scene: scenes.Scene, found: CapabilityPlan, step: float, seconds: float) -> dict:
+    """Everything for JSON."""
+    return {
+        "scene": scene.name,
+        "objective": "capability",
+        **_placed(found.best),
+        "noise_alone": _placed(found.quiet),
+        "pairs": found.pairs,
+        "guarantee": _guarantee(found, step),
+        "seconds": seconds,
+    }
+
+
+def _guarantee(found: CapabilityPlan, step: float) -> str:
+    return f"No pair of the {step:g} degree grid ({found.pairs} pairs) is better by noise and places in the image"
+
+
+def _placed(placed: Placed) -> dict:
+    rows = _rows(placed)
+    return {
+        "sensor": list(placed.sensor),
+        "light": scenes.pairs(placed.light),
+        "worst_ratio": max((row["ratio"] for row in rows if row["ratio"] is not None), default=None),
+        "measurands": rows,
+    }
+
+
+def _rows(placed: Placed) -> list[dict]:
+    pairs = zip(placed.budget.measurands, placed.budget.prediction.measurands, strict=True)
+    return [
+        {
+            "name": each.name,
+            "unit": each.unit,
+            "repeatability": each.repeatability,
+            "u": each.u,
+            "U": each.U,
+            "k": each.k,
+            "ratio": None if told.tolerance is None else each.U / told.tolerance.half,
+        }
+        for each, told in pairs
+    ]

@@ -1,0 +1,72 @@
+"""Uncertainty budgets for a terminal: one table a measurand, and the sentence that is signed."""
+
+from __future__ import annotations
+
+import math
+
+from rich.table import Table
+
+from planner.uncertainty.budget import Budget
+
+_CAPTION = "contribution = |sensitivity| u; share of u_c^2; A: from observations or the noise model, B: otherwise."
+
+_LEAST = 5e-4  # of the variance: sources below are one row
+
+
+def table(budget: Budget) -> Table:
+    """All contributions to one measurand, the largest first."""
+    shown = Table(
+        title=f"{budget.name} [{budget.unit}]", title_justify="left", title_style="bold", box=None, padding=(0, 1),
+        caption=_CAPTION, caption_justify="left",
+    )  # fmt: skip
+    for name in ("source", "u", "sensitivity", "contribution", "share", "type", "dof"):
+        shown.add_column(name, justify="left" if name in ("source", "type") else "right", no_wrap=True)
+    rows = sorted(budget.contributions, key=lambda row: -row.share)
+    for row in rows:
+        if row.share < _LEAST:
+            break
+        dof = "-" if math.isinf(row.dof) else f"{row.dof:.0f}"
+        numbers = f"{row.u:.3g}", _sensitivity(row.sensitivity), f"{row.contribution:.3g}", f"{100 * row.share:.1f} %"
+        shown.add_row(row.source, *numbers, row.type, dof)
+    if rest := [row for row in rows if row.share < _LEAST]:
+        together = math.hypot(*(row.contribution for row in rest))
+        share = sum(row.share for row in rest)
+        shown.add_row(f"{len(rest)} others", "", "", f"{together:.3g}", f"{100 * share:.2f} %", "", "")
+    return shown
+
+
+def _sensitivity(value: float | None) -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{value:.3g}"
+
+
+def summary(budget: Budget) -> str:
+    """Its sum, and repeatability and accuracy apart."""
+    dof = "infinite" if math.isinf(budget.dof) else f"{budget.dof:.0f}"
+    return (
+        f"u_c = {budget.u:.3g}, dof_eff = {dof}, k = {budget.k:.3g}, U = {budget.U:.3g} {budget.unit}"
+        f" ({100 * budget.p:g} %); repeatability u = {budget.repeatability:.3g}, accuracy u = {budget.accuracy:.3g}"
+    )
+
+
+def sentence(budget: Budget, kind: str) -> str:
+    """What is signed: value and expanded uncertainty, to two digits of it.
+
+    Parameters
+    ----------
+    budget : Budget
+    kind : str
+        Of the measurand.
+    """
+    places = decimals(budget.U)
+    what = kind if budget.name == kind else f"{kind} {budget.name!r}"
+    unit = budget.unit
+    return f"The {what} is {budget.value:.{places}f} {unit} +- {budget.U:.{places}f} {unit}, k = {budget.k:.1f}"
+
+
+def decimals(uncertainty: float) -> int:
+    """Decimal places that show two digits of an uncertainty.
+
+    >>> decimals(0.0058), decimals(0.012), decimals(3.0)
+    (4, 3, 1)
+    """
+    return 4 if not uncertainty > 0 else max(0, min(12, 1 - math.floor(math.log10(uncertainty))))

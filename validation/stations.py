@@ -1,0 +1,54 @@
+"""Simulated stations: inputs drawn, a picture of each draw, measured as the scene says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+import measure
+from planner.budgeting.station import Station
+from planner.imaging.appearance import is_plain
+from planner.imaging.arrangement import arrangement_of
+from planner.imaging.blurred import BlurredModel
+from planner.imaging.lens import undistorted
+from scenes import InvalidInput, Picture
+
+
+def clean_image(station: Station) -> np.ndarray:
+    """The noise-free picture of a station, shape (height, width), grey levels, by the closed form of plain scenes.
+
+    Vertices lie exactly where the station records them; along bent edges the middle of a lens that is off counts as
+    centred. What a tilt of the part does to its brightness is left out.
+
+    Raises
+    ------
+    InvalidInput
+        If things hide or shade each other in the scene, or it is not alone before darkness.
+    """
+    scene = station.scene
+    if not is_plain(scene):
+        raise InvalidInput(f"scene must be one convex body before darkness for simulated pictures, got {scene.name}")
+    camera = scene.camera
+    there = arrangement_of(station.pictures)
+    there = replace(there, vertices=undistorted(station.record(scene.bodies.vertices), camera))
+    y, x = (part.ravel() for part in np.mgrid[: camera.height, : camera.width])
+    model = BlurredModel(there, x, y, np.arange(0))
+    return model.image(model.start()).reshape(camera.height, camera.width) + scene.noise.dark_level
+
+
+def measured(
+    stations: list[Station], picture: Picture, rng: np.random.Generator, estimator: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values (n, M) measured in one noisy picture of each station by who believes the scene, and statuses (n, M).
+
+    Each station's sensor has a fixed pattern of its own.
+    """
+    from render.sensor import expose
+
+    images = []
+    for station in stations:
+        noise = station.scene.noise.model_copy(update={"pattern_seed": int(rng.integers(2**31))})
+        images.append(expose(clean_image(station), noise, rng, 1)[0])
+    found = measure.measure(np.stack(images), picture, estimator=estimator)
+    return found.value, found.status
