@@ -13,9 +13,9 @@ from planner.search.aim import Aim
 from planner.search.exhaustive import evaluate_pairs, exhaustive
 from planner.search.separable import separable
 from planner.search.viewing import ViewingSpace
+from planner.uncertainty.conformity import decide
 from scenes import InvalidInput, Tolerance
 from validation import statistics
-from planner.uncertainty.conformity import decide
 
 V3, V6 = {"vertex": "v3", "edges": ["e4", "e9"]}, {"vertex": "v6", "edges": ["e7", "e11"]}
 DIAGONAL = {"name": "diagonal", "kind": "distance", "features": [V3, V6], "tolerance": 0.02}
