@@ -171,16 +171,16 @@ def test_monte_carlo_of_a_linear_model():
 
 
 def test_monte_carlo_keeps_its_tolerance():
-    """Of 60 runs the results lie within the numerical tolerance in nearly all; a fixed block does not."""
+    """Nearly all of 60 runs have all results within the numerical tolerance; two small blocks have not."""
     inputs = [Input(f"X{k}", 0, 1.0) for k in range(4)]
 
     def total(x):
         return sum(x.values())
 
-    runs = [monte_carlo(total, inputs, seed, block=2000, digits=2) for seed in range(60)]
+    runs = [monte_carlo(total, inputs, seed) for seed in range(60)]
     assert all(each.converged for each in runs)
     wrong = [max(abs(each.u - 2), abs(each.y), abs(each.symmetric[1] - 3.92)) > 0.05 for each in runs]
-    assert np.mean(wrong) <= 0.15
+    assert np.mean(wrong) <= 0.1
     short = [monte_carlo(total, inputs, seed, block=200, most=400) for seed in range(60)]
     assert np.mean([max(abs(each.u - 2), abs(each.y)) > 0.05 for each in short]) > 0.5
 
