@@ -17,6 +17,7 @@ from tests.proofs.stations import coverage
 from tests.system.test_cli import ice
 from validation import budgets
 from validation.chain import Chain
+from validation.report import budget_section
 
 
 @lru_cache
@@ -147,3 +148,11 @@ def test_bad_options(arguments, text) -> None:
     done = ice("budget", "calibrated_rig", *arguments)
     assert done.returncode == 2
     assert text in done.stderr
+
+
+def test_the_report_has_budgets_of_scenes_that_state_uncertainties() -> None:
+    (found,) = budget_section.budgets_of((scenes.load("task1"), scenes.load("calibrated_rig")))
+    rows = budget_section.cells(found.measurands[0])
+    assert rows[0][0] == "camera.focal_px"
+    assert len(rows) == len(found.measurands[0].contributions)
+    assert "The distance 'diagonal' is 14.5774 cm +- 0.0065 cm, k = 2.0." in budget_section.note(found, 0)
