@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -83,16 +84,18 @@ def _reasons(gum: Budget, mc: MonteCarlo, delta: float) -> list[str]:
         shape = single[row.source].distribution if row.source in single else "normal"
         if row.share >= _DOMINANT and shape != "normal":
             reasons.append(f"{row.source} ({shape}) has {100 * row.share:.0f} % of the variance")
-    if abs(mc.y - gum.value) > delta:
+    if abs(mc.y - gum.value) > max(delta, 3 * mc.spread[0]):
         reasons.append(f"nonlinear: the mean of the draws is {mc.y - gum.value:+.2g} from the value")
     drawn = _drawn_u(gum)
-    if abs(mc.u - drawn) > delta:
+    if math.isfinite(drawn) and abs(mc.u - drawn) > max(delta, 3 * mc.spread[1]):
         reasons.append(f"nonlinear: the draws' standard deviation is {mc.u:.2g}, first order gives {drawn:.2g}")
     if abs(drawn - gum.u) > delta:
         reasons.append(f"few degrees of freedom: the distributions' standard deviation is {drawn:.2g}, not {gum.u:.2g}")
     low, high = mc.symmetric
     if abs(high + low - 2 * mc.y) > 2 * delta:
         reasons.append("the distribution of the draws is not symmetric")
+    if mc.failed:
+        reasons.append(f"{mc.failed} of {mc.draws + mc.failed} draws gave no value")
     return reasons or ["the distribution of the draws is neither normal nor Student's t"]
 
 

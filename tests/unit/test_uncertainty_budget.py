@@ -171,16 +171,16 @@ def test_monte_carlo_of_a_linear_model():
 
 
 def test_monte_carlo_keeps_its_tolerance():
-    """Of 60 runs the results lie within the numerical tolerance in nearly all; a fixed block does not."""
+    """Nearly all of 60 runs have all results within the numerical tolerance; two small blocks have not."""
     inputs = [Input(f"X{k}", 0, 1.0) for k in range(4)]
 
     def total(x):
         return sum(x.values())
 
-    runs = [monte_carlo(total, inputs, seed, block=2000, digits=2) for seed in range(60)]
+    runs = [monte_carlo(total, inputs, seed) for seed in range(60)]
     assert all(each.converged for each in runs)
     wrong = [max(abs(each.u - 2), abs(each.y), abs(each.symmetric[1] - 3.92)) > 0.05 for each in runs]
-    assert np.mean(wrong) <= 0.15
+    assert np.mean(wrong) <= 0.1
     short = [monte_carlo(total, inputs, seed, block=200, most=400) for seed in range(60)]
     assert np.mean([max(abs(each.u - 2), abs(each.y)) > 0.05 for each in short]) > 0.5
 
@@ -200,6 +200,15 @@ def test_several_measurands_share_their_draws():
     assert both[0].draws == both[1].draws
 
 
+def test_all_measurands_have_to_be_stable():
+    """A heavy tail needs more draws than the normal measurand beside it, and both get them."""
+    inputs = [Input("x", 0, 1.0), Input("tail", 0, 1.0, "t", dof=5)]
+    both = monte_carlo_all(lambda d: np.stack([d["x"], d["tail"]], 1), ("x", "tail"), inputs, 2, block=2000)
+    alone = monte_carlo(lambda d: d["x"], inputs, 2, block=2000)
+    assert all(each.converged for each in both)
+    assert both[0].draws == both[1].draws > alone.draws
+
+
 def test_failed_draws_are_counted():
     def model(x):
         return np.where(x["x"] > 2, np.nan, x["x"])
@@ -207,6 +216,8 @@ def test_failed_draws_are_counted():
     drawn = monte_carlo(model, [Input("x", 0, 1)], 1)
     assert drawn.failed / (drawn.failed + drawn.draws) == pytest.approx(stats.norm.sf(2), abs=3e-3)
     assert drawn.y == pytest.approx(-stats.norm.pdf(2) / stats.norm.cdf(2), abs=0.02)
+    found = validate(budget("y", "", 0.0, [Input("x", 0, 1)], {"x": 1.0}), drawn)
+    assert found.reason.endswith(f"{drawn.failed} of {drawn.failed + drawn.draws} draws gave no value")
 
 
 def test_too_few_draws_are_said():
@@ -275,6 +286,14 @@ def test_few_degrees_of_freedom_are_a_reason():
     found = validate(gum, monte_carlo(lambda x: x["x"], [given], 1))
     assert found.verdict == "differ"
     assert "few degrees of freedom: the distributions' standard deviation is 1.7, not 1" in found.reason
+
+
+def test_a_distribution_without_variance_is_no_nonlinearity():
+    given = Input("x", 0, 1.0, "t", dof=2)
+    gum = replace(budget("y", "", 0.0, [given], {"x": 1.0}), k=2.0, U=2.0)
+    found = validate(gum, monte_carlo(lambda x: x["x"], [given], 1, most=50_000))
+    assert "nonlinear" not in found.reason
+    assert "x (t) has 100 % of the variance" in found.reason
 
 
 def test_agreement_of_a_t_with_its_own_factor():

@@ -193,7 +193,12 @@ def test_logarithm():
     assert (gum.value, gum.u, gum.interval[1]) == pytest.approx((-0.511, 0.481, 0.432), abs=1e-3)
     assert (drawn.y, drawn.u) == pytest.approx((-0.665, 0.606), abs=3e-3)
     assert drawn.shortest == pytest.approx((-1.895, 0.095), abs=0.012)
-    assert validate(gum, drawn).verdict == "differ"
+    found = validate(gum, drawn)
+    assert found.verdict == "differ"
+    assert found.reason.startswith(
+        "x (rectangular) has 100 % of the variance; nonlinear: the mean of the draws is -0.15"
+    )
+    assert found.reason.endswith("the distribution of the draws is not symmetric")
 
 
 def test_correlated_measurands():
