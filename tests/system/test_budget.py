@@ -134,6 +134,12 @@ def test_command(tmp_path) -> None:
         assert [row["source"] for row in csv.DictReader(file)] == [row["source"] for row in each["contributions"]]
 
 
+def test_pictures_of_stations_need_a_plain_scene() -> None:
+    done = ice("budget", "plate", "--stations", 50)
+    assert done.returncode == 2
+    assert "--stations must be 0 but for one convex body before darkness" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -17,9 +17,8 @@ from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
-    from planner.uncertainty.budget import Budget
-
     from planner.budgeting.budgets import SceneBudget
+    from planner.uncertainty.budget import Budget
 
 commands = commands()
 _MOST_DRAWS, _FEWEST_PICTURES, _MOST_PICTURES = 10_000_000, 50, 100_000
@@ -64,9 +63,12 @@ def budget_command(
     check_directory("--out", out)
     poses = _poses(sensor, light)
     loaded = scenes.load(scene)
+    from planner.imaging.appearance import is_plain
     from validation import budgets
 
     picture = _picture(loaded, *poses)
+    if stations and not is_plain(loaded):
+        raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
     found = budgets.budget_of(picture, p, rendered=render)
     drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
     shown = budgets.pictured(found, stations, seed) if stations else None
