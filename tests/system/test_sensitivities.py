@@ -39,8 +39,8 @@ _SEEN = [*_NUMBERS, "sensor_deg.polar", "sensor_roll_deg", "part_tilt_deg.x", "p
 
 @pytest.mark.parametrize("name", _SEEN)
 def test_sensitivities_are_those_of_measured_pictures(name: str) -> None:
-    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 0.2 %, and 1 %
-    for the distortion, which bends edges that the estimator takes for straight."""
+    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 0.2 %, and
+    1 % for the distortion, which bends edges that the estimator takes for straight."""
     picture, features, given, slopes = _known()
     which = [source.name for source in given].index(name)
     source, here = given[which], Station.nominal(features.pictures)
