@@ -161,4 +161,4 @@ def test_the_report_has_budgets_of_scenes_that_state_uncertainties() -> None:
     rows = budget_section.cells(found.measurands[0])
     assert rows[0][0] == "camera.focal_px"
     assert len(rows) == len(found.measurands[0].contributions)
-    assert "The distance 'diagonal' is 14.5774 cm +- 0.0065 cm, k = 2.0." in budget_section.note(found, 0)
+    assert "The distance 'diagonal' is 14.5774 cm +- 0.0062 cm, k = 2.0." in budget_section.note(found, 0)
