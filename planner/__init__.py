@@ -1,7 +1,8 @@
 """The analytic expert: from a scene and poses to the precision of the measurement, without an image."""
 
-from planner.budgeting.budgets import SceneBudget, budget
-from planner.budgeting.plans import CapabilityPlan, plan_capability
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from planner.combining import Combination, combine
 from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
@@ -22,6 +23,22 @@ from planner.search.varied import Chosen, Varied
 from planner.search.viewing import ViewingSpace, local_minima
 from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
+
+if TYPE_CHECKING:
+    from planner.budgeting.budgets import SceneBudget, budget
+    from planner.budgeting.plans import CapabilityPlan, plan_capability
+
+_LATER = {
+    "SceneBudget": "budgets", "budget": "budgets", "CapabilityPlan": "plans", "plan_capability": "plans",
+}  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Budgets are loaded when they are asked for: statistics take a third of a second."""
+    if name in _LATER:
+        return getattr(import_module(f"planner.budgeting.{_LATER[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",

@@ -94,7 +94,7 @@ def budget(
         Polar angle and azimuth, degrees; not with a picture, which has its own.
     variances : ndarray, shape (M,), optional
         Of the values by pixel noise, the scene's unit squared or degrees^2, where a picture tells them better than the
-        ``calibrated`` model.
+        models do: ``calibrated`` of the classic locators, ``bound``, at which ``arrangement`` stands.
     biases : ndarray, shape (M,), optional
         Of the values without noise, measured in a noise-free picture, in place of the predicted ones.
     biased : bool, optional
@@ -126,7 +126,7 @@ def budget(
     biased = not is_plain(picture.scene) if biased is None else biased
     given = sources(picture.scene)
     slopes = sensitivities(features, given, biased=biased)
-    noise = np.array([each.variance_object for each in prediction.measurands]) if variances is None else variances
+    noise = _noise(prediction, picture, biased=biased) if variances is None else variances
     beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased)
     inputs, budgets = shared_inputs(picture.scene, given), []
     for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
@@ -135,6 +135,12 @@ def budget(
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
+
+
+def _noise(prediction: Prediction, picture: Picture, *, biased: bool) -> np.ndarray:
+    """Variances of the values (M,) by pixel noise, by the estimator that is meant."""
+    told = prediction if biased else predict(picture, model="bound")
+    return np.array([each.variance_object for each in told.measurands])
 
 
 def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:

@@ -17,6 +17,7 @@ from tests.proofs.stations import coverage
 from tests.system.test_cli import ice
 from validation import budgets
 from validation.chain import Chain
+from validation.report import budget_section
 
 
 @lru_cache
@@ -133,6 +134,12 @@ def test_command(tmp_path) -> None:
         assert [row["source"] for row in csv.DictReader(file)] == [row["source"] for row in each["contributions"]]
 
 
+def test_pictures_of_stations_need_a_plain_scene() -> None:
+    done = ice("budget", "plate", "--stations", 50)
+    assert done.returncode == 2
+    assert "--stations must be 0 but for one convex body before darkness" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -147,3 +154,11 @@ def test_bad_options(arguments, text) -> None:
     done = ice("budget", "calibrated_rig", *arguments)
     assert done.returncode == 2
     assert text in done.stderr
+
+
+def test_the_report_has_budgets_of_scenes_that_state_uncertainties() -> None:
+    (found,) = budget_section.budgets_of((scenes.load("task1"), scenes.load("calibrated_rig")))
+    rows = budget_section.cells(found.measurands[0])
+    assert rows[0][0] == "camera.focal_px"
+    assert len(rows) == len(found.measurands[0].contributions)
+    assert "The distance 'diagonal' is 14.5774 cm +- 0.0062 cm, k = 2.0." in budget_section.note(found, 0)

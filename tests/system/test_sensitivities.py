@@ -17,7 +17,8 @@ from planner.budgeting.station import Station
 from planner.imaging.pictures import Pictures
 from validation.stations import clean_image
 
-_NUMBERS = {"camera.focal_px": 2.0, "camera.distance": 0.1, "camera.look_at[2]": 0.05}
+_BENT = "camera.lens.distortion[0]"
+_NUMBERS = {"camera.focal_px": 2.0, "camera.distance": 0.1, "camera.look_at[2]": 0.05, _BENT: 0.02}
 _BESIDE = scenes.Uncertainty(
     sensor_deg=0.1, sensor_roll_deg=0.2, part_shift=0.05, part_tilt_deg=0.1, principal_point_px=1.0
 )
@@ -33,16 +34,20 @@ def _known() -> tuple[scenes.Picture, Features, tuple, np.ndarray]:
     return picture, features, given, sensitivities(features, given, biased=False)
 
 
-@pytest.mark.parametrize("name", [*_NUMBERS, "sensor_deg.polar", "sensor_roll_deg", "part_tilt_deg.x", "part_shift.z"])
+_SEEN = [*_NUMBERS, "sensor_deg.polar", "sensor_roll_deg", "part_tilt_deg.x", "part_shift.z"]
+
+
+@pytest.mark.parametrize("name", _SEEN)
 def test_sensitivities_are_those_of_measured_pictures(name: str) -> None:
-    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 0.2 %."""
+    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 0.2 %, and
+    1 % for the distortion, which bends edges that the estimator takes for straight."""
     picture, features, given, slopes = _known()
     which = [source.name for source in given].index(name)
     source, here = given[which], Station.nominal(features.pictures)
     step = source.told.u / 2
     images = np.stack([clean_image(source.moved(here, sign * step)) for sign in (1, -1)])
     ahead, behind = measure.measure(images, picture).value[:, 0]
-    assert (ahead - behind) / (2 * step) == pytest.approx(slopes[0, which], rel=2e-3)
+    assert (ahead - behind) / (2 * step) == pytest.approx(slopes[0, which], rel=1e-2 if name == _BENT else 2e-3)
 
 
 def test_what_moves_along_with_the_part_is_no_error() -> None:

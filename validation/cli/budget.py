@@ -63,9 +63,12 @@ def budget_command(
     check_directory("--out", out)
     poses = _poses(sensor, light)
     loaded = scenes.load(scene)
+    from planner.imaging.appearance import is_plain
     from validation import budgets
 
     picture = _picture(loaded, *poses)
+    if stations and not is_plain(loaded):
+        raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
     found = budgets.budget_of(picture, p, rendered=render)
     drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
     shown = budgets.pictured(found, stations, seed) if stations else None

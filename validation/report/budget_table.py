@@ -31,7 +31,7 @@ def table(budget: Budget) -> Table:
     if rest := [row for row in rows if row.share < _LEAST]:
         together = math.hypot(*(row.contribution for row in rest))
         share = sum(row.share for row in rest)
-        shown.add_row(f"{len(rest)} others", "", "", f"{together:.3g}", f"{100 * share:.2f} %", "", "")
+        shown.add_row(f"others ({len(rest)})", "", "", f"{together:.3g}", f"{100 * share:.2f} %", "", "")
     return shown
 
 

@@ -10,11 +10,12 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
+from planner.budgeting.budgets import SceneBudget
 from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
-from validation.report import diagnostics, figures
+from validation.report import budget_figure, budget_section, diagnostics, figures
 from validation.report.table import errors, failed, far, names, number, ratio, shift, small
 from validation.statistics import ALLOWANCE, LEVEL, Verdict
 
@@ -99,6 +100,7 @@ def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Sec
             sections.append(Section("Effects, on and off", [effects]))
         if found.refused:
             sections.append(Section("Settings without a result", [_refused(found)]))
+        sections += [_budget(each, folder) for each in budget_section.budgets_of(campaign.scenes)]
         sections.append(Section("What it cost", [], [_time(found, folder)]))
         sections.append(Section("The run", [_facts(found, store)]))
         sections.append(Section("Images and edge pixels", [], [_images(path) for path in drawn[1:]]))
@@ -201,6 +203,22 @@ def _effects(store: RunFile) -> Table:
     keys = list(dict.fromkeys(key for _, effect in lines for key in effect))
     rows = [[scene, *(_word(effect.get(key, "")) for key in keys)] for scene, effect in lines]
     return Table("Effects, on and off", ["scene", *keys], rows, words=True)
+
+
+def _budget(found: SceneBudget, folder: Path) -> Section:
+    scene = found.picture.scene
+    tables = [
+        Table(
+            f"{each.name} [{each.unit}]",
+            budget_section.COLUMNS,
+            budget_section.cells(each),
+            budget_section.note(found, m),
+        )
+        for m, each in enumerate(found)
+    ]
+    caption = f"Standard uncertainties of {scene.name}, sensor {found.picture.sensor}."
+    drawn = budget_figure.draw(found.measurands, folder / f"budget_{scene.name}.png")
+    return Section(f"Uncertainty budget of {scene.name}", tables, [_picture(drawn, caption, caption)])
 
 
 def _word(value: object) -> str:
