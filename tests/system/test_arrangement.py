@@ -69,7 +69,7 @@ def test_a_sliver_that_the_image_does_not_tell(task1):
     assert told.status in (status.ILL_CONDITIONED, status.LOW_CONTRAST)
 
 
-@pytest.mark.parametrize(("kind", "count"), [("task1", 4), ("blocks", 3), ("small", 2)])
+@pytest.mark.parametrize(("kind", "count"), [("task1", 2), ("blocks", 2), ("small", 1)])
 def test_random_poses(kind, count):
     """Reduced `python -m tests.proofs crowded`."""
     figures = judge(study(kind, count, 150, 11, show=False))
