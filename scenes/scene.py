@@ -266,6 +266,10 @@ class Scene(Model):
             raise ValueError(f"light or lights must be given, not both, got {'both' if self.light else 'none'}")
         if len(self.lights) > MOST_LIGHTS:
             raise ValueError(f"lights must be at most {MOST_LIGHTS}, got {len(self.lights)}")
+        if not any(light.intensity > 0 for light in self.lights):
+            raise ValueError(
+                f"{'lights' if self.several_lights else 'light'}.intensity must be more than 0 once, got 0"
+            )
         for i, light in enumerate(self.lights):
             if light.pose is not None and light.kind != "backlight":
                 self.check_pose("light", light.pose, f"lights[{i}].pose" if self.several_lights else "light.pose", i)

@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import measure
 import planner
 import render
 from scenes import InvalidInput, Picture, Pose
+from scenes.load import from_document
 from scenes.picture import several
 from tests.oracle import block_image
 
@@ -65,3 +67,28 @@ sys.stdout.buffer.write(pickle.dumps(picture))
 
 def paths():
     return {"PYTHONPATH": ":".join(path for path in sys.path if path)}
+
+
+def test_lights_of_a_scene_in_one_line(task1):
+    """What is wrong with `[[lights]]`, by its key."""
+    document = task1.model_dump(mode="json", exclude={"settings", "same_scale", "light"})
+    point = {"distance": 100.0}
+    wrong = {
+        r"light or lights must be given, not both, got none": {},
+        r"light or lights must be given, not both, got both": {"light": point, "lights": [point]},
+        r"light.intensity must be more than 0 once, got 0": {"light": {**point, "intensity": 0.0}},
+        r"lights\[0\]: inner_radius must be less than outer_radius, got 5 and 4": {
+            "lights": [{"kind": "ring", **point, "inner_radius": 5.0, "outer_radius": 4.0}]
+        },
+        r"lights\[1\]: pose must be given for mount 'fixed' and for no other, got none": {
+            "lights": [point, {**point, "mount": "fixed"}]
+        },
+        r"lights\[0\]: offset must be left out but for mount 'camera'": {"lights": [{**point, "offset": [1.0, 0.0]}]},
+        r"lights must be at most 16, got 17": {"lights": [point] * 17},
+        r"lights\[0\].pose must be outside the object": {
+            "lights": [{"distance": 1.0, "mount": "fixed", "pose": [0, 0]}]
+        },
+    }
+    for message, lights in wrong.items():
+        with pytest.raises(InvalidInput, match=message):
+            from_document(Path("here.toml"), {**document, **lights})
