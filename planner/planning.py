@@ -342,6 +342,8 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
     alone = _alone(option, result, aim, refined)
     if alone is not None and alone.value < variance:
         scene, sensor, light, variance = with_shares(scene, alone.shares), alone.sensor, alone.lights, alone.value
+    elif alone is not None and max(shares_of(scene)) == 1:
+        alone = alone._replace(value=variance)  # the plan is one light alone
     prediction = predict(scene, tuple(map(float, sensor)), as_poses(light), option.model)
     return Plan(
         scene=scene,

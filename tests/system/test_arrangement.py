@@ -203,7 +203,7 @@ def test_wrong_noise_is_a_misfit(task1, factor):
 @pytest.mark.parametrize("name", list(CONDITIONS))
 def test_photographs_that_are_not_what_the_model_says(name):
     """Reduced `python -m tests.proofs conditions`: unbiased with a true sigma, or not ok."""
-    found = outcome(name, "arrangement", 8, np.random.default_rng(4))
+    found = outcome(name, "arrangement", 5, np.random.default_rng(4))
     assert found.honest
     assert (found.ok == found.count) == (name == "as the model says")
 
