@@ -79,7 +79,7 @@ def _ball(mitsuba: Any, light: Light, poses: np.ndarray, position: np.ndarray, w
 def _beams(scene: Scene, light: Backlight, poses: np.ndarray, exposure: float) -> list[dict]:
     """A telecentric light's directions."""
     found = []
-    lone = scene.model_copy(update={"light": light, "several_lights": ()})
+    lone = scene.lit_by(light)
     for each in emitters(lone, (poses,)):
         away = np.array(scene.camera.look_at) - each.at
         value = {"type": "spectrum", "value": exposure * each.power / float(away @ away)}

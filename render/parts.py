@@ -47,20 +47,19 @@ def parts(picture: Picture, active: frozenset[str]) -> list[Part]:
     found, seen = [], backlights(picture.scene)
     for i, light in enumerate(picture.scene.lights):
         lone = _lone(picture, i)
-        if i in seen:
-            if "spill" in active:  # it has a size that nothing can do without
-                found.append(Part(lone, active | {"light_size"}))
-        elif light.intensity > 0:
-            found.append(Part(lone, active if light.half_size else active - {"light_size"}))
-        if i in seen:
-            found.append(Part(lone, active - {"interreflection", "light_size"}, silhouette=True))
+        if i not in seen:
+            if light.intensity > 0:
+                found.append(Part(lone, active if light.half_size else active - {"light_size"}))
+            continue
+        if "spill" in active:  # it has a size that nothing can do without
+            found.append(Part(lone, active | {"light_size"}))
+        found.append(Part(lone, active - {"interreflection", "light_size"}, silhouette=True))
     return found
 
 
 def _lone(picture: Picture, which: int) -> Picture:
     """The picture with one of its lights."""
-    scene = picture.scene.model_copy(update={"light": picture.scene.lights[which], "several_lights": ()})
-    return Picture(scene, picture.sensor, (picture.lights[which],))
+    return Picture(picture.scene.lit_by(picture.scene.lights[which]), picture.sensor, (picture.lights[which],))
 
 
 def within_cone(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:

@@ -236,7 +236,7 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: 
 
 def pointed(scene: Scene) -> Scene:
     """The scene with its one light as a point in its middle."""
-    return scene.model_copy(update={"light": as_point(scene.lights[0]), "several_lights": ()})
+    return scene.lit_by(as_point(scene.lights[0]))
 
 
 def _towards(place: np.ndarray, points: np.ndarray) -> np.ndarray:

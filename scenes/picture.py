@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from scenes.errors import InvalidInput
 from scenes.lights import Backlight, Luminaire
 from scenes.pose import Pose, several
@@ -90,14 +92,17 @@ class Picture:
 
 def _complete(scene: Scene, sensor: Pose, free: tuple[Pose, ...]) -> tuple[Pose, ...]:
     """Poses of all lights from those of the free ones."""
-    given = iter(free)
-    return tuple(next(given) if light.mount == "free" else mounted(light, sensor) for light in scene.lights)
+    given, at = iter(free), np.array(list(sensor))
+    return tuple(next(given) if light.mount == "free" else Pose(*mounted(light, at).tolist()) for light in scene.lights)
 
 
-def mounted(light: Luminaire, sensor: Pose) -> Pose:
-    """Where a light stands that is not free: at its own pose, at the sensor's, or opposite the sensor."""
+def mounted(light: Luminaire, sensors: np.ndarray) -> np.ndarray:
+    """Poses (..., 2) of a light that is not free, from the sensors' (..., 2), degrees.
+
+    At its own pose, at the sensor's, or opposite the sensor.
+    """
     if light.mount == "fixed":
-        return light.pose
+        return np.array(list(light.pose))
     if isinstance(light, Backlight):
-        return Pose(180.0 - sensor.polar_deg, (sensor.azimuth_deg + 180.0) % 360.0)
-    return sensor
+        return np.stack([180.0 - sensors[..., 0], (sensors[..., 1] + 180.0) % 360.0], -1)
+    return sensors

@@ -166,6 +166,11 @@ class Scene(Model):
         """All lights."""
         return self.several_lights or (() if self.light is None else (self.light,))
 
+    def lit_by(self, *lights: AnyLight) -> Scene:
+        """The scene with other lights, all else as it is."""
+        one = lights[0] if len(lights) == 1 else None
+        return self.model_copy(update={"light": one, "several_lights": () if one else lights})
+
     @property
     def free(self) -> tuple[int, ...]:
         """Which of the lights are free: those that a setting gives poses for."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.imaging.emitters import FULL, GLANCE, Emitter, emitters
 from planner.imaging.projection import light_position, sensor_position
-from scenes import Backlight, InvalidInput, Luminaire, Picture, Scene
+from scenes import InvalidInput, Picture, Scene, mounted
 from scenes.arrays import poses
 
 T = TypeVar("T")
@@ -53,7 +53,7 @@ class Pictures:
         if len(each) != len(scene.free):
             raise InvalidInput(f"lights must be {len(scene.free)} arrays, one for each free light, got {len(each)}")
         free = iter([poses(some, "lights") for some in each])
-        parts = tuple(next(free) if light.mount == "free" else _mounted(light, sensors) for light in scene.lights)
+        parts = tuple(next(free) if light.mount == "free" else mounted(light, sensors) for light in scene.lights)
         return cls(scene, sensors, parts, all(part.ndim == 1 for part in (sensors, *parts)))
 
     def with_scene(self, scene: Scene) -> Pictures:
@@ -84,15 +84,6 @@ class Pictures:
         if key not in self._known:
             self._known[key] = make()
         return self._known[key]
-
-
-def _mounted(light: Luminaire, sensors: np.ndarray) -> np.ndarray:
-    """Poses of a light that is not free, as `scenes.mounted` says of one."""
-    if light.mount == "fixed":
-        return np.array(list(light.pose))
-    if isinstance(light, Backlight):
-        return np.stack([180.0 - sensors[..., 0], (sensors[..., 1] + 180.0) % 360.0], -1)
-    return sensors
 
 
 @lru_cache(maxsize=64)

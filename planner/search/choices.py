@@ -164,7 +164,7 @@ def with_choice(scene: Scene, choice: Choice, hold: Hold = DEFAULT_HOLD) -> Scen
             camera["transmission"] = _rows(wavelengths, passed)
     update["camera"] = scene.camera.model_copy(update=camera)
     if light != {"polarisation_deg": own_choice(scene).polarisation_deg}:
-        update |= {"light": scene.lights[0].model_copy(update=light), "several_lights": ()}
+        scene = scene.lit_by(scene.lights[0].model_copy(update=light))
     return scene.model_copy(update=update)
 
 

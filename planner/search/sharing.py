@@ -77,7 +77,7 @@ def with_shares(scene: Scene, shares: tuple[float, ...]) -> Scene:
     """The scene whose lights have shares of the sum of their intensities."""
     total = sum(light.intensity for light in scene.lights)
     lights = [light.model_copy(update={"intensity": s * total}) for light, s in zip(scene.lights, shares, strict=True)]
-    return scene.model_copy(update={"light": None, "several_lights": tuple(lights)})
+    return scene.lit_by(*lights)
 
 
 def shares_of(scene: Scene) -> tuple[float, ...]:
@@ -212,7 +212,7 @@ class _Looks:
         self.scene, self.aim, self.constraints = scene, aim, constraints
         total = sum(light.intensity for light in scene.lights)
         whole = [light.model_copy(update={"intensity": total}) for light in scene.lights]
-        self.lone = [scene.model_copy(update={"light": light, "several_lights": ()}) for light in whole]
+        self.lone = [scene.lit_by(light) for light in whole]
         self.places = [places if light.mount == "free" else np.zeros((1, 0)) for light in scene.lights]
         self.combinations = int(np.prod([len(each) for each in self.places]))
 

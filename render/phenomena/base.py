@@ -92,8 +92,7 @@ def changed(scene: Scene, part: str, **values) -> Scene:
 
 def relit(scene: Scene, change: Callable[[Luminaire], Luminaire]) -> Scene:
     """The scene with each of its lights replaced by what ``change`` makes of it."""
-    one, more = scene.light and change(scene.light), tuple(map(change, scene.several_lights))
-    return scene.model_copy(update={"light": one, "several_lights": more})
+    return scene.lit_by(*map(change, scene.lights))
 
 
 def with_materials(scene: Scene, **values) -> Scene:

@@ -10,8 +10,9 @@ from rich.text import Text
 
 import planner
 from render import Tolerance
-from scenes import Pose
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
+from validation.report.cells import pose as _pose
+from validation.report.cells import table as _table
 
 
 def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float) -> Group:
@@ -221,16 +222,3 @@ def _robust(safe: planner.Robust) -> Group:
         row = f"{m.factor:.3g}", f"{m.variance:.4f}", f"{m.best:.4f}", f"{m.sensor_deg:.2f}", f"{m.light_deg:.2f}"
         table.add_row(m.input, *row)
     return Group(Text(text), table) if safe.moves else Group(Text(text))
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in columns:
-        table.add_column(name, justify="right", no_wrap=True)
-    return table
-
-
-def _pose(poses: Pose | tuple[Pose, ...]) -> str:
-    if not isinstance(poses, Pose):
-        return " ".join(map(_pose, poses)) or "-"
-    return f"({poses.polar_deg:.1f}, {poses.azimuth_deg:.1f})"

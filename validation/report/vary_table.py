@@ -10,7 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from planner import Chosen, Plan, Varied
-from scenes import Pose
+from validation.report.cells import pose as _pose
+from validation.report.cells import table as _table
 from validation.vary_check import Scatter, VaryCheck
 
 _HELD = {
@@ -121,17 +122,6 @@ def _row(row: Scatter) -> dict:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in columns:
-        table.add_column(name, justify="right", no_wrap=True)
-    return table
-
-
-def _pose(pose: Pose) -> str:
-    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
 
 
 def _angle(value: float | None) -> str:

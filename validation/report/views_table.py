@@ -9,7 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
-from scenes import Pose
+from validation.report.cells import pose as _pose
+from validation.report.cells import table as _table
 from validation.views_check import CheckedQuantity, ViewsCheck
 
 
@@ -136,14 +137,3 @@ def _number(value: float | None, form: str) -> str:
 
 def _sigma(variance: float) -> str:
     return f"{math.sqrt(variance):.3g}" if math.isfinite(variance) else "-"
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in columns:
-        table.add_column(name, justify="right", no_wrap=True)
-    return table
-
-
-def _pose(pose: Pose) -> str:
-    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
