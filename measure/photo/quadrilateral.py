@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from measure import status
@@ -11,9 +12,12 @@ from measure.estimators.registry import SYNONYMS
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
-from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma, refined
+from measure.find.quadrilateral import find_quadrilateral
 from measure.photo.lens import Lens, straight_corners
-from scenes.arrays import picture
+from measure.photo.noise import noise_sigma
+from measure.photo.profiles import edge_sigma, refined
+from scenes import InvalidInput
+from scenes.arrays import finite, picture
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,13 @@ class Quadrilateral:
     p_value: float
 
 
-def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", lens: Lens | None = None) -> Quadrilateral:
-    """Find the most prominent quadrilateral and measure it.
+def measure_quadrilateral(
+    image: np.ndarray,
+    estimator: str = "arrangement",
+    lens: Lens | None = None,
+    corners: np.ndarray | None = None,
+) -> Quadrilateral:
+    """Measure a quadrilateral: the one near ``corners``, or else the most prominent one.
 
     Parameters
     ----------
@@ -66,14 +75,17 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
     lens : Lens, optional
         Intrinsics and distortion.
+    corners : array_like, shape (4, 2), optional
+        Where its corners are, (x, y), px, to some 5 px, in order around it.
 
     Raises
     ------
     InvalidInput
-        If there is no quadrilateral, or the image is no image.
+        If there is no quadrilateral, the image is no image, or the corners are no quadrilateral's in it.
     """
     image = picture(image)
-    corners, noise = refined(image, find_quadrilateral(image)), max(noise_sigma(image), np.sqrt(1 / 12))
+    near = find_quadrilateral(image) if corners is None else _expected(corners, image.shape)
+    corners, noise = refined(image, near), max(noise_sigma(image), np.sqrt(1 / 12))
     blur = edge_sigma(image, corners)
     optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
     likeliest = SYNONYMS.get(estimator, estimator) == "arrangement" and lens is None
@@ -98,6 +110,15 @@ def measure_quadrilateral(image: np.ndarray, estimator: str = "arrangement", len
     return _reported(
         shape.corners[0], shape.covariance[0], noise, blur, status.worst(str(shape.status[0]), fits), whole.p_value[0]
     )
+
+
+def _expected(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    corners = finite(corners, "corners")
+    if corners.shape != (4, 2) or not cv2.isContourConvex(corners.astype(np.float32)):
+        raise InvalidInput(f"corners must be the four corners of a convex quadrilateral, got {corners.tolist()}")
+    if (corners < 0).any() or (corners > np.array(shape[::-1]) - 1).any():
+        raise InvalidInput(f"corners must lie in the image of {shape[1]} x {shape[0]} px, got {corners.tolist()}")
+    return corners
 
 
 def _threshold(shape) -> float:

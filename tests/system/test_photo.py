@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import measure
-from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma
+from measure.find.quadrilateral import find_quadrilateral
 from measure.photo.lens import Lens
+from measure.photo.noise import noise_sigma
+from measure.photo.profiles import edge_sigma
 from scenes import InvalidInput
 from tests.benchmarks.estimators import random_block
 from tests.oracle import polygon_image
@@ -87,3 +89,21 @@ def test_bad_lens(tmp_path):
     path.write_text("fx = -1.0\nfy = 1.0\ncx = 0.0\ncy = 0.0\n")
     with pytest.raises(InvalidInput, match=r"lens\.toml: fx must be greater than 0, got -1\.0"):
         measure.load_lens(path)
+
+
+def test_corners_that_are_known(corners, rng):
+    """Two quadrilaterals: the one whose approximate corners are given is measured, not the more prominent one."""
+    other = np.array([[8.0, 180], [60, 182], [58, 232], [9, 228]])
+    image = polygon_image(corners, SHAPE, 0.7, 120.0, 20.0) + polygon_image(other, SHAPE, 0.7, 40.0, 0.0)
+    image += rng.standard_normal(SHAPE)
+    found = measure.measure_quadrilateral(image, corners=other + rng.uniform(-2, 2, other.shape))
+    assert found.status == "ok"
+    assert np.abs(found.corners - other).max() < 4.5 * np.sqrt(np.diag(found.covariance).max())
+
+
+@pytest.mark.parametrize(
+    "bad", [[[1.0, 1]], [[10.0, 10], [20, 20], [20, 10], [10, 20]], [[-5.0, 10], [20, 10], [20, 20], [-5, 20]]]
+)
+def test_corners_of_no_quadrilateral(bad):
+    with pytest.raises(InvalidInput, match="corners must"):
+        measure.measure_quadrilateral(np.zeros(SHAPE), corners=bad)

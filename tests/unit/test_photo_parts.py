@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from measure.find.quadrilateral import edge_sigma, find_quadrilateral, noise_sigma, refined
+from measure.find.quadrilateral import find_quadrilateral
+from measure.photo.noise import noise_sigma
+from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput
 from tests.oracle import polygon_image
 

@@ -11,8 +11,8 @@ from typer.main import get_command_from_info
 COMMANDS = {
     "validate": ("batch", "Predict, render and measure every setting, and judge the predictions."),
     "plan": ("plan", "Find where sensor and light should stand, and check it by rendering."),
-    "render": ("image", "Render one image of a scene."),
-    "measure": ("image", "Measure an image: a scene's distance, or the quadrilateral it shows."),
+    "render": ("render", "Render one image of a scene."),
+    "measure": ("measure", "Measure an image: a scene's measurands, or what a photograph shows."),
     "new": ("scene", "Write a commented scene of a mesh file."),
     "show": ("scene", "List and draw the vertices, edges and circles that a scene has to name."),
     "scenes": ("scene", "List the bundled scenes."),
