@@ -20,7 +20,7 @@ from scenes.errors import InvalidInput
 _FALSE_ALARM = 0.01  # of all corners of a board together
 _FAINTEST = 3.0  # times the noise: half the difference of bright and dark
 _ORDINARY = 0.8  # px of lens blur to begin with
-_ROUGH, _FINE = 0.05, 1e-4  # px: steps at which either round is done
+_ROUGH, _FINE = 0.05, 1e-3  # px: the last step of either round; its error is about the square
 _MOST = 200  # corners along a side
 
 

@@ -13,7 +13,6 @@ _LEVELS = 12  # linear in place in each of four quadrants
 PARAMETERS = SHAPE + _LEVELS
 _STEPS = 12
 _LARGEST = np.array([0.7, 0.7, 0.15, 0.15, 0.3])  # of a step
-_ENOUGH = 1e-4  # px: a further step is far below any noise
 _BLURS = np.log([0.2, 6.0])  # px
 _TOGETHER = 64  # corners at a time: some 100 MB
 
@@ -45,7 +44,7 @@ class Crossings:
     converged: np.ndarray
 
 
-def fit_crossings(found: Windows, start: np.ndarray, bend: np.ndarray, enough: float = _ENOUGH) -> Crossings:
+def fit_crossings(found: Windows, start: np.ndarray, bend: np.ndarray, enough: float) -> Crossings:
     """Fit n crossings, each to its own window.
 
     Parameters
@@ -67,18 +66,15 @@ def _fit(places, levels, there, shape, bend, enough) -> tuple[np.ndarray, ...]:
     first, shape = shape, shape.copy()
     size = there.sum(1)
     field = np.where(there[..., None], _field(places, first), 0.0)
-    moved = np.full(len(shape), np.inf)
     for _ in range(_STEPS):
-        matrix, residual, _, _ = _linear(places, levels, there, shape, bend, field)
-        step, _ = _solved(matrix, residual)
+        matrix, residual, square, contrast = _linear(places, levels, there, shape, bend, field)
+        step, inverse = _solved(matrix, residual)
         step = np.clip(step[:, :SHAPE], -_LARGEST, _LARGEST)
         shape = shape + step
         shape[:, 4] = np.clip(shape[:, 4], *_BLURS)
         moved = np.abs(step[:, :2]).max(1)
-        if (moved < enough).all():
+        if (moved < enough).all():  # the last step is taken; what was before it differs by its square
             break
-    matrix, residual, square, contrast = _linear(places, levels, there, shape, bend, field)
-    _, inverse = _solved(matrix, residual)
     good = (moved < 10 * enough) & (np.abs(shape[:, :2] - first[:, :2]).max(1) < 2.0) & np.isfinite(square)
     return shape, inverse[:, :2, :2], square, size - PARAMETERS, contrast, good
 

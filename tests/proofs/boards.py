@@ -162,7 +162,7 @@ def _photographs(folder: Path) -> int:
     ours, theirs = found["ours"], found["theirs"]
     excess = ours.chi_square / ours.freedom
     print(
-        f"ours: {len(ours.residuals)} boards, {ours.rms_px:.4f} px rms, chi-square over freedom {excess:.3g}, {ours.status}"
+        f"ours: {len(ours.residuals)} boards, {ours.rms_px:.4f} px rms, chi-square {excess:.3g} a degree, {ours.status}"
     )
     print(f"cornerSubPix: {theirs.rms_px:.4f} px rms")
     return 0 if ours.rms_px <= theirs.rms_px else 1
