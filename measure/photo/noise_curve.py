@@ -15,6 +15,7 @@ _GROUPS, _LEAST = 16, 30  # groups of patches of like level, and how many patche
 _FEW = 20  # patches that are too few to tell the noise
 _CLEAR = 5.0  # standard errors from which the noise depends on the level
 _FALLING = 0.8  # ratio of standard deviations, at the brightest and the darkest level, that no sensor makes
+_LOWEST = 0.05  # of the variance at the darkest level: what a falling line ends at
 _SURFACE = polynomials()[:, :3]
 
 
@@ -25,15 +26,13 @@ class NoiseCurve:
     Attributes
     ----------
     dark, gain : float
-        Variance at ``dark_level``, rounding not included, and how it grows with the level.
+        Variance at ``dark_level``, rounding not included, and how it grows with the level (falls, if negative).
     dark_level : float
         The lowest level that was seen; below it the variance is the same.
     step : float
         What levels were rounded to; 0 for real numbers.
     bits : int or None
         So many make the sensor's scale; None for real numbers, and where levels are not 1 apart.
-    falls : bool
-        Whether the noise is less where it is brighter, as a tone curve makes it that was not undone.
     """
 
     dark: float
@@ -41,7 +40,11 @@ class NoiseCurve:
     dark_level: float
     step: float
     bits: int | None
-    falls: bool = False
+
+    @property
+    def falls(self) -> bool:
+        """Whether the noise is less where it is brighter, as a tone curve makes it that was not undone."""
+        return self.gain < 0
 
     def variance(self, levels: np.ndarray) -> np.ndarray:
         """Variance of the noise at grey levels, rounding included, grey levels^2.
@@ -51,15 +54,15 @@ class NoiseCurve:
         >>> NoiseCurve(2.0, 0.1, 10.0, 0.0, None).variance(np.array([0.0, 10.0, 60.0]))
         array([2., 2., 7.])
         """
-        return self.dark + self.gain * np.maximum(np.asarray(levels) - self.dark_level, 0.0) + self.step**2 / 12
+        light = np.maximum(np.asarray(levels) - self.dark_level, 0.0)
+        return np.maximum(self.dark + self.gain * light, _LOWEST * self.dark) + self.step**2 / 12
 
     @property
     def noise(self) -> Noise:
-        """The sensor's noise for the estimators."""
+        """The sensor's noise for the estimators; where it falls, the darkest level's for all."""
         rounded = 0.0 if self.bits is not None else self.step**2 / 12
-        return Noise(
-            sigma=float(np.sqrt(self.dark + rounded)), bits=self.bits, gain=self.gain, dark_level=self.dark_level
-        )
+        sigma, gain = float(np.sqrt(self.dark + rounded)), max(self.gain, 0.0)
+        return Noise(sigma=sigma, bits=self.bits, gain=gain, dark_level=self.dark_level)
 
 
 def noise_curve(image: np.ndarray) -> NoiseCurve:
@@ -83,8 +86,8 @@ def noise_curve(image: np.ndarray) -> NoiseCurve:
     mean = float(np.average(variance, weights=error**-2.0))
     top = float(np.ptp(level))
     falls = clear < -_CLEAR and dark + gain * top < _FALLING**2 * dark
-    dark, gain = (dark, gain) if clear > _CLEAR else (mean, 0.0)
-    return NoiseCurve(max(dark, 0.0), gain, max(lowest, 0.0), step, bits if step == 1 else None, bool(falls))
+    dark, gain = (dark, gain) if clear > _CLEAR or falls else (mean, 0.0)
+    return NoiseCurve(max(dark, 0.0), gain, max(lowest, 0.0), step, bits if step == 1 else None)
 
 
 def rounding(image: np.ndarray) -> tuple[float, int | None]:
