@@ -1,8 +1,8 @@
 """The contour of a general quadric.
 
 A line e + t d through the eye e meets f = x'Ax + b'x + c in two, one or no points as d'Md is positive, zero or
-negative, M = g g' - f(e) A with g half the gradient at e. It touches in the eye's polar plane g . X + b . e / 2 + c = 0,
-where the contour is a conic.
+negative, M = g g' - f(e) A with g half the gradient at e. It touches in the eye's polar plane
+g . X + b . e / 2 + c = 0, where the contour is a conic.
 """
 
 from __future__ import annotations
