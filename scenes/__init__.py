@@ -12,6 +12,7 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Circle, Edge, Solid, block
+from scenes.parts.step_file import Step
 from scenes.picture import Picture, mounted
 from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
@@ -25,7 +26,7 @@ __all__ = [
     "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
     "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator",
     "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene",
-    "Setting", "Side", "Solid", "StatisticalTexture", "Task", "Tolerance", "Uncertain", "UncertainNumber",
+    "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task", "Tolerance", "Uncertain", "UncertainNumber",
     "Uncertainty", "Unit", "as_point", "block", "find", "load",
     "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

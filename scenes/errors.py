@@ -34,7 +34,7 @@ _KINDS = {
 
 
 _TAGS = (
-    "block", "mesh", "corner", "centre", "side", "statistical", "image", "str", "Where",
+    "block", "mesh", "step", "corner", "centre", "side", "statistical", "image", "str", "Where",
     "point", "disc", "bar", "ring", "dome", "backlight",
 )  # fmt: skip  # alternatives of the model, no keys of the file
 

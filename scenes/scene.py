@@ -25,6 +25,7 @@ from scenes.noise import Noise
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
+from scenes.parts.step_file import Step
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.surfaces import Surfaces, surfaces
@@ -42,7 +43,10 @@ def _tag_of_object(value: Any) -> str:
     return value.get("kind", "block") if isinstance(value, dict) else getattr(value, "kind", "block")
 
 
-Object = Annotated[Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")], Discriminator(_tag_of_object)]
+Object = Annotated[
+    Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")] | Annotated[Step, Tag("step")],
+    Discriminator(_tag_of_object),
+]
 
 
 @lru_cache(maxsize=64)

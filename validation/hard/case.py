@@ -66,7 +66,7 @@ class Case:
     Attributes
     ----------
     area : str
-        ``reflectance``, ``planner``, ``fit``, ``measure`` or ``render``.
+        ``reflectance``, ``planner``, ``limb``, ``fit``, ``measure`` or ``render``.
     name, measurand : str
         What is hard about it, and what is asked.
     ours : callable

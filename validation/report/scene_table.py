@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from scenes import Luminaire, Scene
+from scenes.parts.recognised import cylinders
 
 
 def facts(scene: Scene) -> dict[str, Any]:
@@ -49,6 +50,21 @@ def facts(scene: Scene) -> dict[str, Any]:
             for f, face in enumerate(solid.faces)
             if solid.plane[f]
         ],
+        "cylinders": [
+            {
+                "name": each.name,
+                "point": each.surface.point.tolist(),
+                "axis": each.surface.axis.tolist(),
+                "diameter": 2 * each.surface.radius,
+                "hole": each.surface.hollow,
+                "length": each.surface.ends[1] - each.surface.ends[0],
+                "turn": each.turn_deg,
+                "facets": len(each.faces),
+                "residual": each.residual,
+                "largest": each.largest,
+            }
+            for each in cylinders(solid)
+        ],
         "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
     }
 
@@ -74,6 +90,11 @@ def report(scene: Scene) -> Group:
     for circle in known["circles"]:
         row = circle["name"], *map(_number, circle["centre"]), _number(circle["diameter"])
         circles.add_row(*row, "hole" if circle["hole"] else "outer")
+    walls = _table(f"\nCylinders among the facets, {unit}", "name", "x", "y", "z", "axis", "diameter", "residual", "")
+    for wall in known["cylinders"]:
+        axis = " ".join(f"{x + 0.0:.2f}" for x in wall["axis"])
+        row = wall["name"], *map(_number, wall["point"]), axis, _number(wall["diameter"])
+        walls.add_row(*row, f"{wall['residual']:.1e}", "hole" if wall["hole"] else "outer")
     faces = _table(f"\nPlane faces, by their middles, {unit}", "name", "x", "y", "z", "normal", "material")
     for face in known["faces"]:
         normal = " ".join(f"{x + 0.0:.2f}" for x in face["normal"])
@@ -82,7 +103,7 @@ def report(scene: Scene) -> Group:
     for light in scene.lights:
         numbers = light.distance, light.intensity, light.half_size
         lights.add_row(light.kind, light.mount, *(f"{value:.4g}" for value in numbers))
-    tables = (t for t in (corners, edges, circles, faces, lights) if t.row_count)
+    tables = (t for t in (corners, edges, circles, walls, faces, lights) if t.row_count)
     return Group(*parts, *tables, Text(_smooth(scene)))
 
 

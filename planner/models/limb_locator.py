@@ -1,0 +1,86 @@
+"""What an edge locator finds at a limb, whose profile is no step, and how precisely.
+
+Smoothed by a Gaussian of w (lens, pixel and locator together) the level y^p inside the limb has the second derivative
+Gamma(p + 1) w^(p - 2) exp(-x^2 / 4) D_(1-p)(-x) / sqrt(2 pi) at x = y / w, with D a parabolic cylinder function
+(Whittaker's); p = 0 is the step, whose crossing is at 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import gamma, pbdv
+
+from planner.features.locator import edge_blur
+from planner.imaging.limbs.shading import Profile
+
+_STEPS, _LONGEST = 20, 0.5  # of Newton's method; w
+_SETTLED = 1e-10  # w
+_FARTHEST = 3.0  # w: beyond, what crosses zero is no edge
+
+
+class Crossing(NamedTuple):
+    """Where the second derivative crosses zero beside n points of a limb.
+
+    Attributes
+    ----------
+    shift : ndarray, shape (n,)
+        Outwards, px: the locator's bias against the limb. NaN where there is no crossing.
+    slope : ndarray, shape (n,)
+        Third derivative there, outwards, grey levels / px^3; positive where the body is brighter.
+    """
+
+    shift: np.ndarray
+    slope: np.ndarray
+
+    def variance(self, noise_variance, scale: float) -> np.ndarray:
+        """Variance of a point's place, px^2, in white noise (grey levels^2) smoothed by the locator's scale, px."""
+        return 3 * np.asarray(noise_variance) / (16 * np.pi * scale**6) / self.slope**2
+
+
+def limb_crossing(profile: Profile, beyond, blur_px: float, scale: float, curvature=0.0) -> Crossing:
+    """The crossing of the gradient locator.
+
+    Parameters
+    ----------
+    profile : Profile
+        Of the body's level, n points.
+    beyond : float or ndarray, shape (n,)
+        Level beside the body, grey levels.
+    blur_px, scale : float
+        Standard deviations of lens and locator, px.
+    curvature : float or ndarray, shape (n,)
+        Of the limb's image (`Strand.curvature`), 1 / px: to first order w^2 / 2 of it is added inwards.
+
+    Examples
+    --------
+    >>> step = Profile(np.array([[100.0]]), np.zeros(1))
+    >>> found = limb_crossing(step, 20.0, 0.6, 1.0)
+    >>> from planner.features.locator import kappa2
+    >>> bool(found.shift == 0), bool(np.isclose(found.variance(4.0, 1.0), kappa2(1.0, 0.6) * 4.0 / 80**2))
+    (True, True)
+    """
+    width = float(np.hypot(edge_blur(blur_px), scale))
+    terms = profile.coefficients.astype(float).copy()
+    terms[:, 0] -= beyond
+    powers = np.arange(terms.shape[1]) / 2
+    weights = terms * gamma(powers + 1) * width**powers
+    x = np.zeros(len(terms))
+    with np.errstate(all="ignore"):
+        for _ in range(_STEPS):
+            value, slope = (_sum(weights, powers, order, x) for order in (1, 2))
+            step = np.clip(np.where(slope != 0, value / slope, 0.0), -_LONGEST, _LONGEST)
+            x = x - step
+            if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
+                break
+        slope = -_sum(weights, powers, 2, x) * np.exp(-(x**2) / 4) / (np.sqrt(2 * np.pi) * width**3)
+        lost = ~((np.abs(x) < _FARTHEST) & (np.abs(step) < 1e-6) & (slope != 0))
+    return Crossing(
+        np.where(lost, np.nan, -width * x - width**2 * np.asarray(curvature) / 2), np.where(lost, 0.0, slope)
+    )
+
+
+def _sum(weights: np.ndarray, powers: np.ndarray, order: int, x: np.ndarray) -> np.ndarray:
+    """Sum of weights D_(order - p)(-x) over the powers, (n,)."""
+    return (weights * pbdv(order - powers, -x[:, None])[0]).sum(1)

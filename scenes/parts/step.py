@@ -1,0 +1,225 @@
+"""A part from a STEP file: exact surfaces and edges, and a solid of plane facets that today's pictures are made of."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from scenes.errors import InvalidInput
+from scenes.files import Unreadable, read_bytes
+from scenes.parts import mesh, step_kernel
+from scenes.parts.solid import Solid
+from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Surface, Torus
+from scenes.units import Unit, in_unit
+
+FORMATS = (".step", ".stp")
+MOST_BYTES = 32 << 20
+MOST_SECONDS = 120
+SEGMENTS = 96  # pieces of a full turn; fewer where there are many curved faces
+_SAME = 1e-6  # of the part's size: a circle of the mesh is that of an edge
+_MISSING = (
+    "object.file must be of a kind that can be read: a STEP file needs OpenCASCADE, pip install 'ice-vision[step]'"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class StepEdge:
+    """An edge of the part.
+
+    Attributes
+    ----------
+    kind : str
+        ``line``, ``circle``, ``ellipse`` or ``other``.
+    faces : tuple of int
+        Numbers of the faces that meet in it.
+    ends : ndarray, shape (2, 3)
+    centre, axis : ndarray, shape (3,), or None
+        Of a circle or an ellipse.
+    radii : tuple of float
+        One of a circle, both half axes of an ellipse, none otherwise.
+    """
+
+    kind: str
+    faces: tuple[int, ...]
+    ends: np.ndarray
+    centre: np.ndarray | None
+    axis: np.ndarray | None
+    radii: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class StepPart:
+    """A part as its file says it, in one unit of length.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the F faces in the file, empty where it has none.
+    surfaces : tuple of Surface or None
+        What each face lies on; None where it is no plane, cylinder, cone, sphere or torus.
+    edges : tuple of StepEdge
+    triangles : ndarray, shape (T, 3, 3)
+    triangle_faces : ndarray of int, shape (T,)
+    """
+
+    names: tuple[str, ...]
+    surfaces: tuple[Surface | None, ...]
+    edges: tuple[StepEdge, ...]
+    triangles: np.ndarray
+    triangle_faces: np.ndarray
+
+    @cached_property
+    def solid(self) -> Solid:
+        """The part as plane facets; circles are exact, and plane faces have the file's names where it gives them one.
+
+        Raises
+        ------
+        InvalidInput
+            As `mesh.solid`.
+        """
+        body = trimesh.Trimesh(self.triangles.reshape(-1, 3), np.arange(self.triangles.size // 3).reshape(-1, 3))
+        found = mesh.solid(body)
+        if len(found.triangles) != len(self.triangles):
+            raise InvalidInput("object.file must have faces without slivers, got some that vanish")
+        return replace(found, face_names=self._face_names(found), circles=self._exact(found))
+
+    def _face_names(self, solid: Solid) -> tuple[str, ...]:
+        names, given = list(solid.face_names), set(solid.face_names)
+        counts: dict[str, int] = {}
+        _, first = np.unique(solid.triangle_faces, return_index=True)
+        owners = self.triangle_faces[first]
+        for face, owner in enumerate(owners.tolist()):
+            name = self.names[owner]
+            if not name:
+                continue
+            counts[name] = counts.get(name, 0) + 1
+            wanted = name if counts[name] == 1 and isinstance(self.surfaces[owner], Plane) else f"{name}.{counts[name]}"
+            if wanted not in given:
+                given.add(wanted)
+                names[face] = wanted
+        return tuple(names)
+
+    def _exact(self, solid: Solid) -> tuple:
+        """The mesh's circles with the centres, axes and radii of the edges that they stand for."""
+        known = [edge for edge in self.edges if edge.kind == "circle"]
+        if not known:
+            return solid.circles
+        places = np.array([[*edge.centre, edge.radii[0]] for edge in known])
+        found = []
+        for circle in solid.circles:
+            off = np.abs(places - [*circle.centre, circle.radius]).max(1)
+            edge = known[int(off.argmin())]
+            if off.min() <= _SAME * solid.extent:
+                axis = edge.axis * math.copysign(1.0, float(edge.axis @ circle.axis))
+                circle = replace(circle, centre=edge.centre, axis=axis, radius=edge.radii[0])
+            found.append(circle)
+        return tuple(found)
+
+
+def read(path: Path, unit: Unit = "mm") -> StepPart:
+    """The part of a STEP file in a unit of length; the file says its own.
+
+    Raises
+    ------
+    InvalidInput
+        If the kernel is not installed, or the file is none, of no solid, too large, or ends the kernel's process.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise InvalidInput(f"object.file must be one of {', '.join(FORMATS)}, got {path.name!r}")
+    try:
+        data = read_bytes(path, MOST_BYTES)
+    except Unreadable as error:
+        raise InvalidInput(f"object.file must be a readable STEP file, got {path} ({error.reason})") from None
+    if find_spec("OCP") is None:
+        raise InvalidInput(f"{_MISSING}, got {path}")
+    if b"ISO-10303-21" not in data[:1000]:
+        raise InvalidInput(f"object.file must be a readable STEP file, got {path} (without its first line)")
+    return part(_asked(path, data), unit)
+
+
+def _asked(path: Path, data: bytes) -> dict[str, Any]:
+    """The kernel's record, from a process of its own."""
+    command = [sys.executable, "-P", step_kernel.__file__, str(SEGMENTS), str(mesh.MOST_FACES)]
+    try:
+        done = subprocess.run(command, input=data, capture_output=True, timeout=MOST_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise InvalidInput(f"object.file must be read within {MOST_SECONDS} s, got {path}") from None
+    if done.returncode == 0:
+        return json.loads(done.stdout)
+    if done.returncode == 3:
+        raise InvalidInput(f"{_MISSING}, got {path}")
+    told = done.stderr.decode("utf-8", "replace").strip().splitlines() if done.returncode == 2 else []
+    why = told[-1] if told else "readable by OpenCASCADE, got one at which it breaks down"
+    raise InvalidInput(f"object.file must be {why}: {path}")
+
+
+def part(record: dict[str, Any], unit: Unit = "mm") -> StepPart:
+    """The part of a kernel's record (`scenes.parts.step_kernel`), in a unit of length.
+
+    Raises
+    ------
+    InvalidInput
+        If it is none.
+    """
+    if record.get("format") != step_kernel.FORMAT:
+        raise InvalidInput(f"object.file must be a record of format {step_kernel.FORMAT}, got {record.get('format')!r}")
+    scale = in_unit(1.0, record["unit"], unit)
+    faces, edges = record["faces"], record["edges"]
+    corners = [scale * np.array(face["nodes"])[np.array(face["triangles"], int).reshape(-1, 3)] for face in faces]
+    return StepPart(
+        names=tuple(face["name"] for face in faces),
+        surfaces=tuple(_surface(face, scale) for face in faces),
+        edges=tuple(_edge(edge, scale) for edge in edges),
+        triangles=np.concatenate(corners),
+        triangle_faces=np.repeat(np.arange(len(faces)), [len(c) for c in corners]),
+    )
+
+
+def _surface(face: dict[str, Any], scale: float) -> Surface | None:
+    kind = face["kind"]
+    if kind == "other":
+        return None
+    point = scale * np.array(face["point"])
+    if kind == "plane":
+        return Plane(point, face["normal"])
+    axis, radius, hollow = face["axis"], scale * face["radius"], face["hollow"]
+    if kind == "sphere":
+        return Sphere(point, radius, hollow)
+    if kind == "torus":
+        tube = scale * face["tube"]
+        return Torus(point, axis, radius, tube, hollow) if tube < radius else None
+    if kind == "cylinder":
+        return Cylinder(point, axis, radius, tuple(scale * z for z in face["ends"]), hollow)
+    angle = face["half_angle"]
+    ends = sorted(scale * v * math.cos(angle) for v in face["along"])
+    return _cone(point, np.array(axis), radius, angle, ends, hollow)
+
+
+def _cone(point: np.ndarray, axis: np.ndarray, radius: float, angle: float, ends: list[float], hollow: bool) -> Cone:
+    """With its radius in the middle of the face, where it is not 0 as it may be at the file's own point."""
+    middle = sum(ends) / 2
+    wide = radius + math.tan(angle) * middle
+    return Cone(point + middle * axis, axis, wide, math.degrees(angle), (ends[0] - middle, ends[1] - middle), hollow)
+
+
+def _edge(edge: dict[str, Any], scale: float) -> StepEdge:
+    round_ = edge["kind"] in ("circle", "ellipse")
+    radii = edge.get("radii") or ([edge["radius"]] if "radius" in edge else [])
+    return StepEdge(
+        kind=edge["kind"],
+        faces=tuple(edge["faces"]),
+        ends=scale * np.array(edge["ends"]),
+        centre=scale * np.array(edge["point"]) if round_ else None,
+        axis=np.array(edge["axis"]) if round_ else None,
+        radii=tuple(scale * r for r in radii),
+    )

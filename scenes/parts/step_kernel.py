@@ -1,0 +1,186 @@
+"""What OpenCASCADE reads from a STEP file, as plain JSON; run as a process of its own.
+
+    python -P scenes/parts/step_kernel.py SEGMENTS MOST_FACES < part.step > part.json
+
+The kernel is C++, and a hostile file may end its process: then only this one ends. Lengths are mm, whatever the file's
+unit. One body: several solids are told apart by nothing here. Exit status 2 with one line on standard error where the
+file cannot be used.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import sys
+from typing import Any
+
+FORMAT = 1
+_FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
+_LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
+
+
+class Unusable(Exception):
+    """A file that is no STEP file of a solid."""
+
+
+def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
+    """Faces on their surfaces, edges on their curves, and triangles of ``segments`` pieces a turn."""
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+
+    reader, shape = _read(data)
+    faces = _parts(shape, "TopAbs_FACE", "Face")
+    if len(faces) > most_faces:
+        raise Unusable(f"of at most {most_faces} faces, got {len(faces)}")
+    if not faces or not _parts(shape, "TopAbs_SOLID", "Solid"):
+        raise Unusable("of a solid body, got none")
+    curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
+    pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
+    BRepMesh_IncrementalMesh(shape, _LINEAR, True, 4 * math.pi / pieces, False)
+    found = [{"name": _name(reader, face), **_surface(face), **_triangles(face)} for face in faces]
+    return {"format": FORMAT, "unit": "mm", "segments": pieces, "faces": found, "edges": _edges(shape, faces)}
+
+
+def _read(data: bytes) -> tuple[Any, Any]:
+    """The reader and all that it found, in mm."""
+    from OCP.STEPControl import STEPControl_Reader
+
+    reader = STEPControl_Reader()
+    if int(reader.ReadStream("part.step", io.BytesIO(data))) != 1:  # done
+        raise Unusable("a readable STEP file, got something else")
+    if not reader.TransferRoots() or not reader.NbShapes():
+        raise Unusable("of a solid body, got none")
+    return reader, reader.OneShape()
+
+
+def _parts(shape: Any, kind: str, cast: str) -> list[Any]:
+    """All different faces, edges or solids, in the file's order."""
+    from OCP import TopAbs, TopExp, TopoDS
+
+    explorer = TopExp.TopExp_Explorer(shape, getattr(TopAbs.TopAbs_ShapeEnum, kind))
+    found: list[Any] = []
+    seen: dict[int, list[Any]] = {}
+    while explorer.More():
+        here = getattr(TopoDS.TopoDS, cast)(explorer.Current())
+        known = seen.setdefault(hash(here), [])
+        if not any(here.IsSame(other) for other in known):
+            known.append(here)
+            found.append(here)
+        explorer.Next()
+    return found
+
+
+def _name(reader: Any, face: Any) -> str:
+    """The face's name in the file, empty where it has none."""
+    entity = reader.WS().TransferReader().EntityFromShapeResult(face, 1)
+    name = entity.Name() if hasattr(entity, "Name") else None
+    return name.ToCString() if name is not None else ""
+
+
+def _vector(place: Any) -> list[float]:
+    return [place.X(), place.Y(), place.Z()]
+
+
+def _axis(position: Any) -> dict[str, Any]:
+    return {"point": _vector(position.Location()), "axis": _vector(position.Direction())}
+
+
+def _surface(face: Any) -> dict[str, Any]:
+    """The surface that a face lies on; ``hollow`` where the material is outside."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.TopAbs import TopAbs_Orientation
+
+    adaptor = BRepAdaptor_Surface(face)
+    reverse = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+    kind = str(adaptor.GetType()).rsplit("_", 1)[-1].lower()
+    if kind == "plane":
+        plane = adaptor.Plane()
+        normal = _vector(plane.Axis().Direction())
+        flip = reverse == plane.Position().Direct()
+        return {"kind": kind, "point": _vector(plane.Location()), "normal": [-x for x in normal] if flip else normal}
+    if kind not in ("cylinder", "cone", "sphere", "torus"):
+        return {"kind": "other"}
+    shape = getattr(adaptor, kind.capitalize())()
+    facts: dict[str, Any] = {"kind": kind, **_axis(shape.Position())}
+    facts["hollow"] = reverse == shape.Position().Direct()
+    if kind == "cylinder":
+        return facts | {"radius": shape.Radius(), "ends": [adaptor.FirstVParameter(), adaptor.LastVParameter()]}
+    if kind == "cone":
+        along = [adaptor.FirstVParameter(), adaptor.LastVParameter()]
+        return facts | {"radius": shape.RefRadius(), "half_angle": shape.SemiAngle(), "along": along}
+    if kind == "sphere":
+        return facts | {"radius": shape.Radius()}
+    return facts | {"radius": shape.MajorRadius(), "tube": shape.MinorRadius()}
+
+
+def _triangles(face: Any) -> dict[str, Any]:
+    """Corners (n, 3, 3) of the face's triangles, counter-clockwise from outside."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation
+    from OCP.TopLoc import TopLoc_Location
+
+    location = TopLoc_Location()
+    mesh = BRep_Tool.Triangulation_s(face, location)
+    if mesh is None:
+        raise Unusable("of faces that can be cut into triangles, got others")
+    turn = location.Transformation()
+    nodes = [_vector(mesh.Node(i).Transformed(turn)) for i in range(1, mesh.NbNodes() + 1)]
+    order = (1, 3, 2) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2, 3)
+    corners = [[mesh.Triangle(i).Value(k) - 1 for k in order] for i in range(1, mesh.NbTriangles() + 1)]
+    return {"nodes": nodes, "triangles": corners}
+
+
+def _edges(shape: Any, faces: list[Any]) -> list[dict[str, Any]]:
+    """Edges with their curves and the numbers of the faces that meet in them; seams left out."""
+    owners: dict[int, list[tuple[Any, set[int]]]] = {}
+    for number, face in enumerate(faces):
+        for edge in _parts(face, "TopAbs_EDGE", "Edge"):
+            known = owners.setdefault(hash(edge), [])
+            for other, numbers in known:
+                if edge.IsSame(other):
+                    numbers.add(number)
+                    break
+            else:
+                known.append((edge, {number}))
+    return [_curve(edge) | {"faces": sorted(on)} for known in owners.values() for edge, on in known if len(on) > 1]
+
+
+def _curve(edge: Any) -> dict[str, Any]:
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+    adaptor = BRepAdaptor_Curve(edge)
+    kind = str(adaptor.GetType()).rsplit("_", 1)[-1].lower()
+    first, last = adaptor.FirstParameter(), adaptor.LastParameter()
+    facts: dict[str, Any] = {"kind": kind, "ends": [_vector(adaptor.Value(t)) for t in (first, last)]}
+    if kind == "circle":
+        return facts | _axis(adaptor.Circle().Position()) | {"radius": adaptor.Circle().Radius(), "turn": last - first}
+    if kind == "ellipse":
+        shape = adaptor.Ellipse()
+        return facts | _axis(shape.Position()) | {"radii": [shape.MajorRadius(), shape.MinorRadius()]}
+    return facts if kind == "line" else facts | {"kind": "other"}
+
+
+def main() -> int:
+    """Read standard input, write standard output; what the kernel itself prints goes nowhere."""
+    out = os.dup(1)
+    silent = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)
+    try:
+        found = record(sys.stdin.buffer.read(), int(sys.argv[1]), int(sys.argv[2]))
+    except ImportError:
+        print("missing", file=sys.stderr)
+        return 3
+    except Exception as error:  # the kernel's own are of many types
+        print(error if isinstance(error, Unusable) else "readable by OpenCASCADE, got a broken one", file=sys.stderr)
+        return 2
+    with os.fdopen(out, "w") as file:
+        json.dump(found, file)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.stdout.flush()
+    status = main()
+    sys.stderr.flush()
+    os._exit(status)  # the kernel's own end may take seconds

@@ -1,0 +1,87 @@
+"""Cylinders recognised among a mesh's facets."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import scenes
+from scenes.parts.mesh import solid
+from scenes.parts.recognised import cylinders
+from tests.parts import bracket, unevenly
+from validation.report import scene_table
+
+
+def turned(mesh: trimesh.Trimesh, seed: int) -> tuple[trimesh.Trimesh, np.ndarray]:
+    """Somewhere else in space, and the rotation."""
+    frame = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    frame *= np.sign(np.linalg.det(frame))
+    move = np.eye(4)
+    move[:3, :3], move[:3, 3] = frame, (3.0, -2.0, 7.0)
+    return mesh.copy().apply_transform(move), frame
+
+
+@pytest.mark.parametrize("sections", [12, 48, 200])
+def test_a_rod(sections):
+    """Radius, axis and ends to rounding, however many facets."""
+    mesh, frame = turned(trimesh.creation.cylinder(2.0, 5.0, sections=sections), sections)
+    found = cylinders(solid(mesh))
+    assert [each.name for each in found] == ["k1"]
+    surface = found[0].surface
+    assert surface.radius == pytest.approx(2.0, rel=1e-9)
+    assert abs(surface.axis @ frame[:, 2]) == pytest.approx(1, abs=1e-12)
+    assert np.diff(surface.ends)[0] == pytest.approx(5.0, rel=1e-9)
+    assert found[0].residual < 1e-9
+    assert found[0].turn_deg == pytest.approx(360)
+    assert not surface.hollow
+
+
+def test_single_precision_leaves_its_residual():
+    mesh, _ = turned(trimesh.creation.cylinder(2.0, 5.0, sections=64), 1)
+    mesh = trimesh.load_mesh(trimesh.util.wrap_as_stream(mesh.export(file_type="stl")), file_type="stl")
+    found = cylinders(solid(mesh))[0]
+    assert 1e-9 < found.residual <= found.largest < 2e-6
+    assert found.surface.radius == pytest.approx(2.0, abs=2e-6)
+
+
+def test_noise_of_vertices_is_the_residual():
+    """Both rims off by the same noise of sigma, so that facets stay plane: the root mean square is sigma."""
+    rng, sections, sigma = np.random.default_rng(5), 400, 2e-5
+    mesh = trimesh.creation.cylinder(2.0, 5.0, sections=sections)
+    x, y, _ = mesh.vertices.T
+    number = np.round(np.arctan2(y, x) * sections / (2 * np.pi)).astype(int) % sections
+    noise = rng.normal(size=sections)
+    mesh.vertices[:, :2] *= 1 + sigma / 2.0 * noise[number][:, None]
+    found = cylinders(solid(mesh))[0]
+    expected = sigma * np.std(noise) * np.sqrt(1 - 2 / sections)  # less the mean, and two shifts
+    assert found.residual == pytest.approx(expected, rel=0.02)
+
+
+def test_walls_of_holes_are_hollow():
+    """A bracket's two bores of unequal facets, turned in space: radii 4 and 5 mm, 12 and 6 mm deep."""
+    mesh, frame = turned(bracket(angles=unevenly(np.random.default_rng(2), 60)), 4)
+    found = cylinders(solid(mesh))
+    assert len(found) == 2
+    for each, (radius, deep) in zip(
+        sorted(found, key=lambda f: f.surface.radius), ((4.0, 12.0), (5.0, 6.0)), strict=True
+    ):
+        assert each.surface.hollow
+        assert each.surface.radius == pytest.approx(radius, rel=1e-8)
+        assert np.diff(each.surface.ends)[0] == pytest.approx(deep, rel=1e-8)
+        assert abs(each.surface.axis @ frame[:, 2]) == pytest.approx(1, abs=1e-10)
+        assert each.residual < 1e-8
+
+
+def test_a_cone_a_box_and_a_ball_are_none():
+    for mesh in (
+        trimesh.creation.cone(2.0, 3.0, sections=48),
+        trimesh.creation.box((1, 2, 3)),
+        trimesh.creation.icosphere(subdivisions=3),
+    ):
+        assert cylinders(solid(mesh)) == ()
+
+
+def test_listed_with_their_residuals():
+    """What ``ice show`` lists of the bundled bracket: both bores, their diameters within single precision."""
+    walls = scene_table.facts(scenes.load("bracket_mm"))["cylinders"]
+    assert [(w["name"], round(w["diameter"], 4), w["hole"]) for w in walls] == [("k1", 8.0, True), ("k2", 10.0, True)]
+    assert all(0 < w["residual"] <= w["largest"] < 1e-5 for w in walls)
