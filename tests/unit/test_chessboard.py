@@ -148,7 +148,7 @@ def test_the_end_of_the_scale_is_told(clean):
 
 
 def test_sharpened_pictures_are_measured_and_told(clean):
-    """Edges under an unsharp mask are narrower than any blur: corners stay, the status says that the model does not fit."""
+    """Edges under an unsharp mask are narrower than any blur: corners stay, the status says that no model fits."""
     sharp = clean + 0.8 * (clean - cv2.GaussianBlur(clean, (0, 0), 1.0))
     found = measure.chessboard(sharp + np.random.default_rng(1).normal(0, 1.0, clean.shape), (9, 6), noise=1.0)
     assert found.measured.all()
