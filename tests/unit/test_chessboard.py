@@ -165,5 +165,15 @@ def test_a_shape_that_is_none_is_refused(clean, shape):
 def test_an_image_without_a_board_is_refused():
     with pytest.raises(InvalidInput, match="image must show a whole chessboard of at least 3 x 3"):
         measure.chessboard(np.random.default_rng(1).normal(100, 3, (60, 80)))
-    with pytest.raises(InvalidInput, match="noise must be more than 0, got 0"):
-        measure.chessboard(np.zeros((60, 80)), noise=0)
+
+
+@pytest.mark.parametrize("noise", [0, -1.0, float("nan"), "x", 1e300, True])
+def test_noise_that_is_none_is_refused(noise):
+    with pytest.raises(InvalidInput, match="noise must be a number more than 0"):
+        measure.chessboard(np.zeros((60, 80)), noise=noise)
+
+
+def test_squares_that_are_too_small_are_told():
+    found = measure.chessboard(np.kron((np.indices((8, 8)).sum(0) % 2) * 200.0 + 20, np.ones((6, 6))))
+    assert set(found.status) == {"short"}
+    assert np.isnan(found.corners).all()
