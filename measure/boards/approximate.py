@@ -5,9 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from measure.boards.growing import grown
+from measure.boards.growing import grown, trimmed
 
 _SEEDS = ((3, 3), (5, 4), (4, 3))  # patterns that a larger board is grown from
+_USUAL = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5))  # looked for where nothing grows
 _LEAST = 16  # px of an image
 _LONGEST = 1600  # px; a larger image is looked at smaller first
 _BY_SECTORS = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
@@ -43,10 +44,15 @@ def _eight_bits(image: np.ndarray) -> np.ndarray:
 def _counted(grey: np.ndarray) -> np.ndarray | None:
     """A board of any size, the largest that grows from a part of it: with no more rows than columns, and begun at the
     end that is nearer to the image's first pixel."""
-    found = [part for seed in _SEEDS if (part := _by_sectors(grey, seed, cv2.CALIB_CB_LARGER)) is not None]
-    if not found:
+    parts = (_by_sectors(grey, seed, cv2.CALIB_CB_LARGER) for seed in _SEEDS)
+    inner = [kept for part in parts if part is not None and (kept := trimmed(grey, part)) is not None]
+    if not inner:
+        parts = (_by_squares(grey, shape) for shape in _USUAL)
+        inner = [kept for part in parts if part is not None and (kept := trimmed(grey, part)) is not None][:1]
+    whole = [grown(grey, part) for part in inner]
+    if not whole:
         return None
-    grid = grown(grey, max(found, key=lambda part: part.size))
+    grid = max(whole, key=lambda found: found.size)
     grid = np.rot90(grid) if len(grid) > grid.shape[1] else grid
     return grid if np.linalg.norm(grid[0, 0]) <= np.linalg.norm(grid[-1, -1]) else np.rot90(grid, 2)
 

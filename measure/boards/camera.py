@@ -121,9 +121,8 @@ def calibrate_camera(
     """
     free = read_model(model)
     _check(square_size, square_sd, image_shape)
-    boards = list(boards)
-    if not all(isinstance(board, Board) for board in boards):
-        raise InvalidInput("boards must be Boards, got something else")
+    if not isinstance(boards, list | tuple) or not all(isinstance(board, Board) for board in boards):
+        raise InvalidInput("boards must be a list of Boards, got something else")
     enough = sum(board.measured.sum() >= FEWEST_CORNERS for board in boards)
     if enough < FEWEST_BOARDS or enough < len(boards):
         raise InvalidInput(

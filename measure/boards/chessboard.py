@@ -14,13 +14,15 @@ from measure.boards.bend import bends
 from measure.boards.fitting import Crossings, fit_crossings
 from measure.boards.windows import steps, windows
 from measure.photo.noise import noise_sigma
-from scenes.arrays import picture
+from scenes.arrays import BRIGHTEST, picture
 from scenes.errors import InvalidInput
 
 _FALSE_ALARM = 0.01  # of all corners of a board together
 _FAINTEST = 3.0  # times the noise: half the difference of bright and dark
 _ORDINARY = 0.8  # px of lens blur to begin with
 _ROUGH, _FINE = 0.05, 1e-3  # px: the last step of either round; its error is about the square
+_LEAST_NOISE = 1e-150  # below, squares are no ordinary numbers
+_FULL = [2.0**bits - 1 for bits in range(8, 17)]  # ends of sensors' scales
 _MOST = 200  # corners along a side
 
 
@@ -89,8 +91,9 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
     """
     image = picture(image)
     shape = check_shape(shape)
-    if noise is not None and not (np.isfinite(noise) and noise > 0):
-        raise InvalidInput(f"noise must be more than 0, got {noise!r}")
+    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
+    if noise is not None and not (number and _LEAST_NOISE <= noise <= BRIGHTEST):
+        raise InvalidInput(f"noise must be a number more than 0 and at most {BRIGHTEST:g}, got {noise!r}")
     grid = approximate_corners(image, shape)
     if grid is None:
         wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
@@ -157,10 +160,8 @@ def _moved(grid: np.ndarray, room: np.ndarray, fitted: Crossings) -> np.ndarray:
 
 
 def _clipped(image: np.ndarray, some) -> np.ndarray:
-    """Whether a window reaches an end of the scale: many pixels of a rounded image have the least or greatest level."""
-    if not (image == np.rint(image)).all():
-        return np.zeros(len(some.levels), bool)
-    ends = [level for level in (image.min(), image.max()) if (image == level).mean() > 0.001]
+    """Whether a window reaches an end of the sensor's scale: 0 or 2^bits - 1 in many pixels."""
+    ends = [level for level in (image.min(), image.max()) if level in (0.0, *_FULL) and (image == level).mean() > 0.001]
     return np.array([any((row[here] == end).mean() > 0.02 for end in ends)
                      for row, here in zip(some.levels, some.there, strict=True)])  # fmt: skip
 

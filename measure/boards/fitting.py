@@ -11,9 +11,9 @@ from measure.boards.windows import Windows
 
 _LEVELS = 12  # linear in place in each of four quadrants
 PARAMETERS = SHAPE + _LEVELS
-_STEPS = 12
+_STEPS = 15
 _LARGEST = np.array([0.7, 0.7, 0.15, 0.15, 0.3])  # of a step
-_BLURS = np.log([0.2, 6.0])  # px
+_BLURS = np.log([0.35, 6.0])  # px; below, three points a pixel are too few, and a pixel hardly tells
 _TOGETHER = 64  # corners at a time: some 100 MB
 
 
@@ -66,13 +66,17 @@ def _fit(places, levels, there, shape, bend, enough) -> tuple[np.ndarray, ...]:
     first, shape = shape, shape.copy()
     size = there.sum(1)
     field = np.where(there[..., None], _field(places, first), 0.0)
+    damping, before = np.ones((len(shape), 1)), np.zeros((len(shape), 2))
     for _ in range(_STEPS):
         matrix, residual, square, contrast = _linear(places, levels, there, shape, bend, field)
+        matrix[np.isin(shape[:, 4], _BLURS), :, 4] = 0.0  # a blur at its end stays there
         step, inverse = _solved(matrix, residual)
-        step = np.clip(step[:, :SHAPE], -_LARGEST, _LARGEST)
-        shape = shape + step
+        back = (step[:, :2] * before).sum(1, keepdims=True) < 0
+        damping = np.where(back, damping / 2, np.minimum(1.5 * damping, 1.0))  # to and fro: where no model fits well
+        step = damping * np.clip(step[:, :SHAPE], -_LARGEST, _LARGEST)
+        before, shape = step[:, :2], shape + step
         shape[:, 4] = np.clip(shape[:, 4], *_BLURS)
-        moved = np.abs(step[:, :2]).max(1)
+        moved = np.abs(before).max(1)
         if (moved < enough).all():  # the last step is taken; what was before it differs by its square
             break
     good = (moved < 10 * enough) & (np.abs(shape[:, :2] - first[:, :2]).max(1) < 2.0) & np.isfinite(square)

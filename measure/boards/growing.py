@@ -8,7 +8,7 @@ import numpy as np
 from measure.boards.windows import steps
 
 _ALIKE = 0.7  # of its neighbour: how strongly a corner has to alternate; at the board's rim it is a half
-_MOST = 200  # lines
+_FEWEST, _MOST = 3, 200  # lines
 
 
 def grown(grey: np.ndarray, grid: np.ndarray) -> np.ndarray:
@@ -29,6 +29,22 @@ def grown(grey: np.ndarray, grid: np.ndarray) -> np.ndarray:
     return grid
 
 
+def trimmed(grey: np.ndarray, grid: np.ndarray) -> np.ndarray | None:
+    """The grid without outer lines that lie on the board's rim; None if fewer than 3 each way are left."""
+    for turn in range(4):
+        turned = np.rot90(grid, turn)
+        while min(turned.shape[:2]) >= _FEWEST and not _alternates(grey, turned[-2], turned[-1], steps(turned)[-2:]):
+            turned = turned[:-1]
+        grid = np.rot90(turned, -turn)
+    return grid if min(grid.shape[:2]) >= _FEWEST else None
+
+
+def _alternates(grey: np.ndarray, before: np.ndarray, line: np.ndarray, toward: np.ndarray) -> bool:
+    """Whether all corners of a line are crossings as those of the line before it, the other way round."""
+    known, here = _alternation(grey, before, toward[0]), _alternation(grey, line, toward[1])
+    return bool((-np.sign(known) * here > _ALIKE * np.abs(known)).all())
+
+
 def _next(grey: np.ndarray, grid: np.ndarray) -> np.ndarray | None:
     """The line of corners after the last row, if there is one."""
     line = 3 * grid[-1] - 3 * grid[-2] + grid[-3]
@@ -43,8 +59,7 @@ def _next(grey: np.ndarray, grid: np.ndarray) -> np.ndarray | None:
     found = cv2.cornerSubPix(grey, start, (half, half), (-1, -1), criteria)[:, 0].astype(float)
     if np.linalg.norm(found - line, axis=1).max() > 0.35 * size:
         return None
-    before, here = _alternation(grey, grid[-1], toward[0]), _alternation(grey, found, toward[1])
-    return found if (-np.sign(before) * here > _ALIKE * np.abs(before)).all() else None
+    return found if _alternates(grey, grid[-1], found, toward) else None
 
 
 def _alternation(grey: np.ndarray, corners: np.ndarray, toward: np.ndarray) -> np.ndarray:

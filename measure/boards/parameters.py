@@ -73,8 +73,9 @@ def read_model(text: str) -> Model:
     >>> read_model("f,k1").names
     ('fx', 'cx', 'cy', 'k1')
     """
-    names = [] if text == "none" else [part.strip() for part in str(text).split(",")]
+    given = text if isinstance(text, str) else "?"
+    names = [] if given == "none" else [part.strip() for part in given.split(",")]
     if len(set(names)) < len(names) or not set(names) <= {"f", *_COEFFICIENTS}:
-        raise InvalidInput(f"model must be none, or some of f, {', '.join(_COEFFICIENTS)}, got {text!r}")
+        raise InvalidInput(f"model must be none, or some of f, {', '.join(_COEFFICIENTS)}, got {str(text)[:80]!r}")
     always = ("fx", "cx", "cy") if "f" in names else ("fx", "fy", "cx", "cy")
     return Model((*always, *(name for name in _COEFFICIENTS if name in names)))

@@ -60,8 +60,10 @@ class Truth:
 def by_opencv(board: Board, image: np.ndarray) -> Board:
     """The same corners by cornerSubPix."""
     grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-    start = np.ascontiguousarray(np.rint(board.corners)[:, None], np.float32)
-    found = cv2.cornerSubPix(grey, start, (_BORDER, _BORDER), (-1, -1), _CRITERIA)[:, 0].astype(float)
+    good = board.measured
+    start = np.ascontiguousarray(np.rint(board.corners[good])[:, None], np.float32)
+    found = np.full(board.corners.shape, np.nan)
+    found[good] = cv2.cornerSubPix(grey, start, (_BORDER, _BORDER), (-1, -1), _CRITERIA)[:, 0]
     return replace(board, corners=found, covariance=np.tile(_SUB_PIX_PX**2 * np.eye(2), (len(found), 1, 1)))
 
 

@@ -107,8 +107,10 @@ def test_the_covariance_is_one_that_budgets_read(seen):
         ({"square_sd": -1.0}, "square_sd must be a number of at least 0"),
         ({"image_shape": (0, 4)}, "image_shape must be"),
         ({"model": "k9"}, "model must be none, or some of f, k1, k2, p1, p2, k3, got 'k9'"),
+        ({"model": np.zeros(3)}, "model must be none, or"),
+        ({"boards": True}, "boards must be a list of Boards"),
         ({"boards": []}, "boards must be at least 3"),
-        ({"boards": [1, 2, 3]}, "boards must be Boards"),
+        ({"boards": [1, 2, 3]}, "boards must be a list of Boards"),
     ],
 )
 def test_what_is_no_calibration_is_refused(seen, change, match):

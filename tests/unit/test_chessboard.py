@@ -9,7 +9,9 @@ from scipy import stats
 
 import measure
 from measure.boards.bend import bends
+from measure.boards.fitting import fit_crossings
 from measure.boards.saddle import response
+from measure.boards.windows import windows
 from scenes import InvalidInput
 from tests.boards import SMALL, in_order, poses
 from tests.oracle import polygon_image
@@ -73,6 +75,39 @@ def test_covariance_is_that_of_the_corners(clean):
     assert not low < total * 1.3 < high
 
 
+def crossing(parameters, shape=(31, 31)):
+    """Exact image of two edges that cross: x, y, both directions, logarithm of the blur, four levels; its quadrants."""
+    x, y, one, other, blur = parameters[:5]
+    along = [60 * np.array([np.cos(a), np.sin(a)]) for a in (one, other)]
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    sides = [(s * along[0], t * along[1]) for s, t in signs]
+    corner = np.array([x, y])
+    parts = [
+        polygon_image([corner, corner + u, corner + u + v, corner + v], shape, np.exp(blur), 1.0) for u, v in sides
+    ]
+    return sum(level * part for level, part in zip(parameters[5:], parts, strict=True)), parts
+
+
+def test_a_corner_has_the_cramer_rao_bound():
+    """Its covariance against the inverse Fisher information from central differences of exact images."""
+    at = np.array([15.3, 14.8, 0.2, 1.6, np.log(0.7), 40.0, 180.0, 40.0, 180.0])
+    image, parts = crossing(at)
+    way = 24 * np.array([[np.cos(at[2]), np.sin(at[2])], [np.cos(at[3]), np.sin(at[3])]])
+    grid = at[:2] + np.arange(-1, 2)[None, :, None] * way[0] + np.arange(-1, 2)[:, None, None] * way[1]
+    middle = windows(image, grid).some(np.arange(9) == 4)
+    found = fit_crossings(middle, at[None, :5] + [0.1, 0.1, 0.01, -0.02, 0.1], np.zeros((1, 2)), 1e-4)
+    assert found.shape[0, :2] == pytest.approx(at[:2], abs=1e-5)
+
+    x, y = middle.places[0][middle.there[0]].astype(int).T
+    columns = []
+    for k in range(5):
+        step = np.eye(9)[k] * 1e-4
+        columns.append((crossing(at + step)[0] - crossing(at - step)[0])[y, x] / 2e-4)
+    columns += [part[y, x] * field for part in parts for field in (1.0, (x - 15) / 10, (y - 15) / 10)]
+    matrix = np.stack(columns, 1)
+    assert found.unit_covariance[0] == pytest.approx(np.linalg.inv(matrix.T @ matrix)[:2, :2], rel=1e-3)
+
+
 def test_lines_that_a_lens_bends_are_known_to_be_bent(clean):
     """Curvature of the middle row against the circle through three images of its own straight line."""
     found = bends(SMALL.corners(POSE).reshape(6, 9, 2))
@@ -112,6 +147,15 @@ def test_the_end_of_the_scale_is_told(clean):
     assert not set(found.status) & {"ok"}
 
 
+def test_sharpened_pictures_are_measured_and_told(clean):
+    """Edges under an unsharp mask are narrower than any blur: corners stay, the status says that no model fits."""
+    sharp = clean + 0.8 * (clean - cv2.GaussianBlur(clean, (0, 0), 1.0))
+    found = measure.chessboard(sharp + np.random.default_rng(1).normal(0, 1.0, clean.shape), (9, 6), noise=1.0)
+    assert found.measured.all()
+    assert np.abs(found.corners - in_order(found, SMALL.corners(POSE))).max() < 0.05
+    assert found.status.count("misfit") > 40
+
+
 @pytest.mark.parametrize("shape", [(2, 6), (9,), (9, 6.5), "9x6", (9, 500)])
 def test_a_shape_that_is_none_is_refused(clean, shape):
     with pytest.raises(InvalidInput, match="shape must be columns and rows"):
@@ -121,5 +165,15 @@ def test_a_shape_that_is_none_is_refused(clean, shape):
 def test_an_image_without_a_board_is_refused():
     with pytest.raises(InvalidInput, match="image must show a whole chessboard of at least 3 x 3"):
         measure.chessboard(np.random.default_rng(1).normal(100, 3, (60, 80)))
-    with pytest.raises(InvalidInput, match="noise must be more than 0, got 0"):
-        measure.chessboard(np.zeros((60, 80)), noise=0)
+
+
+@pytest.mark.parametrize("noise", [0, -1.0, float("nan"), "x", 1e300, True])
+def test_noise_that_is_none_is_refused(noise):
+    with pytest.raises(InvalidInput, match="noise must be a number more than 0"):
+        measure.chessboard(np.zeros((60, 80)), noise=noise)
+
+
+def test_squares_that_are_too_small_are_told():
+    found = measure.chessboard(np.kron((np.indices((8, 8)).sum(0) % 2) * 200.0 + 20, np.ones((6, 6))))
+    assert set(found.status) == {"short"}
+    assert np.isnan(found.corners).all()

@@ -91,6 +91,19 @@ def _quadrilateral(_rng: np.random.Generator, value: Any) -> None:
     measure.measure_quadrilateral(value)
 
 
+def _chessboard(rng: np.random.Generator, value: Any) -> None:
+    arguments = [_clean()[:90, :90], (4, 3), 2.0]
+    arguments[rng.integers(3)] = value
+    measure.chessboard(*arguments)
+
+
+def _calibrate_camera(rng: np.random.Generator, value: Any) -> None:
+    board = measure.Board((3, 3), np.zeros((9, 2)), np.tile(np.eye(2), (9, 1, 1)), ("ok",) * 9, np.ones(9), 1.0, 1.0)
+    arguments = [[board] * 3, 25.0, (60, 80), "k1", 0.1]
+    arguments[rng.integers(5)] = value
+    measure.calibrate_camera(*arguments)
+
+
 def _fit_ellipse(rng: np.random.Generator, value: Any) -> None:
     if rng.random() < 0.5:
         measure.fit_ellipse(value)
@@ -147,5 +160,6 @@ def _region(_rng: np.random.Generator, value: Any) -> None:
 
 _USES = (
     _distance, _distance, _distance_poses, _distance_arguments, _propagate, _image_bound, _quadrilateral, _fit_ellipse,
-    _find_ellipse, _point_distance, _expose, _variance, _variances, _predict, _pose, _region,
+    _chessboard, _calibrate_camera, _find_ellipse, _point_distance, _expose, _variance, _variances, _predict, _pose,
+    _region,
 )  # fmt: skip
