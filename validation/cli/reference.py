@@ -21,9 +21,10 @@ _PAGE = "command-line.md"
 _INTRODUCTION = """# The command line
 
 This page is made from the program, by `python -m validation.cli.reference docs`; `ice COMMAND --help` prints the same.
-`SCENE` is a bundled scene's name (`ice scenes` lists them) or the path of a TOML file ([the scene format](scene-format.md));
-poses `P,A` are polar angle and azimuth in degrees. Every command takes `--json` ([what it prints](json.md)) and, anywhere, `-q`
-(no progress) and `-v` (say what is done). `ice --version` and `ice --install-completion` are the program's own.
+`SCENE` is a bundled scene's name (`ice scenes` lists them) or the path of a TOML file
+([the scene format](scene-format.md)); poses `P,A` are polar angle and azimuth in degrees. Every command takes `--json`
+([what it prints](json.md)) and, anywhere, `-q` (no progress) and `-v` (say what is done). `ice --version` and
+`ice --install-completion` are the program's own.
 
 | exit status | |
 |---|---|
