@@ -16,10 +16,10 @@ _FENCE = re.compile(r"^```\{?([\w-]+)\}? ?(.*?)\n(.*?)^```$", re.M | re.S)
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: language, the file that its caption adds it to ("" for none), text, line in the page."""
+    """A fenced block: language, caption ("" for none), text, line in the page."""
 
     language: str
-    file: str
+    caption: str
     text: str
     line: int
 
@@ -29,7 +29,7 @@ def blocks(page: Path) -> list[Block]:
     found, text = [], page.read_text()
     for fence in _FENCE.finditer(text):
         kind, argument, body = fence.groups()
-        caption = re.match(r":caption: .*?(\S+)\n\n?", body)
+        caption = re.match(r":caption: (.+)\n\n?", body)
         language = argument if kind == "code-block" else kind
         line = text.count("\n", 0, fence.start()) + 1
         found.append(Block(language, caption[1] if caption else "", body[caption.end() :] if caption else body, line))
