@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.result",
-    "Row": "batch.result", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
+    "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.rows",
+    "Row": "batch.rows", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
     "ratio_interval": "statistics", "verdict": "statistics",
 }  # fmt: skip
 

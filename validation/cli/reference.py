@@ -37,7 +37,7 @@ This page is made from the program, by `python -m validation.cli.reference docs`
 
 def page() -> str:
     """The reference page, Markdown: every command with its arguments and options."""
-    whole = typer.main.get_command(app)
+    whole: Any = typer.main.get_command(app)
     outer = typer.Context(whole, info_name="ice", terminal_width=1000, max_content_width=1000)
     table = ["| command | |", "|---|---|"]
     table += [f"| [`ice {name}`](#ice-{name}) | {about} |" for name, (_, about) in COMMANDS.items()]

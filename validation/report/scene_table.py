@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes import Luminaire, Scene
+from scenes import AnyLight, Scene
 
 
 def facts(scene: Scene) -> dict[str, Any]:
@@ -86,7 +86,7 @@ def report(scene: Scene) -> Group:
     return Group(*parts, *tables, Text(_smooth(scene)))
 
 
-def _kind(light: Luminaire) -> dict[str, str]:
+def _kind(light: AnyLight) -> dict[str, str]:
     return {"kind": light.kind, "mount": light.mount}
 
 
