@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test test-all fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement crowded clean
+.PHONY: validate test test-all fuzz mutants lint docs pages bench-measure bench-planner bench-cost reference proof agreement crowded clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -39,6 +39,17 @@ lint: $(VENV)/.test-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/ty check --python $(VENV)
+
+# The pages of docs/, into build/docs: offline, every warning an error.
+docs: $(VENV)/.docs-installed
+	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -W -n --keep-going -q -d build/docs/.doctrees docs build/docs
+	@echo build/docs/index.html
+
+# The pages that are made from the program.
+pages: $(VENV)/.installed
+	$(BIN)/python -m scenes.reference docs
+	$(BIN)/python -m validation.cli.reference docs
 
 # Store the run that the tests compare with anew, after a change of the measurement that was wanted.
 reference: $(VENV)/.installed
@@ -67,5 +78,9 @@ $(VENV)/.test-installed: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test]"
 	touch $@
 
+$(VENV)/.docs-installed: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[docs]"
+	touch $@
+
 clean:
-	rm -rf $(VENV) runs .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) runs build .pytest_cache .ruff_cache .hypothesis

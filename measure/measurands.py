@@ -14,10 +14,11 @@ from measure.measurement import Measurement, _check_method, checked_image, of_fi
 from measure.quantities import Found, find
 from planner.forecast import unit_of
 from scenes import Picture, Quantity, Scene
+from scenes.results import Shown, finite, value
 
 
-@dataclass(frozen=True)
-class Measurements:
+@dataclass(frozen=True, repr=False)
+class Measurements(Shown):
     """M quantities measured in images of leading shape (...); one image has the shape ().
 
     Attributes
@@ -62,6 +63,38 @@ class Measurements:
     def sigma(self) -> np.ndarray:
         """Standard deviation of `value`, shape (..., M)."""
         return np.sqrt(np.einsum("...mm->...m", self.covariance))
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record an image and measurand: value, one sigma, status; None where there is no value."""
+        count = len(self.quantities)
+        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.status))
+        return [
+            {
+                "image": i,
+                "name": quantity.name,
+                "kind": quantity.kind,
+                "unit": self.units[m],
+                "value": finite(values[m]),
+                "sigma": finite(sigmas[m]),
+                "nominal": float(self.nominal[m]),
+                "status": str(states[m]),
+            }
+            for i, (values, sigmas, states) in enumerate(zip(*columns, strict=True))
+            for m, quantity in enumerate(self.quantities)
+        ]
+
+    def _line(self) -> str:
+        images, count = int(np.prod(self.p_value.shape)), len(self.quantities)
+        if images == 1:
+            return "; ".join(_told(row) for row in self.as_rows())
+        good = int((self.status == status.OK).sum())
+        return f"{images} images, {count} measurands ({', '.join(self.names)}), {good} of {images * count} values ok"
+
+
+def _told(row: dict[str, Any]) -> str:
+    if row["value"] is None:
+        return f"{row['name']} {row['status']}"
+    return f"{row['name']} {value(row['value'], row['sigma'], row['unit'])}, {row['status']}"
 
 
 def measure(

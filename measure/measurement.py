@@ -14,14 +14,15 @@ from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
+from scenes.results import Shown, finite, value
 
 DEFAULT_ESTIMATOR = "gradient"
 PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _DARK = 1e-200  # squared grey levels
 
 
-@dataclass(frozen=True)
-class Measurement:
+@dataclass(frozen=True, repr=False)
+class Measurement(Shown):
     """Distances measured in images of leading shape (...); one image has the shape ().
 
     Attributes
@@ -62,6 +63,29 @@ class Measurement:
     used: np.ndarray
     rejected: np.ndarray
     p_value: np.ndarray
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record an image: distance and its variance, px and px^2, status; None where there is no value."""
+        columns = (self.value_px, self.variance_px2, self.bias_px, self.status, self.p_value)
+        return [
+            {
+                "image": i,
+                "value_px": finite(found),
+                "variance_px2": finite(variance),
+                "bias_px": float(shift),
+                "status": str(state),
+                "p_value": finite(p),
+            }
+            for i, (found, variance, shift, state, p) in enumerate(zip(*map(np.ravel, columns), strict=True))
+        ]
+
+    def _line(self) -> str:
+        count, good = self.value_px.size, int((self.status == status.OK).sum())
+        if count != 1:
+            return f"{count} images, {good} ok"
+        if not np.isfinite(self.value_px).all():
+            return str(self.status.item())
+        return f"{value(self.value_px.item(), self.variance_px2.item() ** 0.5, 'px')}, {self.status.item()}"
 
 
 def distance(

@@ -40,6 +40,10 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATER})
+
+
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
     "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied", "View",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from planner.features.measurand import Measurands
 from planner.features.seen import unit_normals
 from planner.models.errors import Errors
 from scenes import Corner, Quantity, Scene, Tolerance
+from scenes.results import finite, value
 
 _WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned", "clutter", "ok")
 _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
@@ -61,6 +63,29 @@ class Forecast:
     def ratio(self) -> float | None:
         """Standard deviation over half of the tolerance zone; None without a tolerance."""
         return None if self.tolerance is None else float(np.sqrt(self.variance_object)) / self.tolerance.half
+
+    @property
+    def told(self) -> str:
+        """The quantity in one line: name, value +- one sigma, status."""
+        return f"{self.name} {value(self.value_object, np.sqrt(self.variance_object), self.unit)}, {self.status}"
+
+    def as_row(self) -> dict[str, Any]:
+        """A record: value, standard deviations (not variances) in object and image; None where not known."""
+        zone = self.tolerance
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "unit": self.unit,
+            "value": self.value_object,
+            "sigma": finite(np.sqrt(self.variance_object)),
+            "sigma_image": finite(np.sqrt(self.variance_image)),
+            "bias": finite(self.bias_object),
+            "nominal": self.nominal,
+            "plus": zone and zone.plus,
+            "minus": zone and zone.minus,
+            "ratio": None if self.ratio is None else finite(self.ratio),
+            "status": self.status,
+        }
 
 
 def unit_of(scene: Scene, quantity: Quantity) -> str:

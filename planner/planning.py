@@ -25,14 +25,19 @@ from planner.search.sharing import Alone, applies
 from planner.search.trusted import trusted, untrusted
 from planner.search.varied import Varied
 from planner.search.varying import vary_choice
-from scenes import InvalidInput, Picture, Pose, Scene
+from scenes import InvalidInput, Picture, Pose, Scene, several
+from scenes.results import Shown, finite, poses
 
 Search = Literal["exhaustive", "alternating"]
 Shares = Literal["best", "given"]
 
 
-@dataclass(frozen=True)
-class Plan:
+def _rounded(pose: Pose) -> str:
+    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
+
+
+@dataclass(frozen=True, repr=False)
+class Plan(Shown):
     """The best setting and how it was found.
 
     Attributes
@@ -105,6 +110,20 @@ class Plan:
     def poses(self) -> tuple[Pose, Pose | tuple[Pose, ...]]:
         """Sensor and light, or lights."""
         return self.sensor, self.light
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a candidate, the best first: poses in degrees and variances; None where infinite."""
+        names = ("variance", "variance_object", "variance_image")
+        return [
+            poses(each.sensor, each.light)
+            | {"edges": " ".join(each.edges), "limiting": each.limiting}
+            | {name: finite(getattr(each, name)) for name in names}
+            for each in self.candidates
+        ]
+
+    def _line(self) -> str:
+        lights = " ".join(map(_rounded, several(self.light)))
+        return f"{self.scene.name}: sensor {_rounded(self.sensor)}, light {lights}; {self.prediction.told}"
 
 
 def plan(

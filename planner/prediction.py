@@ -20,6 +20,7 @@ from planner.models.errors import Errors
 from planner.models.texture import texture_errors
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit
+from scenes.results import Shown
 from scenes.units import in_unit
 
 __all__ = ["DEFAULT_OBJECTIVE", "EdgePrediction", "Objective", "Prediction", "minimised", "predict", "variances"]
@@ -46,8 +47,8 @@ class EdgePrediction:
     bias_px: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, repr=False)
+class Prediction(Shown):
     """How precisely one setting will let the scene's quantities be measured.
 
     ``measurands`` tells of all of them; the other attributes of the first, where nothing else is said.
@@ -139,6 +140,22 @@ class Prediction:
     def worst_ratio(self) -> float | None:
         """That ratio."""
         return max((each.ratio for each in self.measurands if each.ratio is not None), default=None)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a quantity (`Forecast.as_row`)."""
+        return [each.as_row() for each in self.measurands]
+
+    @property
+    def told(self) -> str:
+        """The quantity, or the worst of several, in one line."""
+        if len(self.measurands) == 1:
+            return self.measurands[0].told
+        ratio, count = self.worst_ratio, len(self.measurands)
+        worst = "" if ratio is None else f", sigma up to {ratio:.3g} of its tolerance ({self.limiting})"
+        return f"{count} measurands{worst}, {self.status}"
+
+    def _line(self) -> str:
+        return f"{self.model}: {self.told}"
 
 
 def variances(

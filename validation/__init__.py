@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.result",
-    "Row": "batch.result", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
+    "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.rows",
+    "Row": "batch.rows", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
     "ratio_interval": "statistics", "verdict": "statistics",
 }  # fmt: skip
 
@@ -19,3 +19,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -13,7 +13,7 @@ from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.crossing import CrossingLocator
-from measure.estimators.estimate import Estimate, Estimator, noisy
+from measure.estimators.estimate import Estimate, noisy
 from measure.estimators.gradient import gradient_locator
 from measure.estimators.isophote import TRIM, isophote_locator
 from measure.estimators.likelihood import LikelihoodEstimator
@@ -47,7 +47,7 @@ def best_estimator(scene: Scene) -> str:
     return "arrangement" if is_plain(scene) else "gradient"
 
 
-def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator | ArrangementEstimator:
+def estimator(layout: Layout, name: str, threshold: float = 12.0) -> AnyEstimator:
     """Prepare an estimator.
 
     Parameters
@@ -252,3 +252,6 @@ class SeparateEstimator:
 def _noisy(noise: Noise) -> Noise:
     """The noise, or the least that a likelihood can be made of."""
     return noise if noise.variance >= _FAINTEST**2 else noise.model_copy(update={"sigma": _FAINTEST})
+
+
+AnyEstimator = SeparateEstimator | LikelihoodEstimator | ArrangementEstimator

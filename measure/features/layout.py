@@ -140,8 +140,8 @@ class Layout:
 
     def shade(self, face: int, points: np.ndarray) -> np.ndarray:
         """Brightness of a face relative to its mean at places (..., 2), px; 1 where nothing is known."""
-        known = face != BACKGROUND and self.shadings[face] is not None
-        return self.shadings[face](points) if known else np.ones(points.shape[:-1])
+        shading = None if face == BACKGROUND else self.shadings[face]
+        return np.ones(points.shape[:-1]) if shading is None else shading(points)
 
     def labels(self) -> np.ndarray:
         """Which face each pixel belongs to, int, shape (height, width)."""

@@ -22,12 +22,13 @@ from planner.uncertainty.groups import Group
 from planner.uncertainty.groups import Source as EngineInput
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import InvalidInput, Picture, Scene
+from scenes.results import Shown, value
 
 CALIBRATION = "camera calibration"
 
 
-@dataclass(frozen=True, eq=False)
-class SceneBudget:
+@dataclass(frozen=True, eq=False, repr=False)
+class SceneBudget(Shown):
     """Budgets of all M measurands, and what they are made of.
 
     Attributes
@@ -56,6 +57,13 @@ class SceneBudget:
 
     def __getitem__(self, name: str) -> Budget:
         return next(each for each in self.measurands if each.name == name)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a measurand and source (`Budget.as_rows`)."""
+        return [{"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
+
+    def _line(self) -> str:
+        return "; ".join(f"{each.name} {value(each.value, each.U, each.unit)}, k = {each.k:.2f}" for each in self)
 
     def ufloats(self) -> dict[str, Any]:
         """Values as numbers of the `uncertainties` package by name; they share the station's inputs and temperature.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from planner.imaging.projection import direction
 from scenes import InvalidInput
@@ -71,8 +71,8 @@ class ViewingSpace:
         return direction(self.poses)
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.directions)
+    def _tree(self) -> KDTree:
+        return KDTree(self.directions)
 
     def neighbours(self, index: int) -> np.ndarray:
         """Indices of the directions next to one."""

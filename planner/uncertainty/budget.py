@@ -16,6 +16,7 @@ from scipy import stats
 
 from planner.uncertainty.groups import Group, Source, members
 from scenes.errors import InvalidInput
+from scenes.results import Shown, value
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class Contribution:
     members: tuple[Contribution, ...] = ()
 
 
-@dataclass(frozen=True)
-class Budget:
+@dataclass(frozen=True, repr=False)
+class Budget(Shown):
     """Uncertainty of one measurand; made by `budget`.
 
     Attributes
@@ -132,6 +133,10 @@ class Budget:
             {key: getattr(row, key) for key in keys} | {"dof": row.dof if math.isfinite(row.dof) else None}
             for row in self.contributions
         ]
+
+    def _line(self) -> str:
+        whole = value(self.value, self.U, self.unit)
+        return f"{self.name} {whole}, k = {self.k:.2f}, {len(self.contributions)} sources"
 
     def _part(self, kind: str) -> float:
         return math.hypot(*(row.contribution for row in self.contributions if row.kind == kind))

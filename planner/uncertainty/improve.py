@@ -82,7 +82,7 @@ def improvements(budget: Budget, factor: float = 0.5) -> tuple[Improvement, ...]
 def needed(budget: Budget, U_wanted: float, source: str) -> Needed:
     """How well a source must be known so that U becomes U_wanted (the question backwards).
 
-    u = sqrt((U_wanted / k)^2 - u_others^2) / |c| where no source has finite degrees of freedom. Otherwise k changes
+    u = sqrt((U_wanted / k)^2 - u_others^2) / abs(c) where no source has finite degrees of freedom. Otherwise k changes
     with u, and u is found by bisection; U never exceeds U_wanted at the result.
 
     Raises

@@ -9,6 +9,7 @@ import pytest
 
 import validation
 from validation.batch import campaign
+from validation.cost import size
 from validation.cost.goal import reach
 from validation.cost.trial import trial
 
@@ -64,3 +65,13 @@ def test_json_tells_the_goal(small_toml, tmp_path):
     document = json.loads(done.stdout)
     assert document["goal"]["half_width"] == pytest.approx(0.4, rel=0.1)
     assert set(document["goal"]["errors"]) == {"sampling", "render", "phase", "model"}
+
+
+def test_a_larger_image_tells_relatively_more(task1, monkeypatch):
+    """The parameter `size` of `ice cost`: n times the pixels a side, about n^-1.5 of the relative error."""
+    monkeypatch.setattr(size, "_FACTORS", (0.5, 1.0, 2.0))
+    monkeypatch.setattr(size, "_IMAGES", 2)
+    case = campaign.Campaign.of(task1).case(0)
+    found = size.size_parameter(case, "scalar_rgb", 1)
+    _, small, large = (row[-1] for row in found.rows)
+    assert small / large == pytest.approx(2**1.5, rel=0.1)

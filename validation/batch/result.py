@@ -12,11 +12,12 @@ import numpy as np
 import planner
 import scenes
 from scenes import InvalidInput, pairs
+from scenes.results import Shown, poses
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
 from validation.batch.found import Found
-from validation.batch.measurands import column
+from validation.batch.measurands import JudgedMeasurand, column
 from validation.batch.rows import Row, Rows
 from validation.batch.store import RunFile
 from validation.batch.work import methods
@@ -25,8 +26,8 @@ from validation.statistics import Verdict
 _WAITING = "not yet worked on"
 
 
-@dataclass(frozen=True)
-class Validation:
+@dataclass(frozen=True, repr=False)
+class Validation(Shown):
     """The outcome of a run.
 
     ``paper_scale`` is the free scale: the median of paper_ice / our paper model over all rows that have both.
@@ -50,6 +51,24 @@ class Validation:
     def to_json(self) -> dict[str, Any]:
         """The document of ``ice validate --json``; numbers that are not finite become null."""
         return document(self)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a setting and measurand: poses, variances in the scene's unit squared, ratio, status."""
+        return [
+            {"scene": row.scene, **poses(row.sensor, row.light), **row.parameters, **_told(each)}
+            for row in self.rows
+            for each in row.measurands
+        ]
+
+    def _line(self) -> str:
+        return f"{self.scene}: {len(self.rows)} settings, {self.verdict.text.split(';')[0]}"
+
+
+def _told(each: JudgedMeasurand) -> dict[str, Any]:
+    """The numbers of a measurand, its interval as two."""
+    facts = vars(each).copy()
+    low, high = facts.pop("ratio_interval") or (None, None)
+    return facts | {"ratio_low": low, "ratio_high": high}
 
 
 def collect(campaign: Campaign, store: RunFile) -> Validation:

@@ -125,7 +125,7 @@ class Rows(Sequence[Row]):
 
     def _kind(self, scene: str, methods: tuple[str, ...]) -> int:
         """Number of a kind of setting; the records get room for its methods."""
-        key, there = (scene, methods), self._records["judged"].shape[1]
+        key, there = (scene, methods), self._records["judged"].shape[1]  # ty: ignore[index-out-of-bounds]
         if len(methods) > there:
             wider = np.zeros(len(self._records), _record(len(methods)))
             some = slice(self._size)

@@ -106,7 +106,7 @@ def _picture(scene: scenes.Scene, sensor: Any, light: Any) -> scenes.Picture:
 
 def write_csv(found: SceneBudget, path: Path) -> None:
     """One row a measurand and contribution."""
-    rows = [{"measurand": each.name, "unit": each.unit, **row} for each in found for row in each.as_rows()]
+    rows = found.as_rows()
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import Any
 
-import typer
+import typer._click.shell_completion
+import typer.core
 from typer.core import TyperGroup
 from typer.main import get_command_from_info
 
@@ -45,6 +47,7 @@ class Commands(TyperGroup):
             formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
     def shell_complete(self, ctx, incomplete: str) -> list:
-        found = typer.core.TyperGroup.__mro__[1].shell_complete(self, ctx, incomplete)  # options, as of any command
+        command: Any = TyperGroup.__mro__[1]
+        found = command.shell_complete(self, ctx, incomplete)  # options, as of any command
         item = typer._click.shell_completion.CompletionItem
         return [item(name, help=text) for name, (_, text) in COMMANDS.items() if name.startswith(incomplete)] + found

@@ -8,6 +8,7 @@ import re
 import tempfile
 import traceback
 from collections.abc import Iterator
+from typing import Any
 
 import typer
 
@@ -68,7 +69,7 @@ def _internal(error: BaseException) -> str:
     return f"{said} (traceback in {log.name})"
 
 
-def usage(error: Exception) -> str:
+def usage(error: Any) -> str:
     """A usage error as "X must be ..., got ..."."""
     message = str(error.message).rstrip(".")
     parameter = getattr(error, "param", None)

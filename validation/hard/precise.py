@@ -93,7 +93,7 @@ def unit(a):
 
 def axes(pose):
     """Away from the object, right and down of a sensor at a pose in degrees."""
-    p, a = (mp.radians(angle) for angle in pose)
+    p, a = (mp.radians(angle) for angle in pose)  # ty: ignore[missing-attribute]
     out = (mp.sin(p) * mp.cos(a), mp.sin(p) * mp.sin(a), mp.cos(p))
     return out, (-mp.sin(a), mp.cos(a), mpf(0)), (mp.cos(p) * mp.cos(a), mp.cos(p) * mp.sin(a), -mp.sin(p))
 

@@ -86,7 +86,7 @@ def edge_pixels(scene: Scene, sensor: Pose, picture: np.ndarray) -> np.ndarray:
     if not layout.names:
         return found
     tool = prepared(layout, "canny", scene.locator.thresholds[0])
-    for part in tool.parts:
+    for part in tool.parts:  # ty: ignore[missing-attribute]
         if part:
             found[tuple(part.locator.edge_pixels(picture).T)] = True
     return found

@@ -34,7 +34,7 @@ def draw(path: Path, step_deg: float = 2.0) -> None:
         axes.set_title(
             f"{title}\nworst {error[seen].max():.1g}, above {SAFE:.0%}: {unsafe:.1%} of the poses", fontsize=10
         )
-        axes.set_rlim(0, 90)
+        axes.set_rlim(0, 90)  # ty: ignore[missing-attribute]
         axes.set_axisbelow(True)
         axes.grid(alpha=0.3)
         axes.tick_params(labelsize=7)

@@ -12,6 +12,8 @@ from rich.text import Text
 from scenes import Luminaire, Scene
 from scenes.parts.recognised import cylinders
 
+from scenes import AnyLight, Scene
+
 
 def facts(scene: Scene) -> dict[str, Any]:
     """For JSON; lengths in the scene's unit."""
@@ -107,7 +109,7 @@ def report(scene: Scene) -> Group:
     return Group(*parts, *tables, Text(_smooth(scene)))
 
 
-def _kind(light: Luminaire) -> dict[str, str]:
+def _kind(light: AnyLight) -> dict[str, str]:
     return {"kind": light.kind, "mount": light.mount}
 
 

@@ -1,0 +1,54 @@
+"""How `make docs` builds these pages: offline, every warning an error."""
+
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "_extensions")]
+
+project = "ICE"
+version = release = installed("ice-vision")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
+exclude_patterns = ["_build", "_extensions"]
+default_role = "py:obj"
+highlight_language = "text"
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+html_math_renderer = "mathml"
+html_theme = "furo"
+html_title = "ICE"
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
+html_extra_path = ["scene.schema.json"]
+html_copy_source = html_show_sphinx = False
+
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = False
+# Types of docstrings are prose ("ndarray, shape (n, 2)"), so no links are sought in them.
+napoleon_use_param = napoleon_use_rtype = False
+napoleon_use_ivar = False
+
+# What is not public, and other projects' names, have no page here: they are shown without a link.
+nitpick_ignore_regex = [("py:.*", ".*")]
+
+
+def _prose(app: Sphinx, page: nodes.document) -> None:
+    """Types of attributes are prose like those of parameters: what looks like a name in them is none."""
+    for shown in page.findall(addnodes.desc_annotation):
+        for found in list(shown.findall(addnodes.pending_xref)):
+            found.replace_self(found.children)
+
+
+def setup(app: Sphinx) -> None:
+    """What stands in backticks is a link where it names something public, else code; pydantic's own stays out."""
+    app.connect("doctree-read", _prose)
+    app.connect("missing-reference", lambda app, env, node, shown: shown if node["reftype"] == "obj" else None)
+    app.connect("autodoc-skip-member", lambda app, what, name, *rest: True if name.startswith("model_") else None)

@@ -1,0 +1,56 @@
+"""The scripts of `examples/`, with small settings, and the library example of the README."""
+
+import sys
+
+import pytest
+
+from tests.docs.pages import ROOT, blocks
+
+pytestmark = pytest.mark.render
+
+
+@pytest.fixture
+def example(monkeypatch):
+    """Import a script of the folder by its name."""
+    import importlib.util
+
+    def load(name):
+        spec = importlib.util.spec_from_file_location(f"example_{name}", ROOT / "examples" / f"{name}.py")
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, spec.name, module)
+        spec.loader.exec_module(module)
+        return module
+
+    return load
+
+
+def test_predict_and_plan(example, capsys):
+    now, best = example("predict_and_plan").main(step_deg=20)
+    assert best.prediction.variance_object < now.variance_object
+    assert "distance         sigma 0.00" in capsys.readouterr().out
+
+
+def test_render_and_compare(example):
+    """The seed's interval holds 1; a variance 1.3 times too large would not be held by it."""
+    ratio, (low, high) = example("render_and_compare").main(count=500)
+    assert low < ratio < high
+    assert low < 1 < high
+    assert not low < 1.3 < high
+
+
+def test_uncertainty_budget(example, capsys):
+    bore = example("uncertainty_budget").main()
+    assert sum(row.share for row in bore.contributions) == pytest.approx(1)
+    largest = max(bore.contributions, key=lambda row: row.share)
+    assert f"halving {largest.source}" in capsys.readouterr().out
+
+
+def test_every_example_is_tested():
+    names = {path.stem for path in (ROOT / "examples").glob("*.py")}
+    assert names == {"predict_and_plan", "render_and_compare", "uncertainty_budget"}
+
+
+def test_the_readmes_library_example(capsys):
+    (block,) = (block for block in blocks(ROOT / "README.md") if "planner.predict(scene, sensor" in block.text)
+    exec(compile(block.text, "README.md", "exec"), {})
+    assert "ok" in capsys.readouterr().out

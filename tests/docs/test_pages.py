@@ -1,0 +1,34 @@
+"""Pages made from the program are up to date; links lead somewhere; every page is in the contents."""
+
+import re
+
+import pytest
+
+from tests.docs.pages import DOCS, ROOT, links
+from validation.cli import reference
+
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+
+
+def test_the_command_lines_page_is_up_to_date():
+    """`python -m validation.cli.reference docs` writes it anew."""
+    assert (DOCS / "command-line.md").read_text() == reference.page()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in links(page):
+        path, _, heading = target.partition("#")
+        there = (page.parent / path).resolve() if path else page
+        assert there.is_relative_to(ROOT), target
+        assert there.exists(), target
+        if heading:
+            headings = re.findall(r"^#+ (.+)$", there.read_text(), re.M)
+            slugs = [re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings]
+            assert heading in slugs, target
+
+
+def test_every_page_is_in_the_contents():
+    """And the contents name no other."""
+    listed = re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.M)
+    assert sorted([*listed, "index"]) == sorted(page.stem for page in DOCS.glob("*.md"))

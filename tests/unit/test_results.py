@@ -1,0 +1,91 @@
+"""What results show of themselves: one line, a table in a notebook, rows, a data frame."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+import measure
+import planner
+import scenes
+from planner.uncertainty import Input, budget
+
+POSES = (30, 135), (15, 315)
+
+
+@pytest.fixture(scope="module")
+def results(task1):
+    """One of each kind; the picture is no render, for what is shown of it does not matter."""
+    dark = np.zeros((2, task1.camera.height, task1.camera.width))
+    plate = planner.predict(scenes.load("plate"), (30, 80), (35, 335))
+    known = scenes.Uncertainty(sensor_distance=0.1)
+    return {
+        "Prediction": plate,
+        "Plan": planner.plan(task1, step_deg=30),
+        "Measurement": measure.distance(dark, task1, *POSES),
+        "Measurements": measure.measure(dark, task1, *POSES, "gradient"),
+        "SceneBudget": planner.budget(task1.model_copy(update={"uncertainty": known}), *POSES),
+        "Budget": budget("<b>", "um", 200.0, [Input("repeats", 0.0, 3.0)], {"repeats": 1.0}),
+    }
+
+
+def test_one_line(results):
+    for kind, found in results.items():
+        text = repr(found)
+        assert text.startswith(f"{kind}(")
+        assert "\n" not in text
+        assert len(text) < 160
+
+
+def test_the_line_has_the_key_numbers(task1, results):
+    found = planner.predict(task1, *POSES)
+    sigma = math.sqrt(found.variance_object)
+    assert repr(found) == f"Prediction(calibrated: distance {found.value_object:.4f} +- {sigma:.4f} cm, ok)"
+    assert "hole to corner" in repr(results["Prediction"])
+    assert repr(results["Budget"]) == "Budget(<b> 200.0 +- 5.9 um, k = 1.96, 1 sources)"
+    plan = results["Plan"]
+    assert f"sensor ({plan.sensor.polar_deg:.1f}, {plan.sensor.azimuth_deg:.1f})" in repr(plan)
+    assert repr(results["Measurement"]) == "Measurement(2 images, 0 ok)"
+
+
+def test_tables_escape_what_they_show(results):
+    shown = results["Budget"]._repr_html_()
+    assert "<b>" not in shown
+    assert "&lt;b&gt;" in shown
+    assert shown.count("<tr>") == 2
+
+
+def test_a_notebook_shows_fifty_rows(task1):
+    dark = np.zeros((60, task1.camera.height, task1.camera.width))
+    shown = measure.distance(dark, task1, *POSES)._repr_html_()
+    assert shown.count("<tr>") == 51
+    assert "and 10 rows more" in shown
+
+
+def test_rows(results):
+    counts = {kind: len(found.as_rows()) for kind, found in results.items()}
+    assert counts == {**counts, "Prediction": 5, "Measurement": 2, "Measurements": 2, "Budget": 1}
+    assert counts["Plan"] == len(results["Plan"].candidates)
+    for found in results.values():
+        for row in found.as_rows():
+            assert all(not isinstance(v, float) or math.isfinite(v) for v in row.values())
+    first = results["Prediction"].as_rows()[0]
+    told = results["Prediction"].measurands[0]
+    assert first["sigma"] == pytest.approx(math.sqrt(told.variance_object))
+    assert first["plus"] == told.tolerance.plus
+
+
+def test_to_frame_without_pandas(results, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(scenes.InvalidInput, match=r"pandas must be installed for to_frame \(.*\), got none"):
+        results["Plan"].to_frame()
+
+
+def test_to_frame(results):
+    pandas = pytest.importorskip("pandas", reason="the extra `frames`, which `make test` installs")
+    for found in results.values():
+        frame = found.to_frame()
+        assert isinstance(frame, pandas.DataFrame)
+        assert frame.shape == (len(found.as_rows()), len(found.as_rows()[0]))
+    assert results["Measurement"].to_frame()["value_px"].dtype == float
