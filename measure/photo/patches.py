@@ -44,9 +44,7 @@ class Patches:
     seen: int
 
 
-def smooth_patches(
-    image: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf), step: float = 0.0
-) -> Patches:
+def smooth_patches(image: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf), step: float = 0.0) -> Patches:
     """The patches of an image (height, width) in which nothing but a shading and noise is to be seen.
 
     White noise spreads evenly over the polynomials of second and third degree and all that is finer, an edge does not:
