@@ -76,7 +76,7 @@ def polynomials() -> np.ndarray:
 
 
 def _cut(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First pixels (P, 2) and pixels (P, SIDE * SIDE) of patches that tile the image, some of them where it is large."""
+    """First pixels (P, 2) and pixels (P, SIDE * SIDE) of patches that tile the image, not all of a large one."""
     height, width = (size // SIDE * SIDE for size in image.shape)
     rows = np.arange(0, height, SIDE)
     step = max(rows.size * (width // SIDE) // _ENOUGH, 1)
