@@ -104,8 +104,9 @@ def measure_quadrilateral(
     photo = image if isinstance(image, Photograph) else Photograph(picture(image))
     levels, name = photo.levels, SYNONYMS.get(estimator, estimator)
     near = find_quadrilateral(levels) if corners is None else _expected(corners, levels.shape)
-    seen = recording(photo)
-    there = expected(levels, refined(levels, near), seen)
+    near = refined(levels, near)
+    seen = recording(photo, near)
+    there = expected(levels, near, seen)
     found = _found(levels, there, "gradient" if lens is not None else name, lens is None)
     if found.state in status.MEASURED and lens is not None:
         straight = straight_corners(levels, there.at(lens.straighten(found.corners)), lens)
@@ -134,33 +135,41 @@ class _Found:
 
 def _found(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Found:
     """What an estimator finds in the image; where sides differ in their blur each is measured by itself."""
-    image, arranged = levels[None], name == "arrangement" and not there.blur.differs
-    if arranged:
-        shape, fitting = likeliest(levels, there, there.layout)
-        if shape.status[0] in status.MEASURED:
-            return _told(shape, str(shape.status[0]), shape.p_value[0], name, 1.0, fitting.at(shape.corners[0]))
-    first = find_shape(image, there.layout, "gradient")
+    image, apart = levels[None], there.blur.differs
+    if not judged or apart:
+        return _beside(levels, there, name, judged)
+    whole, there = likeliest(levels, there, there.layout)
+    if whole.status[0] not in status.MEASURED:
+        return _beside(levels, there, name, judged)
+    corners, state = whole.corners[0], str(whole.status[0])
+    near = there.at(corners)
+    if name == "arrangement":
+        return _told(whole, state, whole.p_value[0], name, 1.0, near)
+    threshold = _threshold(whole)
+    shape = find_shape(image, near, name, threshold, judged=False)
+    fits = status.MISFIT if state == status.MISFIT else status.OK
+    return _told(shape, _judged(shape, fits, there), whole.p_value[0], name, threshold, near)
+
+
+def _beside(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Found:
+    """Each side by itself, from where edge points show it: where their blur differs, or the whole is not seen."""
+    first = find_shape(levels[None], there.layout, "gradient")
     state = str(first.status[0])
     if state not in status.MEASURED or not judged:
         return _told(first, state, np.nan, "gradient", 1.0, there.layout)
     near, threshold = there.at(first.corners[0]), _threshold(first)
-    if there.blur.differs:
-        name, probability = "strip" if name == "arrangement" else name, there.blur.p_value
-        shape = first if name == "gradient" else find_shape(image, near, name, threshold, judged=False)
-        fits = status.OK if probability >= WORST else status.MISFIT
-    else:
-        whole, fitting = likeliest(levels, there, near)
-        probability, fits = whole.p_value[0], status.MISFIT if status.MISFIT in whole.status else status.OK
-        near = fitting.at(first.corners[0])
-        there = fitting
-        shape = whole if arranged else first
-        if name not in ("arrangement", "gradient"):
-            shape = find_shape(image, near, name, threshold, judged=False)
-    uneven = status.CLUTTER if there.uneven and not arranged else status.OK
+    name, shape = "strip" if name == "arrangement" else name, first
+    if name != "gradient":
+        shape = find_shape(levels[None], near, name, threshold, judged=False)
+    fits = status.OK if there.blur.p_value >= WORST else status.MISFIT
+    return _told(shape, _judged(shape, fits, there), there.blur.p_value, name, threshold, near)
+
+
+def _judged(shape: Shape, fits: str, there: Expected) -> str:
+    """Status of what each side by itself tells."""
     state = str(shape.status[0])
-    if state in status.MEASURED:
-        state, near = status.worst(state, fits, uneven), replace(there, orders=there.orders).at(shape.corners[0])
-    return _told(shape, state, probability, name, threshold, near)
+    uneven = status.CLUTTER if there.uneven else status.OK
+    return status.worst(state, fits, uneven) if state in status.MEASURED else state
 
 
 def _told(shape: Shape, state: str, p: float, name: str, threshold: float, layout: Layout) -> _Found:
@@ -186,7 +195,7 @@ def _expected(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _threshold(shape) -> float:
-    """Canny's gradient threshold at a third of the weakest edge's peak."""
+    """Canny's gradient threshold at a third of the weakest edge's peak, grey levels a px."""
     return float(max(shape.edge_contrast[0].min() / 9, 1e-6))
 
 

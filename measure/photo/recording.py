@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from measure import status
+from measure.features.calipers import distance_to_segment
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import Correlation, correlation
 from measure.photo.noise_curve import NoiseCurve, limits_of, noise_curve, rounding
-from measure.photo.patches import Patches, smooth_patches
+from measure.photo.patches import SIDE, Patches, smooth_patches
 from scenes.photograph import Photograph
+
+_BLURRED = 3.0  # px beside an edge
 
 
 @dataclass(frozen=True)
@@ -43,11 +46,16 @@ class Recording:
         )
 
 
-def recording(photo: Photograph) -> Recording:
-    """How a photograph was recorded, from itself."""
+def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording:
+    """How a photograph was recorded, from itself; patches across the sides of a polygon (k, 2), px, do not count.
+
+    Edges that hardly stand out of the noise pass for smooth, and look like noise that is not white.
+    """
     image = photo.levels
     curve, (step, _) = noise_curve(image, photo.full), rounding(image)
     patches = smooth_patches(image, limits_of(image, photo.full), step)
+    if corners is not None:
+        patches = _beside(patches, corners)
     found = correlation(patches, curve)
     if not found.white:
         whole = found.kernel[found.kernel.shape[0] // 2, found.kernel.shape[1] // 2]
@@ -58,6 +66,10 @@ def recording(photo: Photograph) -> Recording:
     return Recording(curve, found, photo.compressed or is_compressed(image, step), patches)
 
 
-def noise_at(curve: NoiseCurve, levels: np.ndarray) -> float:
-    """Standard deviation of the noise at the mean of some grey levels."""
-    return float(np.sqrt(curve.variance(np.mean(levels))))
+def _beside(patches: Patches, corners: np.ndarray) -> Patches:
+    """The patches that no side of a polygon touches."""
+    middle = patches.corner[:, ::-1] + (SIDE - 1) / 2
+    sides = zip(corners, np.roll(corners, -1, 0), strict=True)
+    clear = np.all([distance_to_segment(middle, *side) > SIDE / np.sqrt(2) + _BLURRED for side in sides], axis=0)
+    kept = {name: getattr(patches, name)[clear] for name in ("corner", "pixels", "level", "variance")}
+    return replace(patches, **kept)

@@ -156,8 +156,8 @@ class Outcome:
 
     @property
     def honest(self) -> bool:
-        """At most a twentieth of the images are ok, or the ok ones are unbiased and scatter as told."""
-        if self.ok <= 0.05 * self.count:
+        """At most a twentieth of the images are ok (or one), or the ok ones are unbiased and scatter as told."""
+        if self.ok <= max(0.05 * self.count, 1):
             return True
         error = 1 / np.sqrt(2 * max(self.ok - 1, 1))
         return (
