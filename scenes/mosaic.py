@@ -13,7 +13,7 @@ _CODES = {  # OpenCV names patterns by the second row's second and third pixel
     "GRBG": cv2.COLOR_BayerGB2GRAY, "GBRG": cv2.COLOR_BayerGR2GRAY,
 }  # fmt: skip
 _UNEVEN = 0.02  # of a channel's share of the light: beyond it the picture has colours
-_BLOCK = 16  # px: means of such squares tell the shares
+_BLOCK = 8  # px of one colour: means of such squares tell the shares
 
 
 def bits(image: np.ndarray) -> int:
@@ -37,13 +37,12 @@ def balanced(levels: np.ndarray, pattern: str) -> tuple[np.ndarray, str]:
     pattern = pattern.upper()
     if pattern not in PATTERNS:
         raise InvalidInput(f"--bayer must be one of {', '.join(PATTERNS)}, got {pattern!r}")
-    planes = {place: _means(levels[place[0] :: 2, place[1] :: 2]) for place in np.ndindex(2, 2)}
-    mean = sum(planes.values()) / 4
-    shares = {place: plane / np.maximum(mean, 1e-9) for place, plane in planes.items()}
-    bright = mean > 0.05 * mean.max()
-    middle = {place: float(np.median(share[bright])) for place, share in shares.items()}
-    uneven = max(float(np.percentile(np.abs(shares[p][bright] / middle[p] - 1), 90)) for p in shares)
-    if uneven > _UNEVEN:
+    planes = {place: _blocks(levels[place[0] :: 2, place[1] :: 2]) for place in np.ndindex(2, 2)}
+    mean, spread = sum(blocks.mean(-1) for blocks in planes.values()) / 4, planes[0, 0].std(-1)
+    even = (spread <= 2 * np.median(spread)) & (mean > 0.05 * mean.max())  # no edges
+    shares = {place: blocks.mean(-1)[even] / mean[even] for place, blocks in planes.items()}
+    middle = {place: float(np.median(share)) for place, share in shares.items()}
+    if max(float(np.percentile(np.abs(share / middle[p] - 1), 90)) for p, share in shares.items()) > _UNEVEN:
         whole = levels if levels.dtype in (np.uint8, np.uint16) else np.clip(np.rint(levels), 0, 65535)
         return cv2.cvtColor(np.ascontiguousarray(whole.astype(np.uint16)), _CODES[pattern]), "interpolated mosaic"
     found = levels.astype(np.float32)
@@ -52,10 +51,10 @@ def balanced(levels: np.ndarray, pattern: str) -> tuple[np.ndarray, str]:
     return found, "the mosaic itself, its colours balanced"
 
 
-def _means(plane: np.ndarray) -> np.ndarray:
-    """Means of squares of one colour's pixels."""
+def _blocks(plane: np.ndarray) -> np.ndarray:
+    """One colour's pixels in squares, (n, pixels of each)."""
     height, width = (size // _BLOCK * _BLOCK for size in plane.shape)
     if not height or not width:
         raise InvalidInput(f"--bayer must go with an image of at least {2 * _BLOCK} px, got {plane.shape}")
-    blocks = plane[:height, :width].astype(float).reshape(height // _BLOCK, _BLOCK, -1, _BLOCK)
-    return blocks.mean((1, 3))
+    blocks = plane[:height, :width].astype(np.float32).reshape(height // _BLOCK, _BLOCK, -1, _BLOCK)
+    return blocks.swapaxes(1, 2).reshape(-1, _BLOCK**2)

@@ -65,8 +65,8 @@ class NoiseCurve:
         return Noise(sigma=sigma, bits=self.bits, gain=gain, dark_level=self.dark_level)
 
 
-def noise_curve(image: np.ndarray) -> NoiseCurve:
-    """The noise of an image (height, width), grey levels, from itself.
+def noise_curve(image: np.ndarray, full: float | None = None) -> NoiseCurve:
+    """The noise of an image (height, width), grey levels, from itself; its scale ends at ``full`` if anywhere.
 
     Examples
     --------
@@ -76,8 +76,7 @@ def noise_curve(image: np.ndarray) -> NoiseCurve:
     True
     """
     step, bits = rounding(image)
-    limits = (0.0, 2.0**bits - 1) if bits else (-np.inf, np.inf)
-    patches = smooth_patches(image, limits, step)
+    patches = smooth_patches(image, limits_of(image, full), step)
     if len(patches.level) < _FEW:
         return NoiseCurve(max(noise_sigma(image) ** 2 - step**2 / 12, 0.0), 0.0, 0.0, step, bits if step == 1 else None)
     level, variance, error = _groups(patches, step)
@@ -88,6 +87,14 @@ def noise_curve(image: np.ndarray) -> NoiseCurve:
     falls = clear < -_CLEAR and dark + gain * top < _FALLING**2 * dark
     dark, gain = (dark, gain) if clear > _CLEAR or falls else (mean, 0.0)
     return NoiseCurve(max(dark, 0.0), gain, max(lowest, 0.0), step, bits if step == 1 else None)
+
+
+def limits_of(image: np.ndarray, full: float | None = None) -> tuple[float, float]:
+    """Levels at which the sensor's scale ends: 0 and ``full``, or what rounded levels tell; else none."""
+    _, bits = rounding(image)
+    if full is None and bits is None:
+        return -np.inf, np.inf
+    return 0.0, (2.0**bits - 1 if full is None else full) * (1 - 1e-6)
 
 
 def rounding(image: np.ndarray) -> tuple[float, int | None]:
@@ -127,7 +134,11 @@ def _line(level: np.ndarray, variance: np.ndarray, error: np.ndarray) -> tuple[f
     """Variance at level 0, its slope, and the slope in standard errors: those of each point as the line says."""
     if level.size < 3 or np.ptp(level) <= 0:
         return float(variance.mean()), 0.0, 0.0
-    design, relative, expected = np.stack([np.ones_like(level), level], 1), error / np.maximum(variance, 1e-12), variance
+    design, relative, expected = (
+        np.stack([np.ones_like(level), level], 1),
+        error / np.maximum(variance, 1e-12),
+        variance,
+    )
     for _ in range(4):
         weight = 1 / np.maximum(relative * np.maximum(expected, 1e-3 * variance.max()), 1e-12)
         fit = np.linalg.lstsq(design * weight[:, None], variance * weight, rcond=None)[0]

@@ -44,9 +44,7 @@ class Patches:
     seen: int
 
 
-def smooth_patches(
-    image: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf), step: float = 0.0
-) -> Patches:
+def smooth_patches(image: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf), step: float = 0.0) -> Patches:
     """The patches of an image (height, width) in which nothing but a shading and noise is to be seen.
 
     White noise spreads evenly over the polynomials of second and third degree and all that is finer, an edge does not:
@@ -78,7 +76,7 @@ def polynomials() -> np.ndarray:
 
 
 def _cut(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First pixels (P, 2) and pixels (P, SIDE * SIDE) of patches that tile the image, some of them where it is large."""
+    """First pixels (P, 2) and pixels (P, SIDE * SIDE) of patches that tile the image, not all of a large one."""
     height, width = (size // SIDE * SIDE for size in image.shape)
     rows = np.arange(0, height, SIDE)
     step = max(rows.size * (width // SIDE) // _ENOUGH, 1)

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from measure import status
 from measure.estimators.registry import SYNONYMS
-from measure.features.layout import polygon_layout
-from measure.features.optics import Optics
+from measure.features.found import Shape
+from measure.features.layout import Layout
 from measure.features.shape import find_shape
 from measure.find.search import find_quadrilateral
+from measure.goodness import WORST
+from measure.photo.expected import Expected, expected, likeliest
+from measure.photo.grown import grown_covariance
 from measure.photo.lens import Lens, straight_corners
-from measure.photo.noise import noise_sigma
-from measure.photo.profiles import edge_sigma, refined
+from measure.photo.noise_curve import NoiseCurve
+from measure.photo.profiles import refined
+from measure.photo.recording import Recording, recording
 from scenes import InvalidInput
 from scenes.arrays import finite, picture
+from scenes.photograph import Photograph
+
+_ALIKE = 0.05  # of a standard deviation: what correlated noise may change before the status says so
 
 
 @dataclass(frozen=True)
@@ -43,11 +50,19 @@ class Quadrilateral:
     measurands : tuple of MeasuredValue
         Four sides, two diagonals, four angles.
     noise, blur_px : float
-        Standard deviation of a grey level and of the lens blur, px, as estimated from the image.
+        Standard deviation of a grey level, at the mean level around it, and of the lens blur, px (of the sharpest side
+        where they differ), as estimated from the image.
     status : str
+        ``compressed``, ``correlated`` and ``misfit`` come with values whose standard deviation is not to be relied on.
     p_value : float
         Goodness of fit of straight sides, smooth faces, Gaussian blur and white noise, whichever estimator measured:
         where it is below 1e-4 the status is ``misfit``. NaN where a lens bends the sides.
+    estimator : str
+        What measured: ``strip`` instead of ``arrangement`` where the sides are not equally blurred.
+    curve : NoiseCurve
+        Variance of the noise at each grey level.
+    side_blur_px : ndarray, shape (4,)
+        Standard deviation of each side's blur, px; NaN where it is not told.
     """
 
     corners: np.ndarray
@@ -57,10 +72,13 @@ class Quadrilateral:
     blur_px: float
     status: str
     p_value: float
+    estimator: str
+    curve: NoiseCurve
+    side_blur_px: np.ndarray
 
 
 def measure_quadrilateral(
-    image: np.ndarray,
+    image: np.ndarray | Photograph,
     estimator: str = "arrangement",
     lens: Lens | None = None,
     corners: np.ndarray | None = None,
@@ -69,8 +87,8 @@ def measure_quadrilateral(
 
     Parameters
     ----------
-    image : array_like, shape (height, width)
-        Grey levels.
+    image : array_like, shape (height, width), or Photograph
+        Grey levels, linear in the light; `scenes.photograph.read` makes them of a file.
     estimator : {"strip", "arrangement", "isophote", "gradient", "canny"}
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
     lens : Lens, optional
@@ -83,33 +101,88 @@ def measure_quadrilateral(
     InvalidInput
         If there is no quadrilateral, the image is no image, or the corners are no quadrilateral's in it.
     """
-    image = picture(image)
-    near = find_quadrilateral(image) if corners is None else _expected(corners, image.shape)
-    corners, noise = refined(image, near), max(noise_sigma(image), np.sqrt(1 / 12))
-    blur = edge_sigma(image, corners)
-    optics = Optics(image.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
-    likeliest = SYNONYMS.get(estimator, estimator) == "arrangement" and lens is None
-    if likeliest:
-        shape = find_shape(image[None], polygon_layout(corners, optics), "arrangement")
-        if shape.status[0] in status.MEASURED:
-            return _reported(shape.corners[0], shape.covariance[0], noise, blur, str(shape.status[0]), shape.p_value[0])
-    shape = find_shape(image[None], polygon_layout(corners, optics), "gradient")
+    photo = image if isinstance(image, Photograph) else Photograph(picture(image))
+    levels, name = photo.levels, SYNONYMS.get(estimator, estimator)
+    near = find_quadrilateral(levels) if corners is None else _expected(corners, levels.shape)
+    near = refined(levels, near)
+    seen = recording(photo, near)
+    there = expected(levels, near, seen)
+    found = _found(levels, there, "gradient" if lens is not None else name, lens is None)
+    if found.state in status.MEASURED and lens is not None:
+        straight = straight_corners(levels, there.at(lens.straighten(found.corners)), lens)
+        found = replace(found, corners=straight.corners, covariance=straight.covariance, p_value=float("nan"))
+    elif found.state in status.MEASURED and not seen.correlation.white:
+        found = _grown(levels, found, seen)
+    if found.state in status.MEASURED:
+        said = status.OK if seen.correlation.white or found.alike else status.CORRELATED
+        found = replace(found, state=status.worst(found.state, said, seen.status))
+    return _reported(found, there, seen)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Corners, their covariance, and how they were found; ``alike`` where correlation hardly changes them."""
+
+    corners: np.ndarray
+    covariance: np.ndarray
+    state: str
+    p_value: float
+    estimator: str
+    threshold: float
+    layout: Layout
+    alike: bool = False
+
+
+def _found(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Found:
+    """What an estimator finds in the image; where sides differ in their blur each is measured by itself."""
+    image, apart = levels[None], there.blur.differs
+    if not judged or apart:
+        return _beside(levels, there, name, judged)
+    whole, there = likeliest(levels, there, there.layout)
+    if whole.status[0] not in status.MEASURED:
+        return _beside(levels, there, name, judged)
+    corners, state = whole.corners[0], str(whole.status[0])
+    near = there.at(corners)
+    if name == "arrangement":
+        return _told(whole, state, whole.p_value[0], name, 1.0, near)
+    threshold = _threshold(whole)
+    shape = find_shape(image, near, name, threshold, judged=False)
+    fits = status.MISFIT if state == status.MISFIT else status.OK
+    return _told(shape, _judged(shape, fits, there), whole.p_value[0], name, threshold, near)
+
+
+def _beside(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Found:
+    """Each side by itself, from where edge points show it: where their blur differs, or the whole is not seen."""
+    first = find_shape(levels[None], there.layout, "gradient")
+    state = str(first.status[0])
+    if state not in status.MEASURED or not judged:
+        return _told(first, state, np.nan, "gradient", 1.0, there.layout)
+    near, threshold = there.at(first.corners[0]), _threshold(first)
+    name, shape = "strip" if name == "arrangement" else name, first
+    if name != "gradient":
+        shape = find_shape(levels[None], near, name, threshold, judged=False)
+    fits = status.OK if there.blur.p_value >= WORST else status.MISFIT
+    return _told(shape, _judged(shape, fits, there), there.blur.p_value, name, threshold, near)
+
+
+def _judged(shape: Shape, fits: str, there: Expected) -> str:
+    """Status of what each side by itself tells."""
     state = str(shape.status[0])
-    if state in status.MEASURED and lens is not None:
-        found = straight_corners(image, polygon_layout(lens.straighten(shape.corners[0]), optics), lens)
-        return _reported(found.corners, found.covariance, noise, blur, state)
-    if state not in status.MEASURED:
-        return _reported(shape.corners[0], shape.covariance[0], noise, blur, state)
-    near = polygon_layout(shape.corners[0], optics)
-    whole = find_shape(image[None], near, "arrangement")
-    if likeliest:
-        shape = whole
-    elif estimator != "gradient":
-        shape = find_shape(image[None], near, estimator, _threshold(shape))
-    fits = status.MISFIT if status.MISFIT in whole.status else status.OK
-    return _reported(
-        shape.corners[0], shape.covariance[0], noise, blur, status.worst(str(shape.status[0]), fits), whole.p_value[0]
-    )
+    uneven = status.CLUTTER if there.uneven else status.OK
+    return status.worst(state, fits, uneven) if state in status.MEASURED else state
+
+
+def _told(shape: Shape, state: str, p: float, name: str, threshold: float, layout: Layout) -> _Found:
+    return _Found(shape.corners[0], shape.covariance[0], state, float(p), name, threshold, layout)
+
+
+def _grown(levels: np.ndarray, found: _Found, seen: Recording) -> _Found:
+    """With the covariance that correlated noise makes."""
+    whole = grown_covariance(levels, found.corners, found.layout, seen, found.estimator, found.threshold)
+    if not np.isfinite(whole).all():
+        return replace(found, covariance=found.covariance * max(float(seen.correlation.kernel.sum()), 1.0))
+    change = np.sqrt(np.diag(whole) / np.diag(found.covariance))
+    return replace(found, covariance=whole, alike=bool(np.abs(change - 1).max() < _ALIKE))
 
 
 def _expected(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -122,13 +195,17 @@ def _expected(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _threshold(shape) -> float:
-    """Canny's gradient threshold at a third of the weakest edge's peak."""
+    """Canny's gradient threshold at a third of the weakest edge's peak, grey levels a px."""
     return float(max(shape.edge_contrast[0].min() / 9, 1e-6))
 
 
-def _reported(corners, covariance, noise: float, blur: float, state: str, p: float = float("nan")) -> Quadrilateral:
-    values = _values(corners, covariance) if np.isfinite(corners).all() else ()
-    return Quadrilateral(corners, covariance, values, noise, blur, state, float(p))
+def _reported(found: _Found, there: Expected, seen: Recording) -> Quadrilateral:
+    values = _values(found.corners, found.covariance) if np.isfinite(found.corners).all() else ()
+    optics, sides = there.layout.optics, there.blur.sigma
+    return Quadrilateral(
+        found.corners, found.covariance, values, float(np.sqrt(optics.noise_variance)), optics.blur_px, found.state,
+        found.p_value, found.estimator, seen.curve, sides,
+    )  # fmt: skip
 
 
 def _values(corners: np.ndarray, covariance: np.ndarray) -> tuple[MeasuredValue, ...]:

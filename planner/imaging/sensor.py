@@ -10,6 +10,8 @@ from scipy.special import ndtr
 from scenes import Noise
 
 _MARGIN = 6.0  # standard deviations below the end of the scale within which it is felt
+_EVEN = 0.7  # grey levels of noise that rounding adds a twelfth to, wherever the level lies
+_QUIETEST = 5  # grey levels that less noise reaches
 
 
 class Levels(NamedTuple):
@@ -71,12 +73,20 @@ def squared_errors(noise: Noise, level: np.ndarray, like: Levels) -> tuple[np.nd
     """Mean and variance of (x - m)^2 / v over pictures, of what is recorded (x) of noise-free levels (n,).
 
     ``like`` holds m and v. Normal noise with that mean and variance has 1 and 2; near the end of the scale both are
-    sums over the grey levels, or over an eighth of a standard deviation where that is more.
+    sums over the grey levels, or over an eighth of a standard deviation where that is more. Where noise is less than
+    rounding spreads evenly, both depend on where between two grey levels a level lies: sums over these.
     """
     mean, variance, full = np.ones(level.shape), np.full(level.shape, 2.0), full_scale(noise)
     sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level) - 1 / 12, 1e-12))
+    if np.isinf(full):
+        return mean, variance
+    quiet = sigma < _EVEN
+    if quiet.any():
+        mean[quiet], variance[quiet] = _rounded(
+            sigma[quiet], level[quiet], like.level[quiet], like.noise_variance[quiet]
+        )
     near = level > full - _MARGIN * sigma
-    if np.isinf(full) or not near.any():
+    if not near.any():
         return mean, variance
     widest = float(sigma[near].max())
     cell = max(1.0, widest / 8)
@@ -87,6 +97,17 @@ def squared_errors(noise: Noise, level: np.ndarray, like: Levels) -> tuple[np.nd
     mean[near] = (probability * squares).sum(1)
     variance[near] = (probability * squares**2).sum(1) - mean[near] ** 2
     return mean, variance
+
+
+def _rounded(sigma: np.ndarray, level: np.ndarray, mean: np.ndarray, variance: np.ndarray):
+    """As `squared_errors`, of normal noise (n,) that is rounded to whole grey levels."""
+    values = np.rint(level)[:, None] + np.arange(-_QUIETEST, _QUIETEST + 1)
+    away = (values - level[:, None]) / sigma[:, None]
+    half = 0.5 / sigma[:, None]
+    probability = ndtr(away + half) - ndtr(away - half)
+    squares = (values - mean[:, None]) ** 2 / variance[:, None]
+    found = (probability * squares).sum(1)
+    return found, (probability * squares**2).sum(1) - found**2
 
 
 def full_scale(noise: Noise) -> float:

@@ -9,10 +9,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes import Luminaire, Scene
-from scenes.parts.recognised import cylinders
-
 from scenes import AnyLight, Scene
+from scenes.parts.recognised import cylinders
 
 
 def facts(scene: Scene) -> dict[str, Any]:
