@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,9 @@ from scenes.errors import InvalidInput
 _FALSE_ALARM = 0.01  # of all corners of a board together
 _FAINTEST = 3.0  # times the noise: half the difference of bright and dark
 _ORDINARY = 0.8  # px of lens blur to begin with
-_ROUGH, _FINE = 0.05, 1e-3  # px: the last step of either round; its error is about the square
+_ROUGH, _FINE = 0.05, 1e-3  # px: the last step of the first and of later rounds; its error is about the square
+_ROUNDS, _SETTLED = 4, 0.1  # px that corners may move in the last one
+_NEAR = 0.35  # of the way to the next corner: further off it is another one
 _LEAST_NOISE = 1e-150  # below, squares are no ordinary numbers
 _FULL = [2.0**bits - 1 for bits in range(8, 17)]  # ends of sensors' scales
 _MOST = 200  # corners along a side
@@ -126,21 +128,23 @@ def _least_noise(image: np.ndarray) -> float:
 def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
     """The corners about ``grid``, shape (rows, columns, 2), px, under white noise of a standard deviation."""
     columns, rows = grid.shape[1::-1]
-    found = windows(image, grid)
-    room = begun = found.room
-    if not room.any():
-        return _nothing((columns, rows), noise)
-    toward = steps(grid).reshape(-1, 2, 2)[room]
-    direction, blur = np.arctan2(toward[..., 1], toward[..., 0]), np.full(len(toward), np.log(_ORDINARY))
-    start = np.column_stack([grid.reshape(-1, 2)[room], direction, blur])
-    rough = fit_crossings(found.some(room), start, np.zeros(direction.shape), _ROUGH)
-    grid = _moved(grid, room, rough)
-    found = windows(image, grid)
-    room = begun & found.room
-    if not room.any():
-        return _nothing((columns, rows), noise)
-    some, still = found.some(room), room[begun]
-    fitted = fit_crossings(some, rough.shape[still], bends(grid).reshape(-1, 2)[room], _FINE)
+    toward = steps(grid).reshape(-1, 2, 2)
+    shape = np.column_stack([grid.reshape(-1, 2), np.arctan2(toward[..., 1], toward[..., 0]), np.zeros(len(toward))])
+    shape[:, 4] = np.log(_ORDINARY)
+    near = _NEAR * np.linalg.norm(toward, axis=-1).min(1)
+    for turn in range(_ROUNDS):
+        found = windows(image, grid)
+        room = found.room
+        if not room.any():
+            return _nothing((columns, rows), noise)
+        some, bend = found.some(room), bends(grid).reshape(-1, 2)[room] * (turn > 0)
+        fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
+        away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
+        fitted = replace(fitted, converged=fitted.converged & (away < near[room]))
+        before, grid = grid, _moved(grid, room, fitted)
+        shape[np.flatnonzero(room)[fitted.converged]] = fitted.shape[fitted.converged]
+        if turn and np.abs(grid - before).max() < _SETTLED:  # windows and bends are those of the corners as they are
+            break
     return _board((columns, rows), room, fitted, noise, _clipped(image, some))
 
 

@@ -79,7 +79,7 @@ def _fit(places, levels, there, shape, bend, enough) -> tuple[np.ndarray, ...]:
         moved = np.abs(before).max(1)
         if (moved < enough).all():  # the last step is taken; what was before it differs by its square
             break
-    good = (moved < 10 * enough) & (np.abs(shape[:, :2] - first[:, :2]).max(1) < 2.0) & np.isfinite(square)
+    good = (moved < 10 * enough) & np.isfinite(square)
     return shape, inverse[:, :2, :2], square, size - PARAMETERS, contrast, good
 
 

@@ -9,6 +9,7 @@ from scipy import stats
 
 import measure
 from measure.boards.bend import bends
+from measure.boards.chessboard import measured
 from measure.boards.fitting import fit_crossings
 from measure.boards.saddle import response
 from measure.boards.windows import windows
@@ -59,6 +60,14 @@ def test_without_noise_corners_are_where_they_are(clean):
     assert np.abs(found.corners - in_order(found, SMALL.corners(POSE))).max() < 1e-3
     assert abs(found.blur_px - SMALL.blur) < 0.01
     assert set(found.status) == {"ok"}
+
+
+def test_a_poor_beginning_does_not_show(clean):
+    """Corners first taken to be up to 3 px off also tell wrongly how the lens bends edges, until they are found."""
+    truth = SMALL.corners(POSE)
+    begun = truth + np.random.default_rng(1).uniform(-2, 2, truth.shape)
+    found = measured(clean, begun.reshape(6, 9, 2), 0.1)
+    assert np.abs(found.corners - truth).max() < 1e-3
 
 
 def test_covariance_is_that_of_the_corners(clean):
