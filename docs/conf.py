@@ -42,9 +42,11 @@ nitpick_ignore_regex = [("py:.*", ".*")]
 
 def _prose(app: Sphinx, page: nodes.document) -> None:
     """Types of attributes are prose like those of parameters: what looks like a name in them is none."""
-    for shown in page.findall(addnodes.desc_annotation):
-        for found in list(shown.findall(addnodes.pending_xref)):
-            found.replace_self(found.children)
+    for kind in (nodes.field, addnodes.desc_annotation):
+        for shown in page.findall(kind):
+            for found in list(shown.findall(addnodes.pending_xref)):
+                if found.get("refspecific"):
+                    found.replace_self(found.children)
 
 
 def setup(app: Sphinx) -> None:
