@@ -26,7 +26,7 @@ html_title = "ICE"
 html_static_path = ["_static"]
 html_css_files = ["wide.css"]
 html_extra_path = ["scene.schema.json"]
-html_copy_source = html_show_sphinx = False
+html_copy_source = html_show_sphinx = html_show_copyright = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
