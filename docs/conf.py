@@ -47,8 +47,23 @@ def _keys(app: Sphinx, what: str, name: str, found: Any, *rest: Any) -> tuple[st
     return None
 
 
+_KEPT: dict[str, list[str]] = {}
+
+
+def _keep(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """What an attribute says before napoleon, which takes all before a colon for a type."""
+    if what in ("attribute", "data", "property"):
+        _KEPT[name] = list(lines)
+
+
+def _put_back(app: Sphinx, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    lines[:] = _KEPT.pop(name, lines)
+
+
 def setup(app: Sphinx) -> None:
     """What stands in backticks is a link where it names something public, else code; pydantic's own stays out."""
+    app.connect("autodoc-process-docstring", _keep, priority=400)
+    app.connect("autodoc-process-docstring", _put_back, priority=600)
     app.connect("autodoc-process-signature", _keys)
     app.connect("missing-reference", lambda app, env, node, shown: shown if node["reftype"] == "obj" else None)
     app.connect("autodoc-skip-member", lambda app, what, name, *rest: True if name.startswith("model_") else None)
