@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import doctest
-import os
+import io
 import re
 import shlex
 from pathlib import Path
@@ -18,16 +19,20 @@ def follow(page: Path, folder: Path) -> int:
     """Run all blocks of a page; the number of those that were run.
 
     ``console``: commands and what they print (``...`` stands for anything). ``python``: one script, block by block.
-    A caption says where the text of another block goes: "in place of `[table]` in FILE" or "at the end of FILE".
+    A caption says where the text of another block goes, "in place of `[table]` in FILE" or "at the end of FILE", or
+    that the block before "prints" it.
     """
     names: dict[str, object] = {}
+    printed = ""
     found = [block for block in blocks(page) if block.language in ("console", "python") or block.caption]
     for block in found:
         where = f"{page.name}:{block.line}"
         if block.language == "console":
             _console(block, folder, where)
         elif block.language == "python":
-            _python(block, folder, where, names)
+            printed = _python(block, folder, where, names)
+        elif block.caption == "prints":
+            assert doctest.OutputChecker().check_output(block.text, printed, _FLAGS), f"{where}: prints {printed}"
         else:
             _write(block, folder, where)
     return len(found)
@@ -44,13 +49,11 @@ def _console(block: Block, folder: Path, where: str) -> None:
         assert same or not wanted.strip(), f"{where}: {command} prints\n{done.out}"
 
 
-def _python(block: Block, folder: Path, where: str, names: dict[str, object]) -> None:
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
+def _python(block: Block, folder: Path, where: str, names: dict[str, object]) -> str:
+    """What the block prints."""
+    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()) as out:
         exec(compile(block.text, where, "exec"), names)
-    finally:
-        os.chdir(before)
+    return out.getvalue()
 
 
 def _write(block: Block, folder: Path, where: str) -> None:

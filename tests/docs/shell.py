@@ -23,20 +23,17 @@ class Done(NamedTuple):
 
 def ice(*arguments: str, cwd: Path) -> Done:
     """Run ``ice ARGUMENTS`` in a folder, in this process."""
-    out, err, before = io.StringIO(), io.StringIO(), Path.cwd()
-    os.chdir(cwd)
-    try:
-        with (
-            mock.patch.object(sys, "argv", ["ice", *arguments]),
-            mock.patch.object(entry.signal, "signal"),
-            mock.patch.dict(os.environ, COLUMNS="160"),
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-        ):
-            try:
-                entry.main()
-            except SystemExit as ended:
-                return Done(out.getvalue(), err.getvalue(), int(ended.code or 0))
-    finally:
-        os.chdir(before)
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        contextlib.chdir(cwd),
+        mock.patch.object(sys, "argv", ["ice", *arguments]),
+        mock.patch.object(entry.signal, "signal"),
+        mock.patch.dict(os.environ, COLUMNS="160"),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            entry.main()
+        except SystemExit as ended:
+            return Done(out.getvalue(), err.getvalue(), int(ended.code or 0))
     raise AssertionError("main must end with SystemExit")
