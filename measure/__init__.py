@@ -8,17 +8,21 @@ from measure.find.ellipse import find_ellipse
 from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
+from measure.photo.mtf import EdgeResponse, mtf
+from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
 __all__ = [
     "ESTIMATORS",
+    "EdgeResponse",
     "Ellipse",
     "Lens",
     "MeasuredValue",
     "Measurement",
     "Measurements",
+    "NoiseCurve",
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
@@ -33,6 +37,8 @@ __all__ = [
     "measure",
     "measure_by",
     "measure_quadrilateral",
+    "mtf",
+    "noise_curve",
     "point_distance",
     "propagate",
     "region_of_interest",

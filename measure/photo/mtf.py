@@ -13,13 +13,15 @@ import numpy as np
 
 from measure.estimators.strip import pixels_beside
 from measure.features.calipers import edge_calipers
-from measure.features.layout import Layout
-from measure.photo.noise_curve import NoiseCurve
+from measure.features.layout import Layout, polygon_layout
+from measure.features.optics import Optics
+from measure.photo.noise_curve import NoiseCurve, noise_curve
 from scenes import InvalidInput
+from scenes.arrays import finite, picture
+from scenes.photograph import Photograph
 
 STEP = 0.125  # px between samples of the edge spread
 HALF = 12.0  # px to each side of the edge
-_CORNER = 6.0  # px left out at a side's ends
 _FEWEST = 24  # px of a side that tell it
 _FREQUENCIES = np.arange(0, 1.0001, 0.01)  # cycles/px
 
@@ -55,15 +57,44 @@ class EdgeResponse:
     mtf50_error: float
 
 
+def mtf(image: np.ndarray | Photograph, corners: np.ndarray, side: int = 0) -> EdgeResponse:
+    """Modulation transfer across a side of a convex polygon in an image.
+
+    Parameters
+    ----------
+    image : array_like, shape (height, width), or Photograph
+        Grey levels, linear in the light.
+    corners : array_like, shape (k, 2)
+        Of a polygon, in order around it, (x, y), px, to a tenth of a pixel (`measure_quadrilateral` gives them); two
+        are the ends of one edge with nothing beside it.
+    side : int
+        From corner ``side`` to the next.
+
+    Raises
+    ------
+    InvalidInput
+        As `edge_response`, or if there is no such side.
+    """
+    photo = image if isinstance(image, Photograph) else Photograph(picture(image))
+    corners = finite(corners, "corners")
+    if corners.ndim != 2 or corners.shape[1] != 2 or not 0 <= side < max(len(corners) - (len(corners) == 2), 0):
+        raise InvalidInput(f"side must be one of a polygon's of {len(corners)} corners, got {side}")
+    if len(corners) == 2:
+        across = np.array([-(corners[1] - corners[0])[1], (corners[1] - corners[0])[0]])
+        corners = np.concatenate([corners, corners[::-1] + across])
+    layout = polygon_layout(corners, Optics(photo.levels.shape))
+    return edge_response(photo.levels, layout, side, noise_curve(photo.levels, photo.full))
+
+
 def edge_response(image: np.ndarray, layout: Layout, side: int, curve: NoiseCurve) -> EdgeResponse:
     """Spread and modulation transfer across one side of a layout that lies on the image's sides.
 
     Raises
     ------
     InvalidInput
-        If the side is too short, or parallel to the pixels' rows or columns, so that distances from it are not all told.
+        If the side is too short, or so parallel to rows or columns of pixels that these do not tell all distances.
     """
-    caliper = edge_calipers(layout, _CORNER, HALF + 1)[side]
+    caliper = edge_calipers(layout, HALF, HALF + 1)[side]
     if caliper.positions.size < _FEWEST:
         raise InvalidInput(f"side {side + 1} must show at least {_FEWEST} px clear of corners and border, got less")
     flat, _, _, across = pixels_beside(caliper, HALF)
