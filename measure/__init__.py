@@ -10,6 +10,8 @@ from measure.find.ellipse import find_ellipse
 from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
+from measure.photo.mtf import EdgeResponse, mtf
+from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
@@ -18,11 +20,13 @@ __all__ = [
     "ESTIMATORS",
     "Board",
     "CameraCalibration",
+    "EdgeResponse",
     "Ellipse",
     "Lens",
     "MeasuredValue",
     "Measurement",
     "Measurements",
+    "NoiseCurve",
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
@@ -39,6 +43,8 @@ __all__ = [
     "measure",
     "measure_by",
     "measure_quadrilateral",
+    "mtf",
+    "noise_curve",
     "point_distance",
     "propagate",
     "region_of_interest",

@@ -248,6 +248,12 @@ class SeparateEstimator:
     def respond(self, clean: np.ndarray) -> np.ndarray:
         return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])
 
+    def respond_within(self, clean: np.ndarray) -> np.ndarray:
+        """The same at `pixels` alone, (2 E, P)."""
+        pixels = self.pixels
+        return np.concatenate([part.respond(clean)[:, pixels] if part else np.zeros((2, pixels.size))
+                               for part in self.parts])  # fmt: skip
+
 
 def _noisy(noise: Noise) -> Noise:
     """The noise, or the least that a likelihood can be made of."""

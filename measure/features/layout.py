@@ -144,11 +144,18 @@ class Layout:
         return np.ones(points.shape[:-1]) if shading is None else shading(points)
 
     def labels(self) -> np.ndarray:
-        """Which face each pixel belongs to, int, shape (height, width)."""
-        found = np.full(self.optics.shape, BACKGROUND)
-        for index, face in enumerate(self.faces):
-            found[polygon2mask(self.optics.shape, self.optics.recorded(face)[:, ::-1])] = index
-        return found
+        """Which face each pixel belongs to, int, shape (height, width); not to be written to."""
+        return _labels(self)
+
+
+@lru_cache(maxsize=1)  # asked for edge by edge
+def _labels(layout: Layout) -> np.ndarray:
+    shape = layout.optics.shape
+    found = np.full(shape, BACKGROUND, np.int32)
+    for index, face in enumerate(layout.faces):
+        found[polygon2mask(shape, layout.optics.recorded(face)[:, ::-1])] = index
+    found.flags.writeable = False
+    return found
 
 
 @lru_cache(maxsize=64)

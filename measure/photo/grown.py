@@ -24,8 +24,7 @@ def corner_rows(image: np.ndarray, layout: Layout, estimator: str, threshold: fl
         centre = locate(tool, layout, tool.taken(image[None])[0], image)
         return tool.derivative(centre)[tool.index(tool.arrangement.corners)], tool.pixels
     response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
-    pixels = tool.pixels
-    return response @ tool.respond(image)[:, pixels], pixels
+    return response @ tool.respond_within(image), tool.pixels
 
 
 def grown_covariance(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -75,41 +76,55 @@ def noise_curve(image: np.ndarray, full: float | None = None) -> NoiseCurve:
     >>> bool(np.all(np.abs(noise_curve(noisy).variance(level) / (1 + 0.05 * level) - 1) < 0.05))
     True
     """
-    step, bits = rounding(image)
-    patches = smooth_patches(image, limits_of(image, full), step)
+    scale = scale_of(image, full)
+    return curve_of(smooth_patches(image, scale.limits, scale.step), scale, image)
+
+
+def curve_of(patches: Patches, scale: Scale, image: np.ndarray) -> NoiseCurve:
+    """The same from the image's smooth patches; from second differences of the image where these are too few."""
+    step, bits = scale.step, scale.bits if scale.step == 1 else None
     if len(patches.level) < _FEW:
-        return NoiseCurve(max(noise_sigma(image) ** 2 - step**2 / 12, 0.0), 0.0, 0.0, step, bits if step == 1 else None)
+        return NoiseCurve(max(noise_sigma(image) ** 2 - step**2 / 12, 0.0), 0.0, 0.0, step, bits)
     level, variance, error = _groups(patches, step)
     lowest = float(patches.level.min())
     dark, gain, clear = _line(level - lowest, variance, error)
-    mean = float(np.average(variance, weights=error**-2.0))
-    top = float(np.ptp(level))
-    falls = clear < -_CLEAR and dark + gain * top < _FALLING**2 * dark
-    dark, gain = (dark, gain) if clear > _CLEAR or falls else (mean, 0.0)
-    return NoiseCurve(max(dark, 0.0), gain, max(lowest, 0.0), step, bits if step == 1 else None)
+    falls = clear < -_CLEAR and dark + gain * float(np.ptp(level)) < _FALLING**2 * dark
+    if not (clear > _CLEAR or falls):
+        dark, gain = float(np.average(variance, weights=error**-2.0)), 0.0
+    return NoiseCurve(max(dark, 0.0), gain, max(lowest, 0.0), step, bits)
 
 
-def limits_of(image: np.ndarray, full: float | None = None) -> tuple[float, float]:
-    """Levels at which the sensor's scale ends: 0 and ``full``, or what rounded levels tell; else none."""
-    _, bits = rounding(image)
-    if full is None and bits is None:
-        return -np.inf, np.inf
-    return 0.0, (2.0**bits - 1 if full is None else full) * (1 - 1e-6)
+class Scale(NamedTuple):
+    """What the levels of an image are multiples of (0 for real numbers), bits of their scale, and where it ends."""
+
+    step: float
+    bits: int | None
+    limits: tuple[float, float]
 
 
-def rounding(image: np.ndarray) -> tuple[float, int | None]:
-    """What the levels of an image are multiples of (0 for real numbers), and the bits of their scale.
+def scale_of(image: np.ndarray, full: float | None = None) -> Scale:
+    """The scale of an image's levels as they tell it; ``full`` is its end where that is known.
 
     Examples
     --------
-    >>> rounding(np.array([[0, 16], [32, 4000.0]])), rounding(np.array([[0.5, 1.0]]))
-    ((16.0, 12), (0.0, None))
+    >>> scale_of(np.array([[0, 16], [32, 4000.0]]))[:2], scale_of(np.array([[0.5, 1.0]]))
+    ((16.0, 12), Scale(step=0.0, bits=None, limits=(-inf, inf)))
     """
-    flat = np.asarray(image).ravel()
+    step, bits = _rounding(np.asarray(image).ravel())
+    if full is None:
+        full = None if bits is None else 2.0**bits - 1
+    return Scale(step, bits, (-np.inf, np.inf) if full is None else (0.0, full * (1 - 1e-6)))
+
+
+def _rounding(flat: np.ndarray) -> tuple[float, int | None]:
     low, high = float(flat.min()), float(flat.max())
-    if low < 0 or high > 65535 or not (flat == np.rint(flat)).all():
+    if low < 0 or high > 65535:
         return 0.0, None
-    step = float(np.gcd.reduce(np.diff(np.unique(flat.astype(int))), initial=0)) or 1.0
+    whole = flat.astype(np.uint16)
+    if not (flat == whole).all():
+        return 0.0, None
+    used = np.flatnonzero(np.bincount(whole))
+    step = float(np.gcd.reduce(np.diff(used), initial=0)) or 1.0
     return step, next(bits for bits in (8, 10, 12, 14, 16) if high < 2**bits)
 
 

@@ -10,7 +10,7 @@ from measure import status
 from measure.features.calipers import distance_to_segment
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import Correlation, correlation
-from measure.photo.noise_curve import NoiseCurve, limits_of, noise_curve, rounding
+from measure.photo.noise_curve import NoiseCurve, curve_of, scale_of
 from measure.photo.patches import SIDE, Patches, smooth_patches
 from scenes.photograph import Photograph
 
@@ -52,8 +52,9 @@ def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording
     Edges that hardly stand out of the noise pass for smooth, and look like noise that is not white.
     """
     image = photo.levels
-    curve, (step, _) = noise_curve(image, photo.full), rounding(image)
-    patches = smooth_patches(image, limits_of(image, photo.full), step)
+    scale = scale_of(image, photo.full)
+    patches = smooth_patches(image, scale.limits, scale.step)
+    curve = curve_of(patches, scale, image)
     if corners is not None:
         patches = _beside(patches, corners)
     found = correlation(patches, curve)
@@ -63,7 +64,7 @@ def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording
         added = (total - 1) * curve.step**2 / 12  # the rounding's part stays as it is
         curve = replace(curve, dark=max(total * curve.dark + added, 0.0), gain=total * curve.gain)
         found = replace(found, kernel=found.kernel / total)
-    return Recording(curve, found, photo.compressed or is_compressed(image, step), patches)
+    return Recording(curve, found, photo.compressed or is_compressed(image, scale.step), patches)
 
 
 def _beside(patches: Patches, corners: np.ndarray) -> Patches:

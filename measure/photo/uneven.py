@@ -17,7 +17,7 @@ MOST = 2  # order of a region's level
 _FAR = 40.0  # px from the sides up to which patches tell
 _CLEAR = 2.5  # blurs, and half a patch's diagonal, from the sides at which they show no edge
 _FEWEST = 12
-_SURE = 0.01  # probability of as much unevenness in an even region
+_SURE = 0.003  # probability of as much unevenness in an even region
 
 
 def orders(patches: Patches, layout: Layout, curve: NoiseCurve) -> tuple[int, int]:

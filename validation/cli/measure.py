@@ -9,8 +9,8 @@ import numpy as np
 import typer
 
 import scenes
-from scenes import InvalidInput
-from validation.cli import measurands
+from scenes import InvalidInput, photograph
+from validation.cli import measurands, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
 
@@ -31,6 +31,10 @@ def measure_command(
     estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
+    gamma: recorded.Gamma = None,
+    channel: recorded.Channel = None,
+    bayer: recorded.Bayer = None,
+    mtf: recorded.Mtf = None,
     as_json: Json = False,
 ) -> None:
     """Measure an image: the measurands of a known scene, or else the quadrilateral that it shows.
@@ -40,11 +44,14 @@ def measure_command(
     import measure
     from validation import picture_file
 
-    picture = picture_file.read(file)
     if scene is None:
-        found = measure.measure_quadrilateral(picture, estimator or "arrangement", lens and measure.load_lens(lens))
-        say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
+        photo = photograph.read(file, gamma, channel, bayer)
+        found = measure.measure_quadrilateral(photo, estimator or "arrangement", lens and measure.load_lens(lens))
+        facts = _quadrilateral_facts(found) | recorded.facts(photo, found, mtf)
+        say({"file": str(file), **facts}, as_json, f"{_quadrilateral_text(found)}\n{recorded.text(facts)}")
         raise typer.Exit(0 if found.measurands else 1)
+    recorded.refuse({"--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf})
+    picture = picture_file.read(file)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:

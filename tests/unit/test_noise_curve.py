@@ -1,0 +1,124 @@
+"""A photograph's noise against level, before rounding, its correlation, and JPEG's blocks, from images made with known
+ones."""
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from measure.photo.compression import is_compressed
+from measure.photo.correlation import REACH, correlation
+from measure.photo.noise_curve import noise_curve, scale_of
+from measure.photo.patches import smooth_patches
+from measure.photo.recording import recording
+from scenes.photograph import Photograph
+from tests.oracle import polygon_image
+
+SHAPE = (260, 330)
+CORNERS = np.array([[61.3, 52.2], [241.6, 63.9], [230.4, 190.7], [50.8, 179.1]])
+
+
+@lru_cache(maxsize=1)
+def shaded():
+    """Two levels with an edge between them, both gently shaded, so that levels lie anywhere between whole numbers."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    return polygon_image(CORNERS, SHAPE, 0.8, 100.0, 40.0) + 0.03 * x + 0.021 * y
+
+
+@pytest.mark.parametrize("sigma", [0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 3.0])
+def test_noise_before_rounding(sigma, rng):
+    """Within 3 %, or 0.006 of a level (0.03 below a fifth of one), of what there was, which rounding hides; with the
+    rounding's part to 5 %."""
+    image = np.rint(shaded() + sigma * rng.standard_normal(SHAPE))
+    curve = noise_curve(image)
+    assert curve.gain == 0
+    assert np.sqrt(curve.dark) == pytest.approx(sigma, rel=0.03, abs=0.006 if sigma >= 0.2 else 0.03)
+    assert np.sqrt(curve.variance(100.0)) == pytest.approx(np.sqrt(sigma**2 + 1 / 12), rel=0.05)
+    if sigma < 0.5:
+        assert smooth_patches(image, step=1.0).variance.mean() > 1.4 * sigma**2
+
+
+def test_shot_noise(rng):
+    """Variance at both levels to 4 %; a constant noise is told as such."""
+    clean = shaded()
+    noisy = clean + np.sqrt(1.0 + 0.08 * clean) * rng.standard_normal(SHAPE)
+    levels = np.array([45.0, 95.0, 150.0])
+    for image in (noisy, np.rint(noisy)):
+        rounded = (image is not noisy) / 12
+        assert noise_curve(image).variance(levels) == pytest.approx(1.0 + 0.08 * levels + rounded, rel=0.04)
+    assert noise_curve(clean + rng.standard_normal(SHAPE)).gain == 0
+
+
+def test_noise_that_falls_is_told(rng):
+    """As a gamma curve that was not undone makes it."""
+    light = (shaded() + 2 * rng.standard_normal(SHAPE)) / 255
+    assert noise_curve(255 * light**0.45).falls
+    assert not noise_curve(255 * light).falls
+
+
+def test_saturated_patches_do_not_count(rng):
+    """A face at the end of the scale has no noise; the background's is told."""
+    image = np.clip(np.rint(polygon_image(CORNERS, SHAPE, 0.8, 300.0, 60.0) + 2 * rng.standard_normal(SHAPE)), 0, 255)
+    assert np.sqrt(noise_curve(image).dark) == pytest.approx(2.0, rel=0.03)
+
+
+def test_scale():
+    """12 bits in steps of 16; real numbers have no steps."""
+    assert scale_of(np.array([[0, 160, 16], [48, 65520, 32.0]]))[:2] == (16.0, 16)
+    assert scale_of(np.array([[0.0, 4095.0], [1.0, 2.0]]))[:2] == (1.0, 12)
+    assert scale_of(np.array([[0.25, 3.0]])).step == 0
+
+
+def kernel_of(taps):
+    """Autocovariance of white noise through a filter, at lags up to REACH."""
+    half = taps.shape[0] - 1
+    full = cv2.filter2D(np.pad(taps, half), cv2.CV_64F, taps, borderType=cv2.BORDER_CONSTANT)
+    middle = full.shape[0] // 2
+    return full[middle - REACH : middle + REACH + 1, middle - REACH : middle + REACH + 1]
+
+
+def test_correlation_of_filtered_noise(rng):
+    """Every lag within 5 standard errors (0.02) of the filter's own autocorrelation."""
+    taps = np.zeros((7, 7))
+    taps[3, 3] = 1
+    taps = gaussian_filter(taps, 0.6, mode="constant")
+    image = shaded() + cv2.filter2D(4 * rng.standard_normal(SHAPE), cv2.CV_64F, taps)
+    seen = recording(Photograph(image), CORNERS)
+    expected = kernel_of(taps)
+    assert not seen.correlation.white
+    assert seen.correlation.kernel == pytest.approx(expected / expected[REACH, REACH], abs=0.03)
+    assert float(seen.curve.variance(100.0)) == pytest.approx(16 * expected[REACH, REACH], rel=0.05)
+
+
+def test_white_noise_is_white(rng):
+    """Median p-value of 20 images near a half; an edge of 4 times the noise does not pass for correlation."""
+    clean = polygon_image(CORNERS, SHAPE, 0.8, 8.0, 60.0)
+    found = [recording(Photograph(clean + 2 * rng.standard_normal(SHAPE)), CORNERS).correlation for _ in range(20)]
+    told = np.array([one.p_value for one in found])
+    assert 0.15 < np.median(told) < 0.85
+    assert all(one.white for one in found)
+
+
+def test_covariance_of_a_mean_under_correlated_noise(rng):
+    """The variance of a mean of n pixels of smoothed noise is the kernel's sum over n, about."""
+    image = shaded() + cv2.GaussianBlur(4 * rng.standard_normal(SHAPE), (0, 0), 0.6)
+    patches, curve = smooth_patches(image), noise_curve(image)
+    found = correlation(patches, curve)
+    side = 40
+    pixels = (np.arange(side)[:, None] * 100 + np.arange(side)).ravel()
+    mean = np.full((1, side**2), 1 / side**2)
+    whole = found.covariance(mean, pixels, np.ones(side**2), 100)[0, 0] * side**2
+    assert whole == pytest.approx(found.kernel.sum(), rel=0.06)
+    assert whole > 2
+
+
+@pytest.mark.parametrize("quality", [50, 75, 90, 95])
+@pytest.mark.parametrize("sigma", [0.5, 1.5])
+def test_jpeg_is_seen(quality, sigma, rng):
+    """Wherever its grid lies; the same picture before is none."""
+    image = np.clip(np.rint(shaded() + sigma * rng.standard_normal(SHAPE)), 0, 255).astype(np.uint8)
+    packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    assert is_compressed(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE)[3:, 6:])
+    assert not is_compressed(image)
