@@ -11,7 +11,11 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 OURS = ("scenes", "planner", "render", "measure", "validation")
-OPTIONAL = {"distributed": "dask", "pyarrow": "pyarrow"}  # extras, imported only where they are asked for
+OPTIONAL = {
+    "distributed": "dask",
+    "pyarrow": "pyarrow",
+    "pandas": "frames",
+}  # extras, imported only where they are asked for
 
 
 def imported(file: Path) -> set[str]:
