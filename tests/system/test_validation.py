@@ -31,6 +31,20 @@ def found(few, tmp_path_factory):
     return validation.run(few, renders=500, seed=11, out=tmp_path_factory.mktemp("run"), workers=1)
 
 
+def test_a_run_shows_itself(found):
+    """One line, and one row a setting and measurand with the numbers of the table."""
+    assert repr(found) == "Validation(task1: 4 settings, agree: measured is as predicted)"
+    rows = found.as_rows()
+    assert [(row["sensor_polar"], row["light_azimuth"]) for row in rows] == [
+        (row.sensor[0], row.light[1]) for row in found.rows
+    ]
+    told = found.rows[0].measurands[0]
+    assert (rows[0]["empirical"], rows[0]["ratio_low"], rows[0]["ratio_high"]) == (
+        told.empirical,
+        *told.ratio_interval,
+    )
+
+
 def test_predictions_agree(found):
     assert found.verdict.agrees
     assert found.verdict.rows == 4

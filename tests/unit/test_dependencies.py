@@ -15,6 +15,7 @@ OPTIONAL = {
     "distributed": "dask",
     "pyarrow": "pyarrow",
     "OCP": "cadquery-ocp-novtk",
+    "pandas": "frames",
 }  # extras, imported only where they are asked for
 
 
