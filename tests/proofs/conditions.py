@@ -24,6 +24,7 @@ CORNERS = np.array([[61.3, 52.2], [201.6, 63.9], [190.4, 150.7], [50.8, 139.1]])
 CONTRAST, NOISE, BLUR, BACKGROUND = 135.0, 1.5, 0.8, 50.0
 
 
+@lru_cache(maxsize=1)
 def _clean(blur: float = BLUR) -> np.ndarray:
     return BACKGROUND + CONTRAST / 100 * polygon_image(CORNERS, SHAPE, blur)
 
