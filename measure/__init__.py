@@ -4,27 +4,34 @@ from measure.bounds import bound, image_bound
 from measure.estimators.registry import ESTIMATORS, best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
+from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse
+from measure.find.search import find
 from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
+from measure.photo.photograph import Found, Photograph, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
 __all__ = [
     "ESTIMATORS",
+    "Candidate",
     "Ellipse",
+    "Found",
     "Lens",
     "MeasuredValue",
     "Measurement",
     "Measurements",
+    "Photograph",
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
     "best_estimator",
     "bound",
     "distance", "distances",
+    "find",
     "find_ellipse",
     "fit_ellipse",
     "image_bound",
@@ -33,6 +40,7 @@ __all__ = [
     "measure",
     "measure_by",
     "measure_quadrilateral",
+    "photograph",
     "point_distance",
     "propagate",
     "region_of_interest",

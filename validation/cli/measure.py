@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import numpy as np
 import typer
 
 import scenes
 from scenes import InvalidInput
-from validation.cli import measurands
+from validation.cli import measurands, photograph
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import measure
 
 commands = commands()
+
+_MOST, _ALL = 5, 1000  # shapes that are measured
 
 
 @commands.command("measure")
@@ -31,20 +33,49 @@ def measure_command(
     estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
+    near: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="The shape at this place of a photograph, px.")
+    ] = None,
+    box: Annotated[str | None, typer.Option(metavar="X0,Y0,X1,Y1", help="Shapes in this box, px.")] = None,
+    corners: Annotated[
+        tuple[str, str, str, str] | None,
+        typer.Option(metavar="X,Y X,Y X,Y X,Y", help="A quadrilateral whose corners are here, to some 5 px."),
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="quadrilateral, circle, ellipse, tag, chessboard; several with commas.")
+    ] = None,
+    most: Annotated[int | None, typer.Option(help="Shapes to measure, the most prominent first.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Measure all shapes that are found.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="PNG", help="Draw the photograph with what was found.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure an image: the measurands of a known scene, or else the quadrilateral that it shows.
+    """Measure an image: the measurands of a known scene, or else the shapes that it shows.
 
-    Exit status 1 if something cannot be measured.
+    Of a photograph the five most prominent shapes are measured where nothing else is said. Exit status 1 if something
+    cannot be measured; of a photograph's shapes, if none can.
     """
     import measure
     from validation import picture_file
 
-    picture = picture_file.read(file)
+    chosen = {"--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output}
+    chosen["--all"] = every or None
     if scene is None:
-        found = measure.measure_quadrilateral(picture, estimator or "arrangement", lens and measure.load_lens(lens))
-        say({"file": str(file), **_quadrilateral_facts(found)}, as_json, _quadrilateral_text(found))
-        raise typer.Exit(0 if found.measurands else 1)
+        if every and most is not None:
+            raise InvalidInput(f"--most must be left out with --all, got {most}")
+        wanted = {
+            "near": photograph.numbers("--near", near, 2),
+            "box": photograph.numbers("--box", box, 4),
+            "corners": corners and [photograph.numbers("--corners", corner, 2) for corner in corners],
+            "kinds": None if kind is None else tuple(kind.split(",")),
+            "most": _ALL if every else _MOST if most is None else most,
+        }
+        _photograph(file, wanted, estimator, lens, output, as_json)
+    for option, value in chosen.items():
+        if value is not None:
+            raise InvalidInput(f"{option} must be left out with a scene, got {value}")
+    picture = picture_file.read(file)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:
@@ -65,6 +96,30 @@ def measure_command(
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
+
+
+def _photograph(
+    file: Path, wanted: dict[str, Any], estimator: str | None, lens: Path | None, output: Path | None, as_json: bool
+) -> NoReturn:
+    """Find and measure; exit status 1 where nothing could be measured."""
+    import measure
+    from validation import picture_file
+
+    picture = picture_file.read(file)
+    found = measure.photograph(
+        picture, **wanted, estimator=estimator or "arrangement", lens=lens and measure.load_lens(lens)
+    )
+    if output is not None:
+        from validation.report import overlay
+
+        overlay.write(output, picture, found)
+    if as_json:
+        say({"file": str(file), **photograph.facts(found)}, True, "")
+    else:
+        if found.candidates:
+            console().print(photograph.table(found), highlight=False)
+        say({}, False, photograph.text(found))
+    raise typer.Exit(0 if any(one.corners is not None or one.measured for one in found.found) else 1)
 
 
 def _distance_facts(found: measure.Measurement) -> dict:
@@ -97,25 +152,3 @@ def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
 
 def _fit(p_value: float) -> str:
     return f" (goodness of fit: p = {p_value:.2g})" if np.isfinite(p_value) else ""
-
-
-def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
-    return {
-        "status": found.status,
-        "p_value": found.p_value if np.isfinite(found.p_value) else None,
-        "corners": found.corners.tolist() if found.measurands else None,
-        "noise": found.noise,
-        "blur_px": found.blur_px,
-        "quantities": [vars(value) for value in found.measurands],
-    }
-
-
-def _quadrilateral_text(found: measure.Quadrilateral) -> str:
-    seen = f"noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px{_fit(found.p_value)}"
-    lines = [f"quadrilateral: {found.status}; {seen}"]
-    if found.measurands:
-        sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
-        for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):
-            lines.append(f"corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
-    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.measurands]
-    return "\n".join([*lines, "(1 sigma)"])

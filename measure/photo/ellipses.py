@@ -1,0 +1,52 @@
+"""A circle or an ellipse in a photograph, measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from measure import status
+from measure.features.optics import Optics
+from measure.find.candidate import CIRCLE, ELLIPSE
+from measure.find.ellipse import find_ellipse
+from measure.photo.noise import noise_sigma
+from measure.photo.residuals import ellipse_blur
+
+_SAME = 3.0  # standard deviations up to which the axes count as equal
+_MARGIN = 24  # px around the ellipse that is looked at
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredEllipse:
+    """``kind`` "circle" or "ellipse"; parameters x, y, a, b, px, and angle, degrees, (5,), and their covariance (5, 5);
+    the status; noise (standard deviation of a grey level) and lens blur (px) as estimated from the image."""
+
+    kind: str
+    parameters: np.ndarray
+    covariance: np.ndarray
+    status: str
+    noise: float
+    blur_px: float
+
+
+def measure_ellipse(image: np.ndarray, near: np.ndarray) -> MeasuredEllipse:
+    """Measure the ellipse near x, y, a, b, angle; as a circle where its axes are equal within three sigma."""
+    noise, blur = max(noise_sigma(image), np.sqrt(1 / 12)), ellipse_blur(image, near)
+    reach = near[2] + _MARGIN
+    low = np.maximum(np.floor(near[:2] - reach), 0).astype(int)
+    high = np.minimum(np.ceil(near[:2] + reach).astype(int) + 1, image.shape[::-1])
+    part = image[low[1] : high[1], low[0] : high[0]]
+    optics = Optics(part.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
+    start = near - [*low, 0, 0, 0]
+    found, kind = find_ellipse(part, start, optics), ELLIPSE
+    if found.status in status.MEASURED and _round(found.parameters, found.covariance):
+        found, kind = find_ellipse(part, start, optics, circle=True), CIRCLE
+    return MeasuredEllipse(
+        kind, found.parameters + [*low, 0, 0, 0], found.covariance, str(found.status), float(noise), float(blur)
+    )
+
+
+def _round(parameters: np.ndarray, covariance: np.ndarray) -> bool:
+    difference = np.array([0, 0, 1.0, -1.0])
+    return bool(abs(difference @ parameters[:4]) <= _SAME * np.sqrt(difference @ covariance[:4, :4] @ difference))
