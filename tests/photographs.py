@@ -159,7 +159,9 @@ def _ellipse(x: float, y: float, a: float, b: float) -> Seen:
 
 
 MADE = {
-    "turned by 45 degrees": Photo(lambda: rectangle(100, 60, 45), "a rectangle", (_quadrilateral(turned(100, 60, 45)),)),
+    "turned by 45 degrees": Photo(
+        lambda: rectangle(100, 60, 45), "a rectangle", (_quadrilateral(turned(100, 60, 45)),)
+    ),
     "square on its corner": Photo(lambda: rectangle(60, 60, 45), "a square", (_quadrilateral(turned(60, 60, 45)),)),
     "tripod": Photo(_tripod, "legs of a tripod; no quadrilateral"),
     "two bricks": Photo(_bricks, "two bricks", tuple(map(_quadrilateral, _BRICKS))),
@@ -173,6 +175,13 @@ MADE = {
     "plain": Photo(lambda: np.full((300, 400), 100.0), "nothing"),
 }
 
+_COINS = (
+    (102, 196, 38), (336, 124, 34), (212, 193, 42), (154, 127, 33), (154, 198, 34), (244, 263, 42), (205, 124, 35),
+    (102, 126, 33), (45, 124, 36), (335, 44, 51), (114, 266, 38), (271, 119, 44), (347, 187, 56), (172, 261, 48),
+    (301, 263, 45), (358, 268, 39), (44, 197, 34), (46, 260, 50), (100, 56, 33), (155, 51, 41), (215, 51, 40),
+    (276, 52, 35), (44, 54, 37),
+)  # fmt: skip
+
 SHIPPED = {
     "camera.png": Photo(_file("camera.png"), "a man with a camera on a tripod; no quadrilateral"),
     "page.png": Photo(_file("page.png"), "text; nothing"),
@@ -183,4 +192,25 @@ SHIPPED = {
     "gravel.png": Photo(_file("gravel.png"), "pebbles; nothing"),
     "chelsea.png": Photo(_file("chelsea.png"), "a cat; nothing"),
     "rocket.jpg": Photo(_file("rocket.jpg"), "a rocket; nothing"),
-}
+    "brick.png": Photo(_file("brick.png"), "a wall; single bricks at most, never two", (), 3),
+    "astronaut.png": Photo(
+        _file("astronaut.png"), "a window's image on the helmet, a round badge",
+        (Seen((QUADRILATERAL,), 359, 442, 26), Seen(ROUND, 171, 386, 68)),
+    ),
+    "coins.png": Photo(
+        _file("coins.png"), "24 coins, one of them worn", tuple(Seen(ROUND, x, y, size) for x, y, size in _COINS), 1
+    ),
+    "coffee.png": Photo(
+        _file("coffee.png"), "the rim of a cup, outside and inside", (Seen(ROUND, 290, 113, 187), Seen(ROUND, 291, 112, 158))
+    ),
+    "phantom.png": Photo(
+        _file("phantom.png"), "a skull, outside and inside, and two chambers",
+        (Seen(ROUND, 199, 199, 282), Seen(ROUND, 200, 203, 269), Seen(ROUND, 156, 199, 90), Seen(ROUND, 243, 199, 65)), 3,
+    ),
+    "retina.jpg": Photo(_file("retina.jpg"), "a round field of view", (Seen(ROUND, 704, 703, 1231),)),
+    "cell.png": Photo(_file("cell.png"), "a round cell", (Seen(ROUND, 428, 374, 112),)),
+    "logo.png": Photo(_file("logo.png"), "a disc", (Seen(ROUND, 251, 250, 426),)),
+    "chessboard_GRAY.png": Photo(
+        _file("chessboard_GRAY.png"), "a chessboard of 7 x 7 inner corners", (Seen((CHESSBOARD,), 99.5, 99.5, 150),)
+    ),
+}  # fmt: skip

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure import status
+from measure.features.conic import Ellipse
 from measure.features.optics import Optics
 from measure.find.candidate import CIRCLE, ELLIPSE
 from measure.find.ellipse import find_ellipse
+from measure.photo.edge_points import ellipse_by_points
 from measure.photo.noise import noise_sigma
 from measure.photo.residuals import ellipse_blur
 
 _SAME = 3.0  # standard deviations up to which the axes count as equal
+_LARGE = 150.0  # px, a semi-axis: beyond, edge points are as good for any purpose, and far quicker
 _MARGIN = 24  # px around the ellipse that is looked at
 
 
@@ -39,12 +42,21 @@ def measure_ellipse(image: np.ndarray, near: np.ndarray) -> MeasuredEllipse:
     part = image[low[1] : high[1], low[0] : high[0]]
     optics = Optics(part.shape, blur, noise**2, max(1.0, blur), 3 + 2 * max(1.0, blur))
     start = near - [*low, 0, 0, 0]
-    found, kind = find_ellipse(part, start, optics), ELLIPSE
+    found, kind = _found(part, start, optics, False), ELLIPSE
     if found.status in status.MEASURED and _round(found.parameters, found.covariance):
-        found, kind = find_ellipse(part, start, optics, circle=True), CIRCLE
+        found, kind = _found(part, start, optics, True), CIRCLE
     return MeasuredEllipse(
         kind, found.parameters + [*low, 0, 0, 0], found.covariance, str(found.status), float(noise), float(blur)
     )
+
+
+def _found(image: np.ndarray, start: np.ndarray, optics: Optics, circle: bool) -> Ellipse:
+    """The most likely one; from edge points where it is large, or where the picture is none of one blurred ellipse."""
+    if start[2] <= _LARGE:
+        found = find_ellipse(image, start, optics, circle=circle)
+        if found.status in status.MEASURED:
+            return found
+    return ellipse_by_points(image, start, optics, circle)
 
 
 def _round(parameters: np.ndarray, covariance: np.ndarray) -> bool:
