@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-_FINE = 8  # subpixels a side
+_FINE = 5  # subpixels a side
 
 
 def pattern_image(cells, corners, shape, blur=0.8, dark=30.0, bright=200.0):
@@ -21,8 +21,8 @@ def pattern_image(cells, corners, shape, blur=0.8, dark=30.0, bright=200.0):
     cells = np.asarray(cells, float)
     rows, columns = cells.shape
     around = np.pad(cells, 1, constant_values=1.0)
-    large = np.kron(around, np.ones((40, 40)))
-    source = np.array([[1, 1], [columns + 1, 1], [columns + 1, rows + 1], [1, rows + 1]]) * 40 - 0.5
+    large = np.kron(around, np.ones((20, 20)))
+    source = np.array([[1, 1], [columns + 1, 1], [columns + 1, rows + 1], [1, rows + 1]]) * 20 - 0.5
     target = np.asarray(corners) * _FINE + (_FINE - 1) / 2
     to_image = cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32))
     size = shape[1] * _FINE, shape[0] * _FINE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -104,11 +105,26 @@ _HOLES = (160.0, 140.0, 30.0), (470.0, 150.0, 18.0), (460.0, 330.0, 42.0), (170.
 
 def disc(x: float, y: float, radius: float, shape, blur: float = 0.8) -> np.ndarray:
     """A blurred disc of level 1 as a polygon of 180 corners."""
+    return ellipse((x, y, radius, radius, 0.0), shape, blur)
+
+
+def ellipse(parameters, shape, blur: float = 0.8) -> np.ndarray:
+    """The same of an ellipse x, y, a, b, angle (degrees) that lies in the image as a whole."""
+    x, y, a, b, angle = parameters
     t = np.linspace(0, 2 * np.pi, 180, endpoint=False)
-    swollen = radius * np.sqrt(2 * np.pi / 180 / np.sin(2 * np.pi / 180))  # of the same area
-    return polygon_image(np.stack([x + swollen * np.cos(t), y + swollen * np.sin(t)], 1), shape, blur, 1.0, 0.0)
+    swollen = np.sqrt(2 * np.pi / 180 / np.sin(2 * np.pi / 180))  # of the same area
+    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    u, v = swollen * a * np.cos(t), swollen * b * np.sin(t)
+    corners = np.stack([x + cosine * u - sine * v, y + sine * u + cosine * v], 1)
+    low = np.maximum(np.floor(corners.min(0) - 8), 0).astype(int)
+    high = np.minimum(np.ceil(corners.max(0) + 9).astype(int), shape[::-1])
+    image = np.zeros(shape)
+    part = tuple((high - low)[::-1].tolist())
+    image[low[1] : high[1], low[0] : high[0]] = polygon_image(corners - low, part, blur, 1.0, 0.0)
+    return image
 
 
+@lru_cache(maxsize=1)
 def plate() -> np.ndarray:
     """A plate with four holes."""
     image = polygon_image(_PLATE, (480, 640), 0.8, 120.0, 50.0)
@@ -118,14 +134,16 @@ def plate() -> np.ndarray:
 _TAG = np.array([[70.3, 40.2], [160.3, 48.0], [154.0, 135.0], [61.0, 128.0]])
 
 
-def tag(family: str, number: int, corners: np.ndarray = _TAG, shape=(200, 240)) -> np.ndarray:
-    """One tag on bright paper."""
-    return _noisy(pattern_image(tag_cells(family, number), corners, shape))
+@lru_cache(maxsize=20)
+def tag(family: str, number: int, turn: int = 0) -> np.ndarray:
+    """One tag on bright paper; its first corner is one of four."""
+    return _noisy(pattern_image(tag_cells(family, number), np.roll(_TAG, turn, 0), (200, 240)))
 
 
 _BOARD = np.array([[50.0, 40.0], [330.0, 55.0], [318.0, 230.0], [62.0, 240.0]])
 
 
+@lru_cache(maxsize=1)
 def board() -> np.ndarray:
     """A chessboard of 8 x 6 squares, seen from aside."""
     return _noisy(pattern_image(chessboard_cells(8, 6), _BOARD, (280, 380)))
@@ -201,11 +219,13 @@ SHIPPED = {
         _file("coins.png"), "24 coins, one of them worn", tuple(Seen(ROUND, x, y, size) for x, y, size in _COINS), 1
     ),
     "coffee.png": Photo(
-        _file("coffee.png"), "the rim of a cup, outside and inside", (Seen(ROUND, 290, 113, 187), Seen(ROUND, 291, 112, 158))
+        _file("coffee.png"), "the rim of a cup, outside and inside",
+        (Seen(ROUND, 290, 113, 187), Seen(ROUND, 291, 112, 158)),
     ),
     "phantom.png": Photo(
         _file("phantom.png"), "a skull, outside and inside, and two chambers",
-        (Seen(ROUND, 199, 199, 282), Seen(ROUND, 200, 203, 269), Seen(ROUND, 156, 199, 90), Seen(ROUND, 243, 199, 65)), 3,
+        (Seen(ROUND, 199, 199, 282), Seen(ROUND, 200, 203, 269), Seen(ROUND, 156, 199, 90), Seen(ROUND, 243, 199, 65)),
+        3,
     ),
     "retina.jpg": Photo(_file("retina.jpg"), "a round field of view", (Seen(ROUND, 704, 703, 1231),)),
     "cell.png": Photo(_file("cell.png"), "a round cell", (Seen(ROUND, 428, 374, 112),)),

@@ -51,9 +51,14 @@ def _along(outline: np.ndarray) -> np.ndarray:
 def outside(candidates: list[Candidate]) -> list[Candidate]:
     """Without what is part of a tag's or a chessboard's own pattern; a board may have tags in it."""
     tags = [one for one in candidates if one.kind == TAG]
-    boards = [one for one in candidates if one.kind == CHESSBOARD and not _in_any(one, tags)]
+    boards = [one for one in candidates if one.kind == CHESSBOARD and not any(_on(one, tag) for tag in tags)]
     others = [one for one in candidates if one.kind not in (TAG, CHESSBOARD)]
     return tags + boards + [one for one in others if not _in_any(one, tags + boards)]
+
+
+def _on(board: Candidate, tag: Candidate) -> bool:
+    """Whether a board is seen in a tag's cells."""
+    return tag.distance(board.centre) < 0 and board.area < 1.5 * tag.area
 
 
 def _in_any(one: Candidate, wholes: list[Candidate]) -> bool:

@@ -23,7 +23,8 @@ _ALLOWED = 1.1  # times the noise's variance, which is an estimate itself
 def ellipse_by_points(image: np.ndarray, near: np.ndarray, optics: Optics, circle: bool) -> Ellipse:
     """Fit an ellipse to points where the second derivative across it is zero.
 
-    Points farther off than four times the median are left out. The covariance is that of the points by white noise.
+    Points farther off than four times the median are left out. The covariance is that of the points by white noise;
+    where that does not explain their distances, it is enlarged by their chi-square over its degrees of freedom.
 
     Parameters
     ----------
@@ -72,8 +73,10 @@ def _fitted(points: np.ndarray, covariance: np.ndarray, circle: bool) -> Ellipse
     if fitted.status not in status.MEASURED:
         return fitted
     squares = float((_distances(points[kept], fitted.parameters) ** 2 / np.diag(covariance)[kept]).sum())
-    clean = kept.mean() > 0.9 and squares / _ALLOWED < chdtri(int(kept.sum()) - 5, _RARE)
-    return Ellipse(fitted.parameters, fitted.covariance, np.array(status.OK if clean else status.CLUTTER))
+    freedom = int(kept.sum()) - 5
+    if kept.mean() > 0.9 and squares / _ALLOWED < chdtri(freedom, _RARE):
+        return fitted
+    return Ellipse(fitted.parameters, fitted.covariance * max(squares / freedom, 1.0), np.array(status.CLUTTER))
 
 
 def _distances(points: np.ndarray, parameters: np.ndarray) -> np.ndarray:

@@ -51,10 +51,11 @@ def measure_ellipse(image: np.ndarray, near: np.ndarray) -> MeasuredEllipse:
 
 
 def _found(image: np.ndarray, start: np.ndarray, optics: Optics, circle: bool) -> Ellipse:
-    """The most likely one; from edge points where it is large, or where the picture is none of one blurred ellipse."""
+    """The most likely one; from edge points where it is large, or where the picture is not that of one blurred ellipse,
+    for they tell how far it is from one."""
     if start[2] <= _LARGE:
         found = find_ellipse(image, start, optics, circle=circle)
-        if found.status in status.MEASURED:
+        if found.status == status.OK:
             return found
     return ellipse_by_points(image, start, optics, circle)
 

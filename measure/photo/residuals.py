@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 _REACH, _STEP = 4.0, 0.5  # px across an outline
+_NEAR = 1.5  # px: where the edge's sign is told
 _MOST = 60  # places along a side
 _SPLINE = 1 / 3  # px^2: variance of the cubic B-spline that levels between pixels are averaged with
 _WIDTH = 3  # places along a side whose levels are averaged
@@ -84,7 +85,8 @@ def ellipse_blur(image: np.ndarray, parameters: np.ndarray) -> float:
 
 def _residuals(image: np.ndarray, places: np.ndarray, normals: np.ndarray) -> Residuals:
     offsets, rise = _rises(image, places, normals)
-    rise = cv2.blur(rise, (1, _WIDTH), borderType=cv2.BORDER_REFLECT) * np.sign(rise.sum() or 1.0)
+    sign = np.sign(rise[:, np.abs(offsets) < _NEAR].sum()) or 1.0
+    rise = sign * cv2.blur(rise, (1, _WIDTH), borderType=cv2.BORDER_REFLECT)
     weight = np.clip(rise, 0, None) ** 2
     middle = weight @ offsets / np.maximum(weight.sum(1), 1e-300)
     return Residuals(places, normals, middle)

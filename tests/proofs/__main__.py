@@ -1,4 +1,4 @@
-"""``python -m tests.proofs`` with conditions, crowded, kill, large, lights, parts, photographs, rate, stations or uneven."""
+"""``python -m tests.proofs`` with one of the commands below; without one they are listed."""
 
 from __future__ import annotations
 

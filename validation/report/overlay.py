@@ -1,4 +1,4 @@
-"""A photograph with what was found in it: outlines, lengths, corners' ellipses, and the edge's distance from each line."""
+"""A photograph with what was found in it: outlines, lengths, corners' ellipses, and the edge's distance from them."""
 
 from __future__ import annotations
 
@@ -73,8 +73,6 @@ def figure(image: np.ndarray, found: measure.Photograph) -> Figure:
 
 
 def _mark(shown: Figure, y: float, total: float, colour: str):
-    from matplotlib.patches import Rectangle
-
     return Rectangle(
         (0, y - 0.4 * _LINE / total), 0.008, 0.8 * _LINE / total, color=colour, transform=shown.transFigure
     )
@@ -126,7 +124,7 @@ def _drawn(axes: Axes, one: measure.Found, number: int, scale: float, residual: 
     colour = _colour(number)
     outline = one.candidate.outline if one.candidate is not None else one.corners
     if one.kind == CHESSBOARD and one.corners is not None:
-        axes.plot(one.corners[:, 0], one.corners[:, 1], "+", color=colour, markersize=12)
+        axes.plot(one.corners[:, 0], one.corners[:, 1], "+", color=colour, markersize=16, markeredgewidth=3)
     elif one.corners is not None:
         outline = one.corners
         _outlined(axes, outline, colour, 2.0)
@@ -144,7 +142,10 @@ def _drawn(axes: Axes, one: measure.Found, number: int, scale: float, residual: 
         for middle, block in zip(middles, _blocks(one), strict=True):
             _oval(axes, middle, corner**2 * block, colour)
     if outline is not None:
-        _badge(axes, outline.mean(0), str(number), colour)
+        middle = outline.mean(0)
+        taken = [each.get_position() for each in axes.texts if each.get_text().isdigit()]
+        free = all(np.hypot(*(middle - place)) * scale > _LINE for place in taken)
+        _badge(axes, middle if free else (outline[0] + outline[1]) / 2, str(number), colour)
 
 
 def _oval(axes: Axes, middle: np.ndarray, covariance: np.ndarray, colour: str) -> None:
@@ -198,7 +199,7 @@ def _told(one: measure.Found) -> str:
         return f"{name}: {one.status}"
     lengths = [q for q in one.quantities if q.unit == "px" and not q.name.startswith(("diagonal", "centre"))]
     values = ", ".join(_with_sigma(q.value, q.sigma).replace(" ", _HARD) for q in lengths)
-    return f"{name}, {one.status}: {values} px"
+    return f"{name}, {one.status}: {values}{_HARD}px"
 
 
 def _with_sigma(value: float, sigma: float) -> str:
