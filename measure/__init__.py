@@ -6,12 +6,15 @@ from measure.bounds import bound, image_bound
 from measure.estimators.registry import ESTIMATORS, best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
+from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse
+from measure.find.search import find
 from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
+from measure.photo.photograph import Found, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
@@ -20,8 +23,10 @@ __all__ = [
     "ESTIMATORS",
     "Board",
     "CameraCalibration",
+    "Candidate",
     "EdgeResponse",
     "Ellipse",
+    "Found",
     "Lens",
     "MeasuredValue",
     "Measurement",
@@ -30,11 +35,14 @@ __all__ = [
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
+    "Shapes",
     "best_estimator",
     "bound",
     "calibrate_camera",
     "chessboard",
-    "distance", "distances",
+    "distance",
+    "distances",
+    "find",
     "find_ellipse",
     "fit_ellipse",
     "image_bound",
@@ -45,7 +53,8 @@ __all__ = [
     "measure_quadrilateral",
     "mtf",
     "noise_curve",
+    "photograph",
     "point_distance",
     "propagate",
     "region_of_interest",
-]  # fmt: skip
+]

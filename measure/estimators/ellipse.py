@@ -43,8 +43,12 @@ class Seen:
         """Whether the nearest of the places to outline parameters t (...) showed an edge point."""
         if self.found.all():
             return np.ones(t.shape, bool)
-        apart = np.abs((t[..., None] - self.angles + np.pi) % (2 * np.pi) - np.pi)
-        return self.found[apart.argmin(-1)]
+        order = np.argsort(self.angles % (2 * np.pi))
+        angles = self.angles[order] % (2 * np.pi)
+        halves = (angles + np.append(angles[1:], angles[0] + 2 * np.pi)) / 2  # between each place and the next
+        around = np.searchsorted(halves, t % (2 * np.pi)) % len(angles)
+        first = t % (2 * np.pi) < halves[-1] - 2 * np.pi
+        return self.found[order[np.where(first, len(angles) - 1, around)]]
 
 
 def likeliest_ellipse(

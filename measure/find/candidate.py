@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -21,7 +21,7 @@ class Candidate:
     outline : ndarray, shape (k, 2)
         (x, y), (0, 0) the centre of the first pixel: the four corners of a quadrilateral, the first the one nearest to
         the image's upper left corner, and of a tag's black square in the tag's own order; 64 points of an ellipse; the
-        four outer ones of a chessboard's inner corners. To a pixel or two (of a megapixel, where there are more).
+        four outer ones of a chessboard's inner corners. To a pixel or two (of half a megapixel, where there are more).
     support : float
         Part of the outline, of a quadrilateral's worst side, on which the image changes across it: by more than four
         standard deviations of the noise and at least a quarter of what is usual along it.
@@ -73,9 +73,14 @@ class Candidate:
         """How far a point (2,) is outside the outline, px; negative inside."""
         return -cv2.pointPolygonTest(self.outline.astype(np.float32), tuple(map(float, point)), True)
 
-    def within(self, box: np.ndarray) -> bool:
-        """Whether the whole outline lies in a box (x0, y0, x1, y1)."""
-        return bool((self.outline >= box[:2]).all() and (self.outline <= box[2:]).all())
+    def moved(self, by: np.ndarray) -> Candidate:
+        """The same, moved by (x, y), px."""
+        moved = {"outline": self.outline + by}
+        if self.parameters is not None:
+            moved["parameters"] = self.parameters + [*by, 0, 0, 0]
+        if self.grid is not None:
+            moved["grid"] = self.grid + by
+        return replace(self, **moved)
 
 
 def ellipse_outline(parameters: np.ndarray, count: int = 64) -> np.ndarray:

@@ -36,7 +36,8 @@ def find_chessboard(coarse: Coarse) -> Candidate | None:
 
 def _alternation(coarse: Coarse, grid: np.ndarray) -> tuple[float, float]:
     """Part of the pairs of neighbouring squares that differ as those of a board do, and the median difference over the
-    noise; the squares are those between four inner corners."""
+    noise; squares around the inner corners count too."""
+    grid = _extended(_extended(grid).swapaxes(0, 1)).swapaxes(0, 1)
     middles = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
     levels = coarse.levels(middles.reshape(-1, 2)).reshape(middles.shape[:2])
     row, column = np.indices(levels.shape)
@@ -46,3 +47,8 @@ def _alternation(coarse: Coarse, grid: np.ndarray) -> tuple[float, float]:
     pairs = pairs * np.sign(np.median(pairs))
     enough = pairs > np.median(pairs) / 3
     return float(enough.mean()), float(np.median(pairs)) / max(coarse.noise, 1e-300)
+
+
+def _extended(grid: np.ndarray) -> np.ndarray:
+    """With a row more at both ends, as far away as the next."""
+    return np.concatenate([2 * grid[:1] - grid[1:2], grid, 2 * grid[-1:] - grid[-2:-1]])

@@ -48,13 +48,23 @@ def _along(outline: np.ndarray) -> np.ndarray:
     return np.concatenate([outline, (outline + np.roll(outline, -1, 0)) / 2])
 
 
-def outside(candidates: list[Candidate], wholes: list[Candidate]) -> list[Candidate]:
-    """Without what is part of a tag's or a chessboard's own pattern."""
-    return [one for one in candidates if not any(_part(one, whole) for whole in wholes)]
+def outside(candidates: list[Candidate]) -> list[Candidate]:
+    """Without what is part of a tag's or a chessboard's own pattern; a board may have tags in it."""
+    tags = [one for one in candidates if one.kind == TAG]
+    boards = [one for one in candidates if one.kind == CHESSBOARD and not any(_on(one, tag) for tag in tags)]
+    others = [one for one in candidates if one.kind not in (TAG, CHESSBOARD)]
+    return tags + boards + [one for one in others if not _in_any(one, tags + boards)]
 
 
-def _part(one: Candidate, whole: Candidate) -> bool:
-    if whole is one or whole.kind not in (TAG, CHESSBOARD):
-        return False
-    margin = max(whole.sizes) / (max(whole.grid.shape[:2]) - 1) if whole.grid is not None else 2.0
-    return all(whole.distance(place) < 1.1 * margin for place in one.outline) and one.area < 1.5 * whole.area
+def _on(board: Candidate, tag: Candidate) -> bool:
+    """Whether a board is seen in a tag's cells."""
+    return tag.distance(board.centre) < 0 and board.area < 1.5 * tag.area
+
+
+def _in_any(one: Candidate, wholes: list[Candidate]) -> bool:
+    """Whether a shape lies in one of some wholes; a chessboard's outer squares, up to a diagonal wide, surround it."""
+    return any(all(whole.distance(place) < 1 + _square(whole) for place in one.outline) for whole in wholes)
+
+
+def _square(whole: Candidate) -> float:
+    return 0.0 if whole.grid is None else 2.0 * max(whole.sizes) / (max(whole.grid.shape[:2]) - 1)

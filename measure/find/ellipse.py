@@ -62,6 +62,9 @@ def find_ellipse(
         raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {images.shape}")
     if expected.shape != (5,) or not (expected[2:4] > 0).all() or np.abs(expected).max() > _LARGEST:
         raise InvalidInput(f"expected must be x, y, a, b and angle of an ellipse, got {expected}")
+    if circle:
+        radius = expected[2:4].mean()
+        expected = np.array([*expected[:2], radius, radius, 0.0])
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     start = to_symmetric(expected / UNITS)
     angles, places, normals = _positions(start, optics, spacing)

@@ -60,15 +60,15 @@ def shaped(corners: np.ndarray) -> bool:
 def four_sides(coarse: Coarse, corners: np.ndarray) -> Candidate | None:
     """The quadrilateral near corners (4, 2), coarse px; None where a person would see none.
 
-    All four sides are straight, with an edge of one sign nearly everywhere and ends where they meet the next side.
+    All four sides are straight, each with an edge of one sign nearly everywhere and ends where they meet the next side.
     """
     for reach in (4.0, 2.0):
         corners = _moved(coarse, corners, reach)
         if corners is None:
             return None
     places, normals, piece, lengths = _sides(corners, 1.0 / 40)
-    sign = sign_of(coarse, places, normals)
-    seen = steepest(coarse, places, normals, sign, 1.5, piece)
+    signs = _signs(coarse, places, normals, piece)
+    seen = steepest(coarse, places, normals, signs[piece], 1.5, piece)
     supports, contrasts, slopes = np.empty(4), np.empty(4), np.empty(4)
     for side in range(4):
         of = piece == side
@@ -80,7 +80,7 @@ def four_sides(coarse: Coarse, corners: np.ndarray) -> Candidate | None:
         if one.straightness > max(_STRAIGHT[0], _STRAIGHT[1] * lengths[side]):
             return None
         contrasts[side] = contrast(coarse, places[of], normals[of])
-    if slopes.min() < _BALANCE * slopes.max() or _goes_on(coarse, corners, sign, slopes):
+    if slopes.min() < _BALANCE * slopes.max() or _goes_on(coarse, corners, signs, slopes):
         return None
     if texture(coarse, places, normals, cv2.contourArea(corners.astype(np.float32))):
         return None
@@ -107,7 +107,7 @@ def _sides(corners: np.ndarray, left_out: float) -> tuple[np.ndarray, np.ndarray
 def _moved(coarse: Coarse, corners: np.ndarray, reach: float) -> np.ndarray | None:
     """Corners of lines through the steepest places within ``reach`` px of the sides."""
     places, normals, piece, _ = _sides(corners, 0.1)
-    seen = steepest(coarse, places, normals, sign_of(coarse, places, normals), reach, piece)
+    seen = steepest(coarse, places, normals, _signs(coarse, places, normals, piece)[piece], reach, piece)
     points = places + seen.offsets[:, None] * normals
     lines = []
     for side in range(4):
@@ -125,7 +125,13 @@ def _moved(coarse: Coarse, corners: np.ndarray, reach: float) -> np.ndarray | No
     return found if inside and shaped(found) else None
 
 
-def _goes_on(coarse: Coarse, corners: np.ndarray, sign: int, slopes: np.ndarray) -> bool:
+def _signs(coarse: Coarse, places: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Which way the image changes at each side: a block's face may be brighter than one neighbour and darker than
+    another."""
+    return np.array([sign_of(coarse, places[piece == side], normals[piece == side]) for side in range(4)])
+
+
+def _goes_on(coarse: Coarse, corners: np.ndarray, signs: np.ndarray, slopes: np.ndarray) -> bool:
     """Whether a side goes straight on beyond a corner: then it ends elsewhere, and the corner is none of the shape."""
     along = np.roll(corners, -1, 0) - corners
     lengths = np.linalg.norm(along, axis=1)
@@ -138,7 +144,7 @@ def _goes_on(coarse: Coarse, corners: np.ndarray, sign: int, slopes: np.ndarray)
             inside = ((places > 1) & (places < coarse.size - 2)).all(1)
             if inside.sum() < 3:
                 continue
-            seen = steepest(coarse, places[inside], np.tile(outward, (int(inside.sum()), 1)), sign, 1.5)
+            seen = steepest(coarse, places[inside], np.tile(outward, (int(inside.sum()), 1)), signs[side], 1.5)
             if (seen.slopes < max(_SEEN * slopes[side], 4 * coarse.gradient_noise)).sum() < 2:
                 return True
     return False

@@ -26,7 +26,7 @@ def ellipse(outline: np.ndarray) -> np.ndarray | None:
 
 
 def deviation(outline: np.ndarray, parameters: np.ndarray) -> tuple[float, float]:
-    """Root mean square and 95 % quantile of the distances of an outline's points from an ellipse, to first order, px."""
+    """Root mean square and 95 % quantile of an outline's distances from an ellipse, to first order, px."""
     some = outline[:: max(len(outline) // 200, 1)].astype(float)
     (u, v), (a, b) = _turned(some, parameters), parameters[2:4]
     size = np.hypot(u / a, v / b)

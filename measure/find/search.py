@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
+import cv2
 import numpy as np
 
 from measure.find import four_sides, rounds
@@ -18,8 +20,8 @@ from scenes import InvalidInput
 from scenes.arrays import picture
 
 _CELL = 4.0  # px: outlines with all corners this near are tried together
-_TRIES = 3  # of them
-_MOST = 400  # outlines that are tried
+_LOOKS, _TRIES = 6, 3  # of them: how many are fitted, and how many compared with the image
+_MOST_FITTED, _MOST_COMPARED = 6000, 400  # the longest outlines
 _MOST_READ = 100  # quadrilaterals that may be tags
 _LEAST_SCORE, _LEAST_CONTRAST = 25.0, 1.0  # standard deviations: of an outline as a whole, and of a pixel
 _LEAST_PART = 0.04  # of the best one's score
@@ -35,7 +37,7 @@ def find(image: Any, kinds: tuple[str, ...] | None = None) -> tuple[Candidate, .
     Parameters
     ----------
     image : array_like, shape (height, width)
-        Grey levels. Beyond two megapixels, means of squares of pixels are looked at.
+        Grey levels. Beyond a megapixel, means of squares of pixels are looked at, about half a megapixel.
     kinds : tuple of str, optional
         Which kinds of `Candidate`; all when not given.
 
@@ -61,7 +63,7 @@ def find(image: Any, kinds: tuple[str, ...] | None = None) -> tuple[Candidate, .
     if {TAG, QUADRILATERAL} & wanted:
         found = [tag(image, one) for one in found[:_MOST_READ]] + found[_MOST_READ:]
     board = find_chessboard(coarse) if {CHESSBOARD, QUADRILATERAL} & wanted else None
-    found = outside(found + [board] * (board is not None), [*found, *[board] * (board is not None)])
+    found = outside([*found, board] if board else found)
     return _prominent([one for one in found if one.kind in wanted])
 
 
@@ -103,21 +105,28 @@ def find_quadrilateral(image: np.ndarray) -> np.ndarray:
 
 
 def _shapes(coarse: Coarse, wanted: frozenset[str]) -> Iterator[Candidate]:
-    tried: dict[tuple, int] = {}
-    good: set[tuple] = set()
+    seen, tried, good = Counter(), Counter(), set()
     sides, round_ = bool({QUADRILATERAL, TAG, CHESSBOARD} & wanted), bool({CIRCLE, ELLIPSE} & wanted)
-    for outline in contours(coarse):
+    for outline in sorted(contours(coarse), key=len, reverse=True)[:_MOST_FITTED]:
+        place = _cell(np.array(cv2.boundingRect(outline)))
+        if place in good or seen[place] >= _LOOKS:
+            continue
+        seen[place] += 1
         shape = _shape(outline)
         if shape is None or not (sides if shape[0] == QUADRILATERAL else round_):
             continue
-        key = shape[0], *np.rint(shape[1].ravel() / _CELL).astype(int).tolist()
-        if key in good or tried.get(key, 0) >= _TRIES or len(tried) >= _MOST:
+        key = shape[0], *_cell(shape[1])
+        if tried[key] >= _TRIES or tried.total() >= _MOST_COMPARED:
             continue
-        tried[key] = tried.get(key, 0) + 1
+        tried[key] += 1
         found = (four_sides.four_sides if shape[0] == QUADRILATERAL else rounds.rounded)(coarse, shape[1])
         if found is not None:
-            good.add(key)
+            good.add(place)
             yield found
+
+
+def _cell(numbers: np.ndarray) -> tuple[int, ...]:
+    return tuple(np.rint(numbers.ravel() / _CELL).astype(int).tolist())
 
 
 def _shape(outline: np.ndarray) -> tuple[str, np.ndarray] | None:

@@ -15,7 +15,7 @@ _NOISE, _USUAL = 4.0, 0.25  # standard deviations of the gradient, and part of i
 _AROUND = np.arange(4.0, 8.0)  # px outside an outline, where others may be
 _OTHERS = 0.5  # slope of those over the outline's
 _SMALL = 24.0  # px, root of the area: up to it a shape among others like it is texture
-_MOST_AROUND = 0.25  # part of the surroundings with edges of others
+_MOST_AROUND = 0.2  # part of the surroundings with edges of others
 _AWAY = 3.0  # px inside and outside where levels are compared
 
 
@@ -45,13 +45,17 @@ class Steepest:
         return float(np.sqrt(np.mean(self.offsets[self.counts] ** 2))) if self.counts.any() else np.inf
 
 
-def steepest(coarse: Coarse, places: np.ndarray, normals: np.ndarray, sign: int, reach: float, piece=None) -> Steepest:
+def steepest(
+    coarse: Coarse, places: np.ndarray, normals: np.ndarray, sign: int | np.ndarray, reach: float, piece=None
+) -> Steepest:
     """The steepest change of one sign along outward normals (m, 2) through places (m, 2), within ``reach`` px.
 
-    What is usual is told along each ``piece`` (m,) by itself where pieces are given.
+    The sign is 1 or -1, for all places or for each (m,). What is usual is told along each ``piece`` (m,) by itself
+    where pieces are given.
     """
     offsets = np.arange(-reach, reach + _STEP / 2, _STEP)
-    profiles = sign * cv2.blur(coarse.across(places, normals, offsets), (1, _AVERAGED), borderType=cv2.BORDER_REFLECT)
+    rises = cv2.blur(coarse.across(places, normals, offsets), (1, _AVERAGED), borderType=cv2.BORDER_REFLECT)
+    profiles = rises * np.broadcast_to(sign, len(places))[:, None]
     best = profiles.argmax(1)
     slopes = profiles[np.arange(len(places)), best]
     if piece is None:

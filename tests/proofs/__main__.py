@@ -1,4 +1,4 @@
-"""``python -m tests.proofs`` with boards, conditions, crowded, kill, large, lights, parts, rate, stations or uneven."""
+"""``python -m tests.proofs`` with one of the commands below; without one they are listed."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.parts import parts
+from tests.proofs.photographs import photographs
 from tests.proofs.rate import rate
 from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
@@ -23,6 +24,7 @@ app.command()(kill)
 app.command()(large)
 app.command()(lights)
 app.command()(parts)
+app.command()(photographs)
 app.command()(rate)
 app.command()(uneven)
 app.command()(stations)

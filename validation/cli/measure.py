@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import numpy as np
 import typer
 
 import scenes
-from scenes import InvalidInput, photograph
-from validation.cli import measurands, recorded
+import scenes.photograph
+from scenes import InvalidInput
+from scenes.photograph import Photograph
+from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     import measure
 
 commands = commands()
+
+_MOST, _ALL = 5, 1000  # shapes that are measured
 
 
 @commands.command("measure")
@@ -31,26 +35,54 @@ def measure_command(
     estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
     lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
+    near: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="The shape at this place of a photograph, px.")
+    ] = None,
+    box: Annotated[str | None, typer.Option(metavar="X0,Y0,X1,Y1", help="Shapes in this box, px.")] = None,
+    corners: Annotated[
+        tuple[str, str, str, str] | None,
+        typer.Option(metavar="X,Y X,Y X,Y X,Y", help="A quadrilateral whose corners are here, to some 5 px."),
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="quadrilateral, circle, ellipse, tag, chessboard; several with commas.")
+    ] = None,
+    most: Annotated[int | None, typer.Option(help="Shapes to measure, the most prominent first.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Measure all shapes that are found.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="PNG", help="Draw the photograph with what was found.")
+    ] = None,
     gamma: recorded.Gamma = None,
     channel: recorded.Channel = None,
     bayer: recorded.Bayer = None,
     mtf: recorded.Mtf = None,
     as_json: Json = False,
 ) -> None:
-    """Measure an image: the measurands of a known scene, or else the quadrilateral that it shows.
+    """Measure an image: the measurands of a known scene, or else the shapes that it shows.
 
-    Exit status 1 if something cannot be measured.
+    Of a photograph the five most prominent shapes are measured where nothing else is said. Exit status 1 if something
+    cannot be measured; of a photograph's shapes, if none can.
     """
     import measure
     from validation import picture_file
 
+    chosen = {"--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output}
+    chosen["--all"] = every or None
     if scene is None:
-        photo = photograph.read(file, gamma, channel, bayer)
-        found = measure.measure_quadrilateral(photo, estimator or "arrangement", lens and measure.load_lens(lens))
-        facts = _quadrilateral_facts(found) | recorded.facts(photo, found, mtf)
-        say({"file": str(file), **facts}, as_json, f"{_quadrilateral_text(found)}\n{recorded.text(facts)}")
-        raise typer.Exit(0 if found.measurands else 1)
-    recorded.refuse({"--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf})
+        if every and most is not None:
+            raise InvalidInput(f"--most must be left out with --all, got {most}")
+        wanted = {
+            "near": photograph.numbers("--near", near, 2),
+            "box": photograph.numbers("--box", box, 4),
+            "corners": corners and [photograph.numbers("--corners", corner, 2) for corner in corners],
+            "kinds": None if kind is None else tuple(kind.split(",")),
+            "most": _ALL if every else _MOST if most is None else most,
+        }
+        photo = scenes.photograph.read(file, gamma, channel, bayer)
+        _photograph(file, photo, wanted, estimator, lens, output, mtf, as_json)
+    chosen |= {"--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf}
+    for option, value in chosen.items():
+        if value is not None:
+            raise InvalidInput(f"{option} must be left out with a scene, got {value}")
     picture = picture_file.read(file)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
@@ -72,6 +104,37 @@ def measure_command(
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
+
+
+def _photograph(
+    file: Path,
+    photo: Photograph,
+    wanted: dict[str, Any],
+    estimator: str | None,
+    lens: Path | None,
+    output: Path | None,
+    mtf: Path | None,
+    as_json: bool,
+) -> NoReturn:
+    """Find and measure; exit status 1 where nothing could be measured."""
+    import measure
+
+    found = measure.photograph(
+        photo, **wanted, estimator=estimator or "arrangement", lens=lens and measure.load_lens(lens)
+    )
+    sharp = recorded.sharpness(photo, found, mtf) if mtf is not None else {}
+    if output is not None:
+        from validation.report import overlay
+
+        overlay.write(output, photo.levels, found)
+    if as_json:
+        say({"file": str(file), **recorded.facts(photo), **photograph.facts(found), **sharp}, True, "")
+    else:
+        if found.candidates:
+            console().print(photograph.table(found), highlight=False)
+        lines = [recorded.text(photo), photograph.text(found), *recorded.sharpness_lines(sharp)]
+        say({}, False, "\n".join(lines))
+    raise typer.Exit(0 if any(one.measured for one in found.found) else 1)
 
 
 def _distance_facts(found: measure.Measurement) -> dict:
@@ -104,25 +167,3 @@ def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
 
 def _fit(p_value: float) -> str:
     return f" (goodness of fit: p = {p_value:.2g})" if np.isfinite(p_value) else ""
-
-
-def _quadrilateral_facts(found: measure.Quadrilateral) -> dict:
-    return {
-        "status": found.status,
-        "p_value": found.p_value if np.isfinite(found.p_value) else None,
-        "corners": found.corners.tolist() if found.measurands else None,
-        "noise": found.noise,
-        "blur_px": found.blur_px,
-        "quantities": [vars(value) for value in found.measurands],
-    }
-
-
-def _quadrilateral_text(found: measure.Quadrilateral) -> str:
-    seen = f"noise {found.noise:.2f} grey levels, blur {found.blur_px:.2f} px{_fit(found.p_value)}"
-    lines = [f"quadrilateral: {found.status}; {seen}"]
-    if found.measurands:
-        sigma = np.sqrt(np.diag(found.covariance)).reshape(4, 2)
-        for i, ((x, y), (sx, sy)) in enumerate(zip(found.corners, sigma, strict=True), 1):
-            lines.append(f"corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
-    lines += [f"{q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in found.measurands]
-    return "\n".join([*lines, "(1 sigma)"])

@@ -26,74 +26,79 @@ Bayer = Annotated[
 Mtf = Annotated[Path | None, typer.Option(metavar="PNG", help="Draw edge spread and modulation transfer of each side.")]
 
 
-def refuse(options: dict[str, Any]) -> None:
-    """Options that are about photographs.
+def facts(photo: Photograph) -> dict[str, Any]:
+    """Tone curve and channel."""
+    return {"tone": photo.tone, "channel": photo.channel}
+
+
+def text(photo: Photograph) -> str:
+    """The same in words."""
+    return f"{photo.tone}; channel: {photo.channel}"
+
+
+def of_sides(found: measure.Quadrilateral) -> dict[str, Any]:
+    """What measured, noise against level, blur of each side."""
+    curve = found.curve
+    return {
+        "estimator": found.estimator,
+        "noise_curve": {"dark_variance": curve.dark, "gain": curve.gain, "dark_level": curve.dark_level,
+                        "rounding_step": curve.step},
+        "side_blur_px": [_number(b) for b in found.side_blur_px],
+    }  # fmt: skip
+
+
+def of_sides_lines(found: measure.Quadrilateral) -> list[str]:
+    """The same in words."""
+    curve, blur = found.curve, found.side_blur_px
+    grows = f" + {curve.gain:.3g} (level - {curve.dark_level:.0f})" if curve.gain else ""
+    lines = [
+        f"by {found.estimator}; noise variance {curve.dark:.3g}{grows} grey levels^2"
+        + (", and rounding" if curve.step else "")
+    ]
+    if np.isfinite(blur).all():
+        lines.append("blur of the sides " + ", ".join(f"{b:.2f}" for b in blur) + " px")
+    return lines
+
+
+def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str, Any]:
+    """Modulation transfer of each side of the first quadrilateral, drawn to ``plot``.
 
     Raises
     ------
     InvalidInput
-        If one is given.
+        If none was measured, or the file cannot be written.
     """
-    for name, value in options.items():
-        if value is not None:
-            raise InvalidInput(f"{name} must be left out with a scene, got {value}")
-
-
-def facts(photo: Photograph, found: measure.Quadrilateral, plot: Path | None) -> dict:
-    """Tone curve, channel, noise against level, blur of each side; with ``plot`` the sharpness, drawn there, too."""
-    curve = found.curve
-    told = {
-        "tone": photo.tone,
-        "channel": photo.channel,
-        "estimator": found.estimator,
-        "noise_curve": {"dark_variance": curve.dark, "gain": curve.gain, "dark_level": curve.dark_level,
-                        "rounding_step": curve.step},
-        "side_blur_px": [float(b) if np.isfinite(b) else None for b in found.side_blur_px],
-    }  # fmt: skip
-    return told | ({"mtf": _sharpness(photo, found, plot)} if plot is not None else {})
-
-
-def _sharpness(photo: Photograph, found: measure.Quadrilateral, plot: Path) -> list[dict]:
     from measure import mtf
     from validation.report import sharpness
 
+    four = next((one for one in found.found if one.quadrilateral is not None and one.measured), None)
+    if four is None:
+        raise InvalidInput("--mtf must go with a photograph of which a quadrilateral is measured, got none")
     sides, refused = [], []
-    for side in range(4 if found.measurands else 0):
+    for side in range(4):
         try:
-            sides.append((side + 1, mtf(photo, found.corners, side)))
+            sides.append((side + 1, mtf(photo, four.corners, side)))
         except InvalidInput as error:
             refused.append({"side": side + 1, "refused": str(error)})
     sharpness.write(plot, sides)
-    return [
-        {
-            "side": side,
-            "direction_deg": one.direction_deg,
-            "mtf50": _number(one.mtf50),
-            "error": _number(one.mtf50_error),
-        }
+    told = [
+        {"side": side, "direction_deg": one.direction_deg, "mtf50": _number(one.mtf50),
+         "error": _number(one.mtf50_error)}
         for side, one in sides
-    ] + refused
+    ]  # fmt: skip
+    return {"mtf": told + refused}
 
 
 def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    return float(value) if np.isfinite(value) else None
 
 
-def text(told: dict) -> str:
-    """The same in words."""
-    curve = told["noise_curve"]
-    grows = f" + {curve['gain']:.3g} (level - {curve['dark_level']:.0f})" if curve["gain"] else ""
-    lines = [
-        f"{told['tone']}; channel: {told['channel']}; measured by {told['estimator']}",
-        f"noise variance {curve['dark_variance']:.3g}{grows} grey levels^2"
-        + (", and rounding" if curve["rounding_step"] else ""),
-    ]
-    blur = told["side_blur_px"]
-    if all(blur):
-        lines.append("blur of the sides " + ", ".join(f"{b:.2f}" for b in blur) + " px")
+def sharpness_lines(told: dict[str, Any]) -> list[str]:
+    """What `sharpness` says, in words."""
+    lines = []
     for one in told.get("mtf", ()):
         if "refused" in one:
             lines.append(one["refused"])
         elif one["mtf50"] is not None:
             lines.append(f"side {one['side']}: MTF50 {one['mtf50']:.4f} +- {one['error']:.4f} cycles/px")
-    return "\n".join(lines)
+    return lines

@@ -43,7 +43,12 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--sensor": _POSE, "--light": _POSE, "-o": ("OUT.npy", "OUT.tif", "OUT.gif", "FILE/x.png"),
         "--noise-seed": ("1", str(2**63 - 1)), "--effects": ("fall_off",), "--leave-out-px": ("1",), "--json": (),
     }),
-    "measure": (["IMAGE", "SCENE", "--sensor", "30,135"], {
+    "measure": (["IMAGE"], {
+        "--near": ("5,6", "1e9,1", "x"), "--box": ("1,2,50,60", "9,9,1,1"), "--kind": ("tag", "dog"), "--all": (),
+        "--most": ("0", "3"), "-o": ("OUT.png", "OUT.gif", "FILE/x.png"), "--lens": ("SCENE",), "--json": (),
+        "--estimator": ("gradient", "nobody"),
+    }),
+    "measure ": (["IMAGE", "SCENE", "--sensor", "30,135"], {
         "--sensor": _POSE, "--light": _POSE, "--estimator": ("gradient", "strip", "nobody"),
         "--threshold": ("1e9", "5"),
         "--lens": ("SCENE", "IMAGE"), "--json": (),
@@ -71,7 +76,9 @@ def command(rng: np.random.Generator, folder: Path, scene: Path, run: Path) -> s
     names = {"SCENE": scene, "RUN": run, "OUT": folder / "out", "FILE": folder / "file", "IMAGE": folder / "image.npy"}
     names["DAMAGED"] = _damaged(folder, run)
     names["FILE"].write_text("a file")
-    np.save(names["IMAGE"], np.full((60, 64), 20.0))
+    square = np.full((60, 64), 20.0)
+    square[15:40, 20:50] = 90.0
+    np.save(names["IMAGE"], square)
     arguments = [_named(word, names) for word in _words(rng)]
     out, err = io.StringIO(), io.StringIO()
     here = Path.cwd()
@@ -96,7 +103,7 @@ def command(rng: np.random.Generator, folder: Path, scene: Path, run: Path) -> s
 def _words(rng: np.random.Generator) -> list[str]:
     name = str(rng.choice(list(_COMMANDS)))
     usual, options = _COMMANDS[name]
-    words = [name, *usual] if name else []
+    words = [name.strip(), *usual] if name else []
     for _ in range(rng.integers(0, 4)):
         option = str(rng.choice(list(options)))
         good = options[option]

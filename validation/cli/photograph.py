@@ -1,0 +1,134 @@
+"""What ``ice measure PHOTO`` says: as JSON, and as text."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+
+from scenes import InvalidInput
+from validation.cli import recorded
+
+if TYPE_CHECKING:
+    import measure
+
+
+def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | None:
+    """So many numbers with commas between.
+
+    Raises
+    ------
+    InvalidInput
+        If they are not.
+    """
+    if text is None:
+        return None
+    try:
+        found = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise InvalidInput(f"{option} must be {count} numbers with commas between, px, got {text!r}")
+    return found
+
+
+def facts(found: measure.Shapes) -> dict[str, Any]:
+    """What was measured, and the shapes that were found; null for what is not known."""
+    return {
+        "found": [_facts(one) for one in found.found],
+        "candidates": [
+            {"kind": one.kind, "outline": one.outline.tolist(), **_standing_out(one)} for one in found.candidates
+        ],
+    }
+
+
+def _facts(one: measure.Found) -> dict[str, Any]:
+    told: dict[str, Any] = {"kind": one.kind, "status": one.status}
+    if one.candidate is not None and one.candidate.identifier is not None:
+        told |= {"id": one.candidate.identifier, "family": one.candidate.family}
+    if one.candidate is not None and one.candidate.grid is not None:
+        told["shape"] = [one.candidate.grid.shape[1], one.candidate.grid.shape[0]]
+    if one.kind in ("circle", "ellipse"):
+        shape = None if one.ellipse is None else one.ellipse.tolist()
+        told |= {"centre": shape and shape[:2], "axes": shape and shape[2:4], "angle": shape and shape[4]}
+    else:
+        told["corners"] = None if one.corners is None else [[_known(v) for v in row] for row in one.corners]
+        told["sides"] = _sides(one)
+    return told | {
+        "covariance": None if one.covariance is None else [[_known(v) for v in row] for row in one.covariance],
+        "quantities": [vars(quantity) | {"sigma": _known(quantity.sigma)} for quantity in one.quantities],
+        "residual_px": [side.rms for side in one.residuals],
+        "p_value": _known(one.p_value),
+        "noise": one.noise,
+        "blur_px": _known(one.blur_px),
+        **({} if one.quadrilateral is None else recorded.of_sides(one.quadrilateral)),
+        **({} if one.candidate is None else _standing_out(one.candidate)),
+    }
+
+
+def _sides(one: measure.Found) -> list[dict[str, Any]]:
+    sides = [quantity for quantity in one.quantities if quantity.name.startswith("side")]
+    rms: list[float | None] = [side.rms for side in one.residuals] or [None] * len(sides)
+    return [vars(side) | {"residual_px": each} for side, each in zip(sides, rms, strict=True)]
+
+
+def _standing_out(one: measure.Candidate) -> dict[str, float]:
+    return {"score": one.score, "support": one.support, "contrast": one.contrast}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def text(found: measure.Shapes) -> str:
+    """Each shape that was measured."""
+    return "\n".join([*(_text(number, one) for number, one in enumerate(found.found, 1)), "(1 sigma)"])
+
+
+def _text(number: int, one: measure.Found) -> str:
+    name = one.kind if one.kind != "tag" else f"tag {one.candidate.family} {one.candidate.identifier}"
+    seen = f"noise {one.noise:.2f} grey levels, blur {one.blur_px:.2f} px"
+    fit = f" (goodness of fit: p = {one.p_value:.2g})" if math.isfinite(one.p_value) else ""
+    if one.kind == "chessboard":
+        return f"{number}. {name}: {_board(one)}; {seen}{fit}"
+    lines = [f"{number}. {name}: {one.status}; {seen}{fit}"]
+    lines += [f"   {line}" for line in recorded.of_sides_lines(one.quadrilateral)] if one.quadrilateral else []
+    if one.corners is not None and one.covariance is not None:
+        sigma = np.sqrt(np.diag(one.covariance)).reshape(4, 2)
+        for i, ((x, y), (sx, sy)) in enumerate(zip(one.corners, sigma, strict=True), 1):
+            lines.append(f"   corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
+    lines += [f"   {q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in one.quantities]
+    return "\n".join(lines)
+
+
+def _board(one: measure.Found) -> str:
+    rows, columns = one.candidate.grid.shape[:2]
+    told = f"{one.status}, {columns} x {rows} inner corners"
+    if one.corners is None:
+        return told
+    sigma = np.sqrt(np.diag(one.covariance))
+    return f"{told}, {np.isfinite(sigma[::2]).sum()} measured to {np.nanmedian(sigma):.3f} px (median); --json has them"
+
+
+def table(found: measure.Shapes) -> Table:
+    """All shapes that were found, ranked."""
+    measured = {id(one.candidate): number for number, one in enumerate(found.found, 1)}
+    shown = Table(title="Found", title_justify="left", box=None, padding=(0, 1), title_style="bold",
+                  caption=_CAPTION, caption_justify="left")  # fmt: skip
+    for name in ("kind", "at px", "size px", "support", "contrast/noise", "score", "measured as"):
+        shown.add_column(name, justify="left" if name == "kind" else "right", no_wrap=True)
+    for one in found.candidates[:_ROWS]:
+        (x, y), (long, short) = one.centre, one.sizes
+        shown.add_row(
+            one.kind, f"{x:.0f}, {y:.0f}", f"{long:.0f} x {short:.0f}", f"{one.support:.0%}", f"{one.contrast:.1f}",
+            f"{one.score:.0f}", str(measured.get(id(one), "-")),
+        )  # fmt: skip
+    if len(found.candidates) > _ROWS:
+        shown.add_row(f"and {len(found.candidates) - _ROWS} more", *[""] * 6)
+    return shown
+
+
+_ROWS = 30
+_CAPTION = "Support: part of the outline (of the worst side) with an edge. Score: signal to noise ratio of the outline."
