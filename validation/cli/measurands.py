@@ -50,9 +50,9 @@ def table(rows: list[dict[str, Any]]) -> Table:
     for name in ("name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status"):
         shown.add_column(name, justify="left" if name in ("name", "kind", "unit") else "right", no_wrap=True)
     for row in rows:
-        digits = _digits(row["sigma"])
-        value = "-" if row["value"] is None else f"{row['value']:.{digits}f}"
-        sigma = "" if row["sigma"] is None else f"+- {row['sigma']:.{digits}f}"
+        places = digits(row["sigma"])
+        value = "-" if row["value"] is None else f"{row['value']:.{places}f}"
+        sigma = "" if row["sigma"] is None else f"+- {row['sigma']:.{places}f}"
         nominal, zone = f"{row['nominal']:.6g}", row["tolerance"]
         limits = "-" if zone is None else _limits(zone)
         about = row["name"], row["kind"], value, sigma, row["unit"]
@@ -63,7 +63,7 @@ def table(rows: list[dict[str, Any]]) -> Table:
 _CAPTION = "pass, fail: by more than the expanded uncertainty of 2 sigma within or beyond the tolerance (ISO 14253-1)."
 
 
-def _digits(sigma: float | None) -> int:
+def digits(sigma: float | None) -> int:
     """Decimal places that show two digits of a standard deviation."""
     return 4 if not sigma else int(np.clip(1 - math.floor(math.log10(sigma)), 0, 9))
 

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from scenes import InvalidInput
 from validation.cli import recorded
+from validation.cli.measurands import digits
 
 if TYPE_CHECKING:
     import measure
@@ -99,7 +100,9 @@ def _text(number: int, one: measure.Found) -> str:
         sigma = np.sqrt(np.diag(one.covariance)).reshape(4, 2)
         for i, ((x, y), (sx, sy)) in enumerate(zip(one.corners, sigma, strict=True), 1):
             lines.append(f"   corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
-    lines += [f"   {q.name:<19} {q.value:.3f} +- {q.sigma:.3f} {q.unit}" for q in one.quantities]
+    for q in one.quantities:
+        places = max(digits(q.sigma), 3) if math.isfinite(q.sigma) else 3
+        lines.append(f"   {q.name:<19} {q.value:.{places}f} +- {q.sigma:.{places}f} {q.unit}")
     return "\n".join(lines)
 
 
