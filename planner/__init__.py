@@ -9,7 +9,7 @@ from planner.features.projected_edges import projected_edges
 from planner.forecast import Forecast
 from planner.imaging.pictures import Pictures
 from planner.jitter import PoseSpread, pose_scatter, pose_spread
-from planner.maps import variance_map
+from planner.maps import Map, pose_map, variance_map
 from planner.planning import Candidate, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.search.aim import Aim
@@ -46,8 +46,8 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
-    "Forecast", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied", "View",
-    "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "edges_of", "exhaustive", "local_minima",
-    "plan", "plan_capability", "plan_views", "pose_scatter", "pose_spread", "predict", "projected_edges",
-    "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "Forecast", "Map", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
+    "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "edges_of", "exhaustive",
+    "local_minima", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "pose_spread", "predict",
+    "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

@@ -8,14 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.features.measurand import Measurands
-from planner.features.seen import unit_normals
 from planner.models.errors import Errors
-from scenes import Corner, Quantity, Scene, Tolerance
+from planner.ranks import WORST_FIRST, quantity_ranks
+from scenes import Quantity, Scene, Tolerance
 from scenes.results import finite, value
-
-_WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned", "clutter", "ok")
-_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 
 @dataclass(frozen=True)
@@ -96,17 +92,16 @@ def unit_of(scene: Scene, quantity: Quantity) -> str:
 def forecasts(
     scene: Scene,
     evaluated: Errors,
-    edge_status: dict[str, str],
+    clutter: np.ndarray,
     biases: tuple[np.ndarray, np.ndarray],
     textures: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Forecast, ...]:
-    """One for each quantity of one picture, from the errors, the edges' statuses, and biases in image and object.
+    """One for each quantity of one picture, from the errors, the cluttered edges (E,), and biases in image and object.
 
     ``textures`` are the variances (M,) over parts in image and object; None without textures.
     """
     known = evaluated.measurands
-    crowds = zip(known.circles, evaluated.crowded, strict=False)
-    edge_status = edge_status | {name: "clutter" for name, crowded in crowds if crowded}
+    ranks = quantity_ranks(evaluated, clutter)
     found = []
     for m, quantity in enumerate(known.quantities):
         nominal = known.value_object[m] if quantity.nominal is None else quantity.nominal
@@ -123,7 +118,7 @@ def forecasts(
                 bias_object=float(biases[1][m]),
                 nominal=float(nominal),
                 tolerance=quantity.tolerance,
-                status=_status(known, quantity, edge_status, evaluated.variances[m]),
+                status=WORST_FIRST[ranks[m]],
                 texture_variance_image=None if textures is None else float(textures[0][m]),
                 texture_variance_object=None if textures is None else float(textures[1][m]),
             )
@@ -131,23 +126,9 @@ def forecasts(
     return tuple(found)
 
 
-def _status(known: Measurands, quantity: Quantity, edge_status: dict[str, str], variance: float) -> str:
-    states = [edge_status[name] for name in quantity.edges if name in edge_status]
-    if set(states) & set(_WORST_FIRST[:3]):
-        return min(states, key=_WORST_FIRST.index)
-    directions = dict(zip(known.view.names, unit_normals(known.view.along), strict=True))
-    corners = [feature for feature in quantity.features if isinstance(feature, Corner)]
-    sines = [abs(np.linalg.det([directions[name] for name in corner.edges])) for corner in corners]
-    if min(sines, default=1.0) < _MIN_SINE:
-        states.append("ill_conditioned")
-    if not np.isfinite(variance) and "ill_conditioned" not in states:
-        states.append("not_visible")
-    return min(states, key=_WORST_FIRST.index, default="ok")
-
-
 def worst(forecasts: tuple[Forecast, ...]) -> str:
     """The most serious of several statuses."""
-    return min((each.status for each in forecasts), key=_WORST_FIRST.index)
+    return min((each.status for each in forecasts), key=WORST_FIRST.index)
 
 
 def mildest(states: Iterable[str]) -> str:
@@ -156,4 +137,4 @@ def mildest(states: Iterable[str]) -> str:
     >>> mildest(["not_visible", "clutter"])
     'clutter'
     """
-    return max(states, key=_WORST_FIRST.index)
+    return max(states, key=WORST_FIRST.index)

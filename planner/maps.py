@@ -2,19 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.models.bias import cluttered
 from planner.prediction import minimised
+from planner.ranks import WORST_FIRST, quantity_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Objective
 from planner.search.poses import as_array, by_light
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene, several
 
 _CHUNK = 4096  # directions at a time, which bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """One number and one status for each direction that the sensor or the light may have.
+
+    Attributes
+    ----------
+    space : ViewingSpace
+    variance : ndarray, shape (N,)
+        What is minimised (`variance_map`); infinite where something cannot be measured.
+    status : ndarray of str, shape (N,)
+        The worst of all quantities, as of `Prediction`: where the variance is infinite the reason; else ``ok`` or,
+        where bias was looked for, ``clutter``. From a glance: what a close look at one setting knows besides (rims
+        of circles, light between faces) is left out.
+    """
+
+    space: ViewingSpace
+    variance: np.ndarray
+    status: np.ndarray
 
 
 def variance_map(
@@ -55,6 +79,40 @@ def variance_map(
     >>> values.shape, int(np.isfinite(values).sum()) > 100
     ((425,), True)
     """
+    return _map(scene, sensor, light, space, model, objective, None).variance
+
+
+def pose_map(
+    scene: Scene,
+    sensor: Any = None,
+    light: Any = None,
+    *,
+    space: ViewingSpace | None = None,
+    model: ModelName = DEFAULT_MODEL,
+    objective: Objective = DEFAULT_OBJECTIVE,
+    biased: bool = True,
+) -> Map:
+    """`variance_map` with the status of each direction.
+
+    Without ``biased`` none is ``clutter``: the bias, which decides on it, takes most of the time (on one core 0.4 ms a
+    direction of a block, 40 ms of a plate with a hole).
+
+    Examples
+    --------
+    >>> import scenes
+    >>> found = pose_map(scenes.load("task1"), light=(15, 315), space=ViewingSpace(15, (0, 90)))
+    >>> sorted(set(found.status.tolist()))
+    ['clutter', 'not_visible', 'ok', 'short']
+    """
+    looked = cluttered if biased else _not_asked
+    return _map(scene, sensor, light, space, model, objective, looked)
+
+
+def _not_asked(_: Pictures) -> np.ndarray:
+    return np.array(False)
+
+
+def _map(scene, sensor, light, space, model, objective, clutter: Callable[[Pictures], np.ndarray] | None) -> Map:
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
@@ -65,9 +123,14 @@ def variance_map(
     else:
         fixed = by_light(as_array(scene.check_lights(several(light))))
     evaluate = variance_model(model)
-    values = np.empty(len(space))
+    values, ranks = np.empty(len(space)), np.full(len(space), WORST_FIRST.index("ok"))
     for at in range(0, len(space), _CHUNK):
         part = slice(at, at + _CHUNK)
         poses = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
-        values[part] = minimised(evaluate(Pictures.of(scene, *poses)), objective)
-    return values
+        pictures = Pictures.of(scene, *poses)
+        found = evaluate(pictures)
+        values[part] = minimised(found, objective)
+        if clutter:
+            known = clutter(pictures) if model != "bound" else np.array(False)
+            ranks[part] = quantity_ranks(found, known).min(-1)
+    return Map(space, values, np.array(WORST_FIRST)[ranks])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from planner.features.locator import MIN_CONTRAST, MIN_USABLE
 from planner.features.measurand import measurand, measurands, normals
 from planner.features.propagation import corner_covariance
 from planner.features.seen import plane_axes
@@ -18,6 +17,7 @@ from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
 from planner.models.texture import texture_errors
+from planner.ranks import WORST_FIRST, edge_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit
 from scenes.results import Shown
@@ -230,20 +230,11 @@ def predict(
             name,
             float(length),
             float(step),
-            _edge_status(noise, seen, whole, usable, step, crowded),
+            WORST_FIRST[rank],
             tuple(line.tolist()),
         )
-        for name, length, whole, usable, step, noise, seen, crowded, line in zip(
-            known.view.names,
-            known.view.lengths,
-            known.view.lengths - known.view.trims.sum(-1),
-            known.view.usable,
-            evaluated.contrast,
-            evaluated.noise_variance,
-            known.view.visible,
-            clutter,
-            off,
-            strict=True,
+        for name, length, step, rank, line in zip(
+            known.view.names, known.view.lengths, evaluated.contrast, edge_ranks(evaluated, clutter), off, strict=True
         )
     )
     textures = texture_errors(pictures)
@@ -252,7 +243,7 @@ def predict(
     told = forecasts(
         scene,
         evaluated,
-        {edge.name: edge.status for edge in edges},
+        clutter,
         biased,
         None if textures is None else textures.variances,
     )
@@ -319,13 +310,3 @@ def _corner_covariance(feature: Corner, view, solid, evaluated: Errors) -> np.nd
         offsets = evaluated.line_variance(np.ones(len(view.names)), np.where(last, view.lengths, 0.0))
     offsets = np.where(np.isfinite(offsets) & view.visible, offsets, np.inf)
     return corner_covariance(normals(view)[index], offsets[index])
-
-
-def _edge_status(noise: float, visible: bool, whole: float, usable: float, step: float, crowded: bool) -> str:
-    if not visible or not np.isfinite(usable) or usable < MIN_USABLE <= whole:
-        return "not_visible"
-    if usable < MIN_USABLE:  # first, for where nothing is left there is no contrast either
-        return "short"
-    if not step > MIN_CONTRAST * np.sqrt(noise):
-        return "low_contrast"
-    return "clutter" if crowded else "ok"

@@ -264,10 +264,7 @@ def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> l
         return []
     from validation.report import plan_figures  # matplotlib takes half a second to load
 
-    paths = plan_figures.draw(found, out) if out else []
-    if map_file:
-        paths.append(plan_figures.map_picture(found, map_file))
-    return paths
+    return plan_figures.draw(found, out, map_file) if out else [plan_figures.map_picture(found, map_file)]
 
 
 def _show(

@@ -1,0 +1,54 @@
+"""Whether edges and quantities can be measured and trusted, for one picture or many: statuses by their severity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.features.locator import MIN_CONTRAST, MIN_USABLE
+from planner.features.seen import unit_normals
+from planner.models.errors import Errors
+from scenes import Corner
+
+WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned", "clutter", "ok")
+_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = range(len(WORST_FIRST))
+_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
+
+
+def edge_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
+    """Status of each straight edge as its index in `WORST_FIRST`, int, shape (..., E).
+
+    Parameters
+    ----------
+    evaluated : Errors
+    clutter : ndarray of bool, shape (..., E)
+        What `planner.models.bias.cluttered` says; False where it is not asked.
+    """
+    view = evaluated.measurands.view
+    whole = view.lengths - view.trims.sum(-1)
+    with np.errstate(invalid="ignore"):
+        hidden = ~view.visible | ~np.isfinite(view.usable) | ((view.usable < MIN_USABLE) & (whole >= MIN_USABLE))
+        short = view.usable < MIN_USABLE  # before contrast: where nothing is left there is none either
+        weak = ~(evaluated.contrast > MIN_CONTRAST * np.sqrt(evaluated.noise_variance))
+    return np.select([hidden, short, weak, clutter], [_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _CLUTTER], _OK)
+
+
+def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
+    """Status of each quantity, from the edges and circles that it needs, the same way, shape (..., M)."""
+    known, edges = evaluated.measurands, edge_ranks(evaluated, clutter)
+    rims = [np.where(crowded, _CLUTTER, _OK) for crowded in evaluated.crowded[: len(known.circles)]]
+    rims += [np.array(_OK)] * (len(known.circles) - len(rims))
+    lead = evaluated.variances.shape[:-1]
+    single = np.stack([np.broadcast_to(each, lead) for each in (*np.moveaxis(edges, -1, 0), *rims)], -1)
+    normals = unit_normals(known.view.along)
+    ranks = []
+    for m, (quantity, needs) in enumerate(zip(known.quantities, known.depends(), strict=True)):
+        rank = np.where(needs, single, _OK).min(-1)
+        corners = [feature for feature in quantity.features if isinstance(feature, Corner)]
+        meeting = [normals[..., [known.view.names.index(name) for name in corner.edges], :] for corner in corners]
+        flat = np.zeros(rank.shape, bool)
+        for pair in meeting:
+            flat = flat | (np.abs(np.linalg.det(pair)) < _MIN_SINE)
+        lost = ~np.isfinite(evaluated.variances[..., m])
+        told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
+        ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
+    return np.stack(ranks, -1)
