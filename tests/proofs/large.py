@@ -59,7 +59,7 @@ def fabricate(settings: int, directory: Path) -> int:
     """A run file as of a finished run whose distances are as predicted, but for one image in a hundred settings."""
     campaign, rng = grid(settings), np.random.default_rng(1)
     names = [method.name for method in methods(campaign.scenes[0])]
-    store = RunFile(directory, _identity(campaign, _IMAGES, 1, "scalar_rgb", Rendering()), fresh=True)
+    store = RunFile(directory, _identity(campaign, _IMAGES, 1, "scalar_rgb", Rendering(), None), fresh=True)
     store.note("effects", {})
     every = range(len(campaign))
     predicted = {"paper": 0.1, "calibrated": _SIGMA_PX**2, "bound": _SIGMA_PX**2 / 2, "value_px": 60.0}

@@ -145,7 +145,7 @@ def test_command(tmp_path):
     corners = [f"{x},{y}" for x, y in _PLATE]
     said = ice(tmp_path / "plate.png", "--corners", *corners)
     assert said.returncode == 0
-    assert said.stdout.startswith("1. quadrilateral: ok")
+    assert "1. quadrilateral: ok" in said.stdout
     refused = ice(tmp_path / "plate.png", "--near", "1,2,3")
     assert refused.returncode == 2
     assert refused.stderr.strip().endswith("--near must be 2 numbers with commas between, px, got '1,2,3'")
