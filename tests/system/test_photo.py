@@ -48,7 +48,8 @@ def test_found_and_measured(corners, rng, contrast, background, blur):
 def test_quantities_and_their_errors(corners, rng):
     """Sides, diagonals and angles of 100 photographs: standard deviation as reported (standard error 7 %)."""
     clean = polygon_image(corners, SHAPE, 0.7, 100.0, 20.0)
-    runs = [measure.measure_quadrilateral(clean + 2 * rng.standard_normal(SHAPE), "gradient") for _ in range(100)]
+    shots = [clean + 2 * rng.standard_normal(SHAPE) for _ in range(100)]
+    runs = [measure.measure_quadrilateral(shot, "gradient", corners=corners) for shot in shots]
     values = np.array([[quantity.value for quantity in run.measurands] for run in runs])
     reported = np.array([[quantity.sigma for quantity in run.measurands] for run in runs]).mean(0)
     assert [quantity.unit for quantity in runs[0].measurands] == ["px"] * 6 + ["deg"] * 4
