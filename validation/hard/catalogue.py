@@ -8,5 +8,5 @@ from validation.hard.case import Case
 
 def catalogue() -> list[Case]:
     """All hard cases, in the order of the table."""
-    areas = (reflectance_cases, planner_cases, limb_cases, fit_cases, limb_cases, measure_cases, render_cases)
+    areas = (reflectance_cases, planner_cases, limb_cases, fit_cases, measure_cases, render_cases)
     return [case for area in areas for case in area.cases()]
