@@ -78,7 +78,7 @@ def test_crossing_against_rays(name, beyond):
 
 @pytest.mark.parametrize(("name", "rays"), [("sphere", 1_000_000), ("torus", 40_000)])
 def test_crossing_at_a_dim_limb(name, rays):
-    """A million rays for the sphere: where the limb itself is nearly dark the locator finds it 0.3 px and more inside."""
+    """A million rays for the sphere: a limb that is nearly dark itself is found 0.3 px and more inside."""
     exact, found = _line_crossing(SURFACES[name], POSES[1], 0.0, rays, 0.05)
     assert found == pytest.approx(exact, abs=1e-3)
     assert exact < -0.3
