@@ -3,12 +3,16 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement crowded clean
+.PHONY: validate test test-all fuzz mutants lint bench-measure bench-planner bench-cost reference proof agreement crowded clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
 
 test: lint
+	$(BIN)/pytest -n 2 --dist worksteal -m "not long"
+
+# Those of tests/long.txt as well (2 minutes more).
+test-all: lint
 	$(BIN)/pytest -n 2 --dist worksteal
 
 # How near estimators and ellipses come to the Cramer-Rao bound, on our images and on GalSim's, and how fast (15 minutes).

@@ -1,5 +1,7 @@
 """An image becomes edge points, lines, corners and a distance, each with its covariance and a status."""
 
+from measure.boards.camera import CameraCalibration, calibrate_camera
+from measure.boards.chessboard import Board, chessboard
 from measure.bounds import bound, image_bound
 from measure.estimators.registry import ESTIMATORS, best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
@@ -14,6 +16,8 @@ from measure.region import region_of_interest
 
 __all__ = [
     "ESTIMATORS",
+    "Board",
+    "CameraCalibration",
     "Ellipse",
     "Lens",
     "MeasuredValue",
@@ -24,6 +28,8 @@ __all__ = [
     "Quadrilateral",
     "best_estimator",
     "bound",
+    "calibrate_camera",
+    "chessboard",
     "distance", "distances",
     "find_ellipse",
     "fit_ellipse",

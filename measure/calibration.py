@@ -8,6 +8,7 @@ kappa^2 times the correlation length counts, and that product is what can be com
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -129,14 +130,21 @@ def _square(degrees: float, ratio: float, scene: Scene) -> tuple[np.ndarray, Lay
     optics = Optics(
         (_SIZE, _SIZE), scene.camera.blur_px, (_CONTRAST * ratio) ** 2, scene.locator.scale_px, scene.locator.window_px
     )
+    return _CONTRAST * _covered(corners.tobytes(), scene.camera.blur_px), polygon_layout(corners, optics)
+
+
+@lru_cache(maxsize=8)
+def _covered(square: bytes, blur: float) -> np.ndarray:
+    """Part of each pixel that a square of corners (4, 2) covers."""
+    corners = np.frombuffer(square).reshape(4, 2)
     y, x = np.mgrid[:_SIZE, :_SIZE]
     nodes = np.stack([x, y], -1)[..., None, :] + NODES
     covered = np.ones((_SIZE, _SIZE, len(NODES)))
     for start, stop in zip(corners, np.roll(corners, -1, 0), strict=True):
         along = (stop - start) / _SIDE
         inward = np.array([-along[1], along[0]])
-        covered = covered * half_plane((nodes - start) @ inward / max(scene.camera.blur_px, 0.3))
-    return _CONTRAST * (covered * NODE_WEIGHTS).sum(-1), polygon_layout(corners, optics)
+        covered = covered * half_plane((nodes - start) @ inward / max(blur, 0.3))
+    return (covered * NODE_WEIGHTS).sum(-1)
 
 
 def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] | None:

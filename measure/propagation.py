@@ -93,6 +93,7 @@ def propagate(
     light: Any = None,
     estimator: str = DEFAULT_ESTIMATOR,
     threshold: float | None = None,
+    photographed: bool = False,
 ) -> Propagated:
     """Propagate pixel noise through lines, circles and corners to all measurands.
 
@@ -106,6 +107,9 @@ def propagate(
         Noise-free image, grey levels, not yet cut off at the end of the sensor's scale.
     scene, sensor, light, estimator, threshold
         As for `measure.distance`.
+    photographed : bool
+        The image is the mean of photographs of a camera that stands about where the scene says: how far its value is
+        off the model's tells of the poses, and not of ``clutter``.
     """
     picture = Picture.of(scene, sensor, light)
     camera = picture.scene.camera
@@ -120,7 +124,7 @@ def propagate(
     errors = (noise * rows) @ rows.T
     image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
     textures = texture_errors(Pictures.of(picture)) if picture.lights else None
-    values = _values(found, image, plane, state, estimator, textures)
+    values = _values(found, image, plane, state, estimator in PREDICTED and not photographed, textures)
     return _of_first(found, rows, errors, values, clean.shape)
 
 
@@ -162,14 +166,14 @@ def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> n
 
 
 def _values(
-    found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], estimator: str, textures: TextureErrors | None
+    found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], is_told: bool, textures: TextureErrors | None
 ) -> PropagatedValues:
     measured = np.isin(state, status.MEASURED)
     value, value_image = (np.where(measured, part.value[0], np.nan) for part in (found.plane, found.image))
     bias, bias_image = value - found.known.value_object, value_image - found.known.value
     unexplained = bias_image if textures is None else bias_image - np.nan_to_num(textures.shifts[0])
     for m in range(len(state)):
-        if state[m] == status.OK and estimator in PREDICTED and abs(unexplained[m]) > MOST * np.sqrt(image[m, m]):
+        if state[m] == status.OK and is_told and abs(unexplained[m]) > MOST * np.sqrt(image[m, m]):
             state[m] = status.CLUTTER
     over_parts = (None, None) if textures is None else textures.variances[::-1]
     return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state), *over_parts)

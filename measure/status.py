@@ -9,9 +9,14 @@ NOT_VISIBLE = "not_visible"  # hidden, or outside the image
 ILL_CONDITIONED = "ill_conditioned"  # nearly parallel lines at a corner, or the image tells too little of what is near
 AMBIGUOUS = "ambiguous"  # another solution explains the image as well
 MISFIT = "misfit"  # the image is not what the model says within its noise: neither value nor variance can be trusted
+CORRELATED = "correlated"  # the noise of neighbouring pixels is not independent: the variance says so, not exactly
+COMPRESSED = "compressed"  # by JPEG or its like: what is lost is no noise, and the variance is too small
 
-MEASURED = (OK, CLUTTER, MISFIT)
-_WORST_FIRST = (NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, AMBIGUOUS, MISFIT, CLUTTER, OK)
+MEASURED = (OK, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+_WORST_FIRST = (
+    NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, AMBIGUOUS, COMPRESSED, CORRELATED, MISFIT, CLUTTER,
+    OK,
+)  # fmt: skip
 ALL = frozenset(_WORST_FIRST)
 
 

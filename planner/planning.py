@@ -12,32 +12,23 @@ from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.prediction import Prediction, minimised, predict
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
-from planner.search.alternating import Partial, Step, alternate
+from planner.search.alternating import Step
 from planner.search.candidates import Candidate, candidates, edges_of
 from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import Found, Report, exhaustive, has_bound
+from planner.search.exhaustive import Found, Report, has_bound
+from planner.search.option import Option, Result, held, with_task
 from planner.search.poses import as_array, as_poses
 from planner.search.refinement import refine
-from planner.search.sharing import (
-    Alone,
-    Shared,
-    applies,
-    by_turns,
-    search_shared,
-    shares_of,
-    shares_of_two,
-    with_shares,
-)
+from planner.search.shares import shares_of, with_shares
+from planner.search.sharing import Alone, applies
 from planner.search.trusted import trusted, untrusted
 from planner.search.varied import Varied
 from planner.search.varying import vary_choice
-from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Picture, Pose, Scene, Task, several
+from scenes import InvalidInput, Picture, Pose, Scene
 
 Search = Literal["exhaustive", "alternating"]
 Shares = Literal["best", "given"]
-COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
 
 
 @dataclass(frozen=True)
@@ -190,10 +181,10 @@ def plan(
     if vary:
         check_vary(scene, vary, hold)
     constraints = constraints or Constraints()
-    sensor, light = _fixed(scene, constraints, sensor, light)
+    sensor, light = held(scene, constraints, sensor, light)
     tasks = required_edges(scene) if edges == "best" else ()
     worlds = [with_task(scene, task) for task in tasks] or [scene]
-    options = [_Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
+    options = [Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
     found = [option.search(aim, search, start, report, shares == "best") for option in options]
     options = [option.with_lights(result.shared) for option, result in zip(options, found, strict=True)]
     best = min(range(len(found)), key=lambda k: found[k].variance)
@@ -210,114 +201,12 @@ def plan(
     return replace(made, varied=varied)
 
 
-def with_task(scene: Scene, task: Task) -> Scene:
-    """The scene with another task."""
-    return scene.model_copy(update={"task": task})
-
-
-def _keep(role: str, poses: np.ndarray, allowed: np.ndarray) -> None:
-    """See that a pose that is held fixed is one that the constraints allow."""
-    if not allowed.all():
-        raise InvalidInput(f"{role} must keep the constraints, got {Pose(*map(float, poses[0]))}")
-
-
-def _fixed(scene: Scene, constraints: Constraints, sensor: Any, light: Any) -> tuple[Any, Any]:
-    """The poses that are held fixed, once they keep the constraints on pairs; on one mount the one says the other."""
-    if constraints.same_mount:
-        sensor, light = (light if sensor is None else sensor), (sensor if light is None else light)
-    if sensor is not None and light is not None:
-        pose, lights = scene.check_pose("sensor", sensor), scene.check_lights(several(light))
-        if not constraints.pairs(scene, np.array(list(pose)), as_array(lights)):
-            raise InvalidInput(
-                f"sensor and light must keep the constraints on both (mount, separation, bodies, view), got {pose} and "
-                + " ".join(map(str, lights))
-            )
-    return sensor, light
-
-
 def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {value!r}")
 
 
-@dataclass(frozen=True)
-class _Result:
-    """What searching one set of required edges gave."""
-
-    sensor: np.ndarray
-    light: np.ndarray
-    variance: float
-    partial: Partial | None
-    found: Found | None
-    shared: Shared | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Option:
-    """One set of required edges and where its sensor and light may stand."""
-
-    scene: Scene
-    model: str
-    step_deg: float
-    constraints: Constraints
-    sensors: np.ndarray
-    lights: np.ndarray
-    free: bool
-
-    @classmethod
-    def of(cls, scene, model, step_deg, constraints, sensor, light) -> _Option:
-        fast = has_bound(scene, model)
-        step = (1.0 if fast else COARSE_STEP) if step_deg is None else step_deg
-        sensors = ViewingSpace(step, constraints.sensor_polar_deg).poses
-        lights = ViewingSpace(step, constraints.light_polar_deg).poses if scene.free else np.zeros((1, 0))
-        sensors = sensors[constraints.sensors(scene, sensors)]
-        lights = lights[constraints.lights(lights)] if scene.free else lights
-        if sensor is not None:
-            sensors = np.array([list(scene.check_pose("sensor", sensor))])
-            _keep("sensor", sensors, constraints.sensors(scene, sensors))
-        if light is not None:
-            lights = as_array(scene.check_lights(several(light)))[None]
-            _keep("light", lights.reshape(-1, 2), constraints.lights(lights.reshape(-1, 2)))
-        if not len(sensors) or not len(lights):
-            raise InvalidInput("constraints must leave a pose for sensor and light, got none")
-        return cls(scene, model, step, constraints, sensors, lights, sensor is None and light is None)
-
-    def search(self, aim: Aim, search: str, start: Any, report: Report | None, shares: bool) -> _Result:
-        if len(self.scene.lights) > 1 and self.free:
-            return self._search_lights(aim, report, shares)
-        partial = found = None
-        plain = self.free and len(self.scene.free) == 1 and not self.constraints.coupled
-        if plain:
-            spaces = (_Allowed(self.step_deg, poses) for poses in (self.sensors, self.lights))
-            begin, limits = np.array(list(Pose.of(start))), self.constraints
-            partial = alternate(self.scene, *spaces, begin, self.model, aim, constraints=limits)
-        if search == "exhaustive" or not plain:
-            found = exhaustive(self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report)
-        best = found or partial
-        return _Result(self.sensors[best.sensor], self.lights[best.light], best.variance, partial, found)
-
-    def _search_lights(self, aim: Aim, report: Report | None, shares: bool) -> _Result:
-        """Several lights at once, or one after the other where their contrasts do not tell of mixtures."""
-        how = self.scene, self.sensors, self.lights, self.model, aim, self.constraints, report or (lambda *_: None)
-        mixed = shares_of_two(self.scene) if shares and len(self.scene.lights) == 2 else (shares_of(self.scene),)
-        shared = (search_shared if applies(self.scene, self.model) else by_turns)(*how, mixed)
-        found = shared.found
-        return _Result(self.sensors[found.sensor], shared.lights[found.light], found.variance, None, found, shared)
-
-    def with_lights(self, shared: Shared | None) -> _Option:
-        """With the lights that a search of several found for each sensor."""
-        return self if shared is None else replace(self, scene=shared.scene, lights=shared.lights)
-
-
-class _Allowed(ViewingSpace):
-    """A viewing space of the allowed poses only."""
-
-    def __init__(self, step_deg: float, poses: np.ndarray) -> None:
-        super().__init__(step_deg)
-        self.__dict__["poses"] = poses
-
-
-def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim, refined: bool) -> Plan:
+def _finish(options: list[Option], results: list[Result], best: int, aim: Aim, refined: bool) -> Plan:
     option, result = options[best], results[best]
     scene, found, partial = option.scene, result.found, result.partial
     sensor, light, variance = result.sensor, result.light, result.variance
@@ -371,7 +260,7 @@ def _finish(options: list[_Option], results: list[_Result], best: int, aim: Aim,
     )  # fmt: skip
 
 
-def _alone(option: _Option, result: _Result, aim: Aim, refined: bool) -> Alone | None:
+def _alone(option: Option, result: Result, aim: Aim, refined: bool) -> Alone | None:
     """The best setting where one of several lights has all; None where that is not known."""
     best = result.shared and result.shared.alone
     if best is None or not refined:
@@ -388,7 +277,7 @@ def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, ai
     return float(minimised(variance_model(model)(Pictures.of(picture)), aim))
 
 
-def _guarantee(option: _Option, found: Found | None) -> str:
+def _guarantee(option: Option, found: Found | None) -> str:
     if option.lights.shape[1] > 2 or len(option.scene.lights) > 1:
         return _of_lights(option, found)
     if found is None:
@@ -397,7 +286,7 @@ def _guarantee(option: _Option, found: Found | None) -> str:
     return f"no pair of the {grid} is better; between its directions a better one may lie"
 
 
-def _of_lights(option: _Option, found: Found | None) -> str:
+def _of_lights(option: Option, found: Found | None) -> str:
     """What is known where there are several lights."""
     if not applies(option.scene, option.model) or found is None:
         return "none: a partial optimum, no other place of the sensor or of one of the lights is better"

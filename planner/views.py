@@ -10,12 +10,12 @@ import numpy as np
 
 from planner.combining import combine
 from planner.models import DEFAULT_MODEL, ModelName
-from planner.planning import COARSE_STEP, _fixed, _Option
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.beside import descend
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Report, has_bound
 from planner.search.looked import Pool, glanced
+from planner.search.option import COARSE_STEP, Option, held
 from planner.search.subsets import (
     MOST_SETS,
     Information,
@@ -92,10 +92,10 @@ def plan_views(
     if len(scene.lights) != 1 or not scene.free:
         raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
     constraints, report = constraints or Constraints(), report or (lambda *_: None)
-    sensor, light = _fixed(scene, constraints, sensor, light)
+    sensor, light = held(scene, constraints, sensor, light)
     fast = has_bound(scene, model) and share is None
     step = (_FINE_STEP if fast else COARSE_STEP) if step_deg is None else step_deg
-    option = _Option.of(scene, model, step, constraints, sensor, light)
+    option = Option.of(scene, model, step, constraints, sensor, light)
     pairs = len(option.sensors) * len(option.lights)
     if pairs * len(scene.quantities) > _MOST_NUMBERS:
         most = f"{_MOST_NUMBERS:.0e} pairs times measurands"
@@ -128,7 +128,7 @@ def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share:
     return aim
 
 
-def _pool(option: _Option, aim: Aim, told: np.ndarray, share: str | None, count: int) -> tuple[Pool, np.ndarray | None]:
+def _pool(option: Option, aim: Aim, told: np.ndarray, share: str | None, count: int) -> tuple[Pool, np.ndarray | None]:
     """The settings to choose from, and which of them share a place."""
     rows = worthwhile(told, aim) if share is None else shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])

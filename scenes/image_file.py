@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import sys
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,18 +12,36 @@ from tokenize import TokenError
 
 import cv2
 import numpy as np
-from PIL import Image
 
 from scenes.camera import MOST_PIXELS as _MOST_PIXELS
 from scenes.errors import InvalidInput
 from scenes.files import Unreadable, opened, read_bytes
+from scenes.image_header import Header, header, turned
 
 _MOST_BYTES = 8 * _MOST_PIXELS + 10_000  # the largest image as float64, with a header
-_TIFF = (b"II*\0", b"MM\0*")
 
 
 def read(path: Path) -> np.ndarray:
-    """Grey levels of an image file, float64, shape (height, width); colour becomes grey.
+    """Grey levels of an image file as they are written, float64, shape (height, width); colour becomes grey.
+
+    Turned as the file says that it is to be seen.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be read as an image.
+    """
+    image, _ = decoded(path)
+    if image.ndim == 3:
+        image = _grey(path, image)
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        return image.astype(float)
+
+
+def decoded(path: Path) -> tuple[np.ndarray, Header]:
+    """The numbers in an image file, (height, width) or (height, width, channels), and what else it says.
+
+    Channels are blue, green, red, as OpenCV has them.
 
     Raises
     ------
@@ -33,7 +49,7 @@ def read(path: Path) -> np.ndarray:
         If the file cannot be read as an image.
     """
     try:
-        image = _array(path) if path.suffix.lower() == ".npy" else _decoded(path)
+        image, told = (_array(path), Header(())) if path.suffix.lower() == ".npy" else _decoded(path)
     except Unreadable as error:
         raise InvalidInput(f"{path} must be a readable image, got: {error.reason}") from None
     except InvalidInput:
@@ -43,10 +59,7 @@ def read(path: Path) -> np.ndarray:
         raise InvalidInput(f"{path} must be a readable image, got: {reason}") from None
     if image is None or image.ndim not in (2, 3) or image.dtype.kind not in "uif" or not image.size:
         raise InvalidInput(f"{path} must be a readable image, got something else")
-    if image.ndim == 3:
-        image = _grey(path, image)
-    with np.errstate(invalid="ignore"):  # signalling NaNs
-        return image.astype(float)
+    return turned(image, told.orientation), told
 
 
 def _array(path: Path) -> np.ndarray:
@@ -62,11 +75,12 @@ def _array(path: Path) -> np.ndarray:
         return flat.reshape(shape, order="F" if by_columns else "C")
 
 
-def _decoded(path: Path) -> np.ndarray | None:
+def _decoded(path: Path) -> tuple[np.ndarray | None, Header]:
     data = read_bytes(path, _MOST_BYTES)
-    _check_size(path, _told_size(data))
+    told = header(data)
+    _check_size(path, told.size)
     with _silent():
-        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        return (cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None), told
 
 
 def _grey(path: Path, image: np.ndarray) -> np.ndarray:
@@ -91,24 +105,6 @@ def _silent() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
-
-
-def _told_size(data: bytes) -> tuple[int, ...]:
-    """Size of an image by its header alone; () for a kind of TIFF that only the decoder knows.
-
-    Where the header is broken nothing is decoded: the decoder would believe it, and take gigabytes.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            with Image.open(io.BytesIO(data)) as header:
-                return header.size
-    except Image.DecompressionBombError:
-        return (_MOST_PIXELS + 1,)
-    except Exception:  # every format raises its own
-        if data[:4] in _TIFF:
-            return ()
-        raise ValueError("no header of an image") from None
 
 
 def _check_size(path: Path, shape: tuple[int, ...]) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from scenes.model import Model
+from scenes.numbers import ROOTS
 from scenes.scene import Scene
 
 _INTRODUCTION = """# The scene format
@@ -32,7 +33,44 @@ _FOLLOWING = ("width", "height", "focal_px", "distance")  # of a camera whose da
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema of a scene's file."""
+    """JSON schema of a scene's file; numbers that may be uncertain may be a table that says how much."""
+    found = _documented()
+    models = found["$defs"]
+    models["UncertainValue"] = {**models["Uncertain"], "required": ["value"], "title": "UncertainValue"}
+    for model in _below([found["properties"][root] for root in ROOTS], models):
+        model["properties"] = {key: _or_uncertain(facts) for key, facts in model["properties"].items()}
+    return found
+
+
+def _below(parts: list[dict[str, Any]], models: dict[str, Any]) -> list[dict[str, Any]]:
+    """The models that a part of a schema names, and those that these name, each once."""
+    names: list[str] = []
+    while parts:
+        new = re.findall(r"#/\$defs/(\w+)", json.dumps(parts))
+        new = [name for name in dict.fromkeys(new) if name not in names]
+        names += new
+        parts = [models[name] for name in new]
+    return [models[name] for name in names if "properties" in models[name]]
+
+
+def _or_uncertain(facts: dict[str, Any]) -> dict[str, Any]:
+    """A number, or the numbers of a list, or such a table in its place."""
+    table = {"$ref": "#/$defs/UncertainValue"}
+    if facts.get("type") == "number":
+        outside = {key: facts[key] for key in ("title", "description", "default") if key in facts}
+        return {**outside, "anyOf": [{key: value for key, value in facts.items() if key not in outside}, table]}
+    if "anyOf" in facts:
+        parts = [_or_uncertain(part) if part.get("type") == "array" else part for part in facts["anyOf"]]
+        return {**facts, "anyOf": [*parts, table] if any(part.get("type") == "number" for part in parts) else parts}
+    if isinstance(facts.get("items"), dict):
+        return {**facts, "items": _or_uncertain(facts["items"])}
+    if "prefixItems" in facts:
+        return {**facts, "prefixItems": [_or_uncertain(item) for item in facts["prefixItems"]]}
+    return facts
+
+
+def _documented() -> dict[str, Any]:
+    """The schema as the page tells it: every number plain."""
     found = Scene.model_json_schema()
     found["title"] = "Scene"
     found["required"] = [key for key in found["required"] if key != "name"]
@@ -52,7 +90,7 @@ def _plain(model: dict[str, Any]) -> None:
 
 def page() -> str:
     """The reference page, Markdown."""
-    whole = schema()
+    whole = _documented()
     parts = [_INTRODUCTION, _section("", Scene, whole, whole)]
     for name, model in sorted(_models().items()):
         if name in whole["$defs"]:

@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: each of the tests' processes has one core
 
@@ -6,6 +7,22 @@ import numpy as np
 import pytest
 
 import scenes
+
+_LONG = [
+    line.split(maxsplit=1)[1]
+    for line in Path(__file__).with_name("long.txt").read_text().splitlines()
+    if line[0] != "#"
+]
+
+
+def pytest_collection_modifyitems(config, items):
+    """Mark what `long.txt` names; a name in it that is no test is an error where all tests are collected."""
+    there = {item.nodeid: item for item in items}
+    for name in _LONG:
+        if name in there:
+            there[name].add_marker("long")
+        elif config.args == config.getini("testpaths"):
+            raise pytest.UsageError(f"tests/long.txt must name tests, got {name!r}")
 
 
 @pytest.fixture(scope="session")

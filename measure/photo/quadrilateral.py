@@ -12,7 +12,7 @@ from measure.estimators.registry import SYNONYMS
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
-from measure.find.quadrilateral import find_quadrilateral
+from measure.find.search import find_quadrilateral
 from measure.photo.lens import Lens, straight_corners
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma, refined

@@ -1,9 +1,10 @@
-"""``python -m tests.proofs`` with conditions, crowded, kill, large, lights, parts, rate, stations or uneven."""
+"""``python -m tests.proofs`` with boards, conditions, crowded, kill, large, lights, parts, rate, stations or uneven."""
 
 from __future__ import annotations
 
 import typer
 
+from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
 from tests.proofs.kill import kill
@@ -15,6 +16,7 @@ from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command()(boards)
 app.command()(conditions)
 app.command()(crowded)
 app.command()(kill)

@@ -109,11 +109,11 @@ def test_workers_that_keep_dying_stop_the_run(small, tmp_path, monkeypatch):
 
 @pytest.fixture
 def cluster():
-    """Three worker processes, on the loopback interface only."""
+    """Two worker processes, on the loopback interface only."""
     from distributed import LocalCluster
 
     with LocalCluster(
-        n_workers=3, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
     ) as made:
         yield made
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import measure
-from measure.find.quadrilateral import find_quadrilateral
+from measure.find.search import find_quadrilateral
 from measure.photo.lens import Lens
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma

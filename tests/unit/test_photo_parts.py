@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from measure.find.quadrilateral import find_quadrilateral
+from measure.find.search import find_quadrilateral
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput

@@ -29,6 +29,17 @@ def test_every_key_has_a_meaning():
             assert known, (name, key)
 
 
+def test_the_schema_knows_uncertain_numbers():
+    """A table in the place of a number, also in a lens, a position or one of several kinds of light; nowhere else."""
+    models = reference.schema()["$defs"]
+    table = {"$ref": "#/$defs/UncertainValue"}
+    for model, key in (("Camera", "focal_px"), ("Lens", "distortion"), ("Ring", "inner_radius"), ("Noise", "gain")):
+        assert table in models[model]["properties"][key]["anyOf"], (model, key)
+    assert table in models["Camera"]["properties"]["look_at"]["prefixItems"][0]["anyOf"]
+    assert models["UncertainValue"]["required"] == ["value"]
+    assert "UncertainValue" not in json.dumps([models["Block"], models["Locator"], models["Task"]])
+
+
 def unknown(document, schema, whole, path=""):
     """Keys of a document that the schema does not know, and required ones that the document lacks."""
     if "$ref" in schema:

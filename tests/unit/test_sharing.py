@@ -9,7 +9,8 @@ import planner
 import scenes
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.sharing import search_shared, shares_of, shares_of_two, with_shares
+from planner.search.shares import shares_of, shares_of_two, with_shares
+from planner.search.sharing import search_shared
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput
 

@@ -28,6 +28,15 @@ def _length(value: float) -> float:
 _Length = Annotated[float, AfterValidator(_length)]
 
 
+class _Photos(BaseModel):
+    """Which photographs, and whether the mean error is judged."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    files: str
+    exact_poses: bool
+
+
 class _Identity(BaseModel):
     """What the numbers depend on."""
 
@@ -43,6 +52,7 @@ class _Identity(BaseModel):
     tolerance: dict[str, float]
     versions: dict[str, str]
     code: str
+    photos: _Photos | None = None
 
 
 class _PredictedMeasurand(BaseModel):

@@ -22,9 +22,10 @@ from render import Quality, Tolerance
 from render import variant as variants
 from render.phenomena import named
 from scenes import InvalidInput, Scene
-from validation.batch import cluster, work
+from validation.batch import cluster, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign, Case
+from validation.batch.photographs import Photographs
 from validation.batch.pool import Crew
 from validation.batch.result import Validation, collect
 from validation.batch.stages import Stages
@@ -35,6 +36,7 @@ from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
 _PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
+_PHOTOGRAPHS = "photographs"  # in the place of the renderer's variant
 _MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
 _IMAGES = 64  # settings whose image is kept for the report
 _BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
@@ -57,6 +59,7 @@ def run(
     more: More | None = None,
     effects: str = "auto",
     tolerance: Tolerance = Tolerance(),
+    photos: Photographs | None = None,
 ) -> Validation:
     """Validate all settings of a scene or a campaign.
 
@@ -89,6 +92,9 @@ def run(
         "auto", "all" or names with commas between: what is simulated (`render.image`).
     tolerance : Tolerance
         What ``auto`` may leave out.
+    photos : Photographs, optional
+        Measured instead of renders (`validation.batch.photographs.load`), with the settings that they are of; then
+        ``scene`` and ``renders`` say nothing.
 
     Raises
     ------
@@ -102,15 +108,20 @@ def run(
     if dask:
         cluster.check_address(dask)
     started = time.perf_counter()
-    campaign, variant = Campaign.of(scene), variants.choose()
+    campaign = photos.campaign if photos else Campaign.of(scene)
+    variant = _PHOTOGRAPHS if photos else variants.choose()
+    renders = max(photos.counts) if photos else renders
     count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)
-    store = RunFile(Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how), fresh)
+    store = RunFile(
+        Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how, photos), fresh
+    )
     try:
         store.note(
             "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
         )
-        store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
-        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more)
+        if photos is None:
+            store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
+        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more, photos)
         log.info(
             "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
         )
@@ -142,7 +153,9 @@ def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
 
 
-def _identity(campaign: Campaign, renders: int, seed: int, variant: str, how: Rendering) -> dict:
+def _identity(
+    campaign: Campaign, renders: int, seed: int, variant: str, how: Rendering, photos: Photographs | None
+) -> dict:
     """All that the numbers depend on; a directory that holds other ones is refused."""
     return {
         "campaign": campaign.model_dump(mode="json"),
@@ -153,13 +166,16 @@ def _identity(campaign: Campaign, renders: int, seed: int, variant: str, how: Re
         **asdict(how),
         "versions": {name: version(name) for name in _PACKAGES},
         "code": _code(),
+        **({"photos": photos.identity()} if photos else {}),
     }
 
 
 def _code() -> str:
     """Digest of the code that makes the numbers."""
     folders = [Path(package.__file__).parent for package in (scenes, planner, render, measure)]
-    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [Path(work.__file__)]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
+        Path(module.__file__) for module in (work, photographs)
+    ]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 
@@ -181,9 +197,11 @@ class _Batch:
     progress: Progress
     how: Rendering = Rendering()
     more: More | None = None
+    photos: Photographs | None = None
 
     def __post_init__(self) -> None:
-        self.stages = Stages([[self.renders] * len(self.campaign), *self.store.fact("stages", [])])
+        wanted = self.photos.counts if self.photos else [self.renders] * len(self.campaign)
+        self.stages = Stages([wanted, *self.store.fact("stages", [])])
         self.done = self.store.images()
 
     @property
@@ -270,6 +288,8 @@ class _Batch:
     def _settings(self) -> Iterator[_Setting]:
         """The settings that have work left, one at a time."""
         for index in range(len(self.campaign)):
+            if self.photos and index in self.photos.troubles and not self.store.trouble(index):
+                self._commit(index, Found(None, {}, self.photos.troubles[index]))
             done = self.store.chunks(index)
             left = deque((chunk, size) for chunk, size in self.stages.sizes(index).items() if chunk not in done)
             if not left or self.store.trouble(index):
@@ -279,7 +299,8 @@ class _Batch:
             except InvalidInput as error:
                 self._commit(index, Found(None, {}, str(error)))
                 continue
-            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.packed(index))
+            files = self.photos.files[index] if self.photos else ()
+            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.packed(index), files)
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
@@ -296,8 +317,9 @@ class _Setting:
     variant: str
     how: Rendering
     image: Packed | None
+    photos: tuple[str, ...] = ()
 
     def task(self, group: int) -> Task:
         """The next task."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
-        return Task(self.case, chunks, self.seed, self.variant, self.image, self.how)
+        return Task(self.case, chunks, self.seed, self.variant, self.image, self.how, self.photos)

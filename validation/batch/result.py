@@ -62,6 +62,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     """
     identity = store.identity()
     rows, refused = Rows(campaign), {}
+    truth = (identity.get("photos") or {}).get("exact_poses", True)
     for i in range(len(campaign)):
         model = store.predicted(i)
         if model:
@@ -86,8 +87,8 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         refused=refused,
         search=_search(campaign, scale),
         correlation=_correlations(campaign, rows),
-        verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values())),
-        classic_verdicts={name: _judge(rows.judged(name)) for name in rows.others},
+        verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values()), truth),
+        classic_verdicts={name: _judge(rows.judged(name), truth=truth) for name in rows.others},
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
     )
 
@@ -110,18 +111,21 @@ def _free_scale(campaign: Campaign, rows: Rows) -> float | None:
     return float(np.median(ratios)) if ratios else None
 
 
-def _verdict(rows: Rows, refused: int) -> Verdict:
+def _verdict(rows: Rows, refused: int, truth: bool) -> Verdict:
     """About every measurand of every setting; where there is one a setting, about its value in the image."""
     measured = rows.measured
     if measured.are_single:
-        return _judge(rows.judged(), refused)
+        return _judge(rows.judged(), refused, truth)
     names = ("ratio", "n", "failed", "bias", "predicted_bias", "ok", "independent")
     found = {name: measured.column(name) for name in names}
-    return _judge({**found, "propagated": measured.column("predicted")}, refused)
+    return _judge({**found, "propagated": measured.column("predicted")}, refused, truth)
 
 
-def _judge(found: dict[str, np.ndarray], refused: int = 0) -> Verdict:
-    """Of one method; a setting that could not be worked on counts as one that was not measured."""
+def _judge(found: dict[str, np.ndarray], refused: int = 0, truth: bool = True) -> Verdict:
+    """Of one method; a setting that could not be worked on counts as one that was not measured.
+
+    Without ``truth`` nothing is said of mean errors: of photographs nobody knows where exactly they were taken.
+    """
 
     def column(name: str, nothing: float) -> np.ndarray:
         return np.concatenate([found[name].astype(float), np.full(refused, nothing)])
@@ -130,7 +134,7 @@ def _judge(found: dict[str, np.ndarray], refused: int = 0) -> Verdict:
         column("ratio", np.nan),
         column("n", 0) - column("failed", 0),
         lost=column("failed", 0),
-        bias_px=column("bias", np.nan),
+        bias_px=column("bias", np.nan) if truth else None,
         predicted_bias_px=column("predicted_bias", 0.0),
         sigma_px=np.sqrt(column("propagated", np.inf)),
         ok=column("ok", 0) > 0,

@@ -22,7 +22,7 @@ from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
 from scenes.camera import MOST_PIXELS
-from validation.batch import measurands
+from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
 
 CHUNK = 250  # images; a run's random numbers depend on it
@@ -124,7 +124,10 @@ class Rendering:
 
 @dataclass(frozen=True)
 class Task:
-    """Chunks of one setting, (number, images) each; without an image the worker renders it."""
+    """Chunks of one setting, (number, images) each; without an image the worker renders it.
+
+    With ``photos``, all files of the setting, nothing is rendered: they are measured, and the image is their mean.
+    """
 
     case: Case
     chunks: tuple[tuple[int, int], ...]
@@ -132,6 +135,7 @@ class Task:
     variant: str
     image: Packed | None = None
     rendering: Rendering = Rendering()
+    photos: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -158,22 +162,27 @@ def _libraries() -> ThreadpoolController:
 
 
 def _perform(task: Task) -> Found:
-    with _RENDERER:
-        variants.use(task.variant)  # what the machine cannot do is not the setting's fault
+    if not task.photos:
+        with _RENDERER:
+            variants.use(task.variant)  # what the machine cannot do is not the setting's fault
     try:
         clean = None
         if task.image is None:
+            mean = photographs.mean(task.case.scene, task.photos) if task.photos else None
             with _RENDERER:
-                clean = render_setting(task.case, task.variant, task.rendering)
+                clean = render_setting(task.case, task.variant, task.rendering, mean)
         image = (task.image or clean.image).array()
-        shots = _shots(task)
-        return Found(clean, {k: measure_chunk(task.case, image, task.seed, k, n, shots) for k, n in task.chunks})
+        return Found(
+            clean, {k: measure_chunk(task.case, image, task.seed, k, n, _shots(task, k)) for k, n in task.chunks}
+        )
     except InvalidInput as error:
         return Found(None, {}, str(error))
 
 
-def _shots(task: Task) -> Shots | None:
-    """Takes pictures from poses that are set anew each time; None where that does not matter."""
+def _shots(task: Task, chunk: int) -> Shots | None:
+    """Takes a chunk's photographs, or pictures from poses set anew each time; None where that does not matter."""
+    if task.photos:
+        return photographs.exposures(task.case.scene, task.photos[chunk * CHUNK :])
     scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
     if _jitter(task.case, how) == Jitter():
         return None
@@ -193,8 +202,8 @@ def _jitter(case: Case, how: Rendering) -> Jitter:
     return render.choose(scene, how.effects, how.tolerance, case.picture).scene.jitter
 
 
-def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Clean:
-    """Render a setting, and predict with and without its image."""
+def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image: np.ndarray | None = None) -> Clean:
+    """Render a setting, unless its image is given, and predict with and without it."""
     clock = _Clock()
     scene, picture = case.scene, case.picture
     predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
@@ -203,13 +212,18 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering()) -> Cl
     numbers |= measurands.texture(predicted["calibrated"].measurands[0].texture_variance_image)
     numbers["measurands"] = measurands.predicted(predicted)
     clock.lap("predict")
-    image = render.image(picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance)
-    clock.lap("render")
+    photographed = image is not None
+    if not photographed:
+        image = render.image(
+            picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance
+        )
+        clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
     spread = planner.pose_scatter(shaken, np.array([list(picture.sensor)]))
     propagated = {}
     for i, method in enumerate(methods(scene)):
-        found = measure.propagate(image, picture, estimator=method.locator, threshold=method.threshold)
+        how_found = {"estimator": method.locator, "threshold": method.threshold, "photographed": photographed}
+        found = measure.propagate(image, picture, **how_found)
         propagated[method.name] = found.variance_px2 + float(spread.covariance[0, 0, 0]), found.value_px, found.status
         if i == 0:
             in_object = np.diag(spread.covariance_object[0])

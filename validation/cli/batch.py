@@ -32,11 +32,13 @@ from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
+    from validation.batch import photographs
     from validation.batch.result import Validation
     from validation.cost.goal import Reached
 
 commands = commands()
 _MOST_RENDERS = 10_000_000
+_MOST_TOLD = 20  # photographs that are left out
 
 Target = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")]
 Renders = Annotated[int, typer.Option(help="Noisy images a setting.")]
@@ -51,6 +53,13 @@ Accuracy = Annotated[
     typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
 ]
 Budget = Annotated[str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")]
+Photos = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Measure these photographs instead of renders: a sub-folder a setting."),
+]
+ExactPoses = Annotated[
+    bool, typer.Option("--exact-poses", help="With --photos: poses are exactly those said, so judge mean errors, too.")
+]
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
 
@@ -68,10 +77,15 @@ def validate_command(
     effects: Effects = "auto",
     bias_px: LeaveOutPx = None,
     variance: LeaveOutVariance = None,
+    photos: Photos = None,
+    exact_poses: ExactPoses = False,
     log_json: LogJson = False,
     as_json: Json = False,
 ) -> None:
     """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
+
+    With --photos nothing is rendered: repeated photographs are measured instead. Sub-folders of DIR are named as
+    sensor_30_90_light_15_270, or DIR holds photos.toml: [[settings]] with sensor, light and files.
 
     Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements
     contradict the predictions.
@@ -87,6 +101,8 @@ def validate_command(
     from validation.cost.goal import reach
 
     limit = _goal(accuracy, budget)
+    taken = _photographs(loaded, photos, exact_poses, accuracy is not None or limit is not None)
+    loaded = taken.campaign if taken else loaded
     how = {
         "seed": seed, "out": out, "workers": workers, "fresh": fresh, "dask": dask, "effects": effects,
         "tolerance": tolerance(bias_px, variance),
@@ -94,21 +110,49 @@ def validate_command(
     with continued(log_json):
         with nullcontext() if log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
             if accuracy is None and limit is None:
-                found, goal = run(loaded, renders, progress=shown, **how), None
+                found, goal = run(loaded, renders, progress=shown, photos=taken, **how), None
             else:
                 how |= {"say": lambda line: print(line, file=sys.stderr), "progress": shown, "started": started}
                 found, goal = reach(loaded, accuracy, limit, **how)
         _write(loaded, found, how["out"])
-    _show(found, goal and replace(goal, seconds=time.perf_counter() - started), how["out"], as_json)
+    _show(found, goal and replace(goal, seconds=time.perf_counter() - started), how["out"], as_json, taken)
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
-def _show(found: Validation, goal: Reached | None, directory: Path, as_json: bool) -> None:
+def _photographs(
+    loaded: campaign.Campaign, folder: Path | None, exact_poses: bool, goal: bool
+) -> photographs.Photographs | None:
+    """The photographs of a folder, if one is given; those left out are told of."""
+    if folder is None:
+        if exact_poses:
+            raise InvalidInput("--exact-poses must be given with --photos, got it alone")
+        return None
+    if goal:
+        raise InvalidInput("--photos must be given without --accuracy and --budget, got both")
+    from validation.batch import photographs
+
+    with progress(f"{loaded.name}: reading", unit="photographs") as shown:
+        taken = photographs.load(loaded, folder, exact_poses, shown)
+    for reason in taken.left_out[:_MOST_TOLD]:
+        print(f"left out: {reason}", file=sys.stderr)
+    if len(taken.left_out) > _MOST_TOLD:
+        print(f"left out: {len(taken.left_out) - _MOST_TOLD} more photographs", file=sys.stderr)
+    return taken
+
+
+def _show(
+    found: Validation,
+    goal: Reached | None,
+    directory: Path,
+    as_json: bool,
+    taken: photographs.Photographs | None = None,
+) -> None:
     """The whole result, as JSON or as tables."""
     if as_json:
         from validation.batch.document import pieces
 
-        sys.stdout.writelines(pieces(found, {"goal": goal.to_json()} if goal else None))
+        more = ({"goal": goal.to_json()} if goal else {}) | ({"left_out": list(taken.left_out)} if taken else {})
+        sys.stdout.writelines(pieces(found, more))
         print()
         return
     from validation.report.table import report

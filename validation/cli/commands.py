@@ -18,6 +18,7 @@ COMMANDS = {
     "scenes": ("scene", "List the bundled scenes."),
     "effects": ("effects", "Which effects a scene calls for, why, their influence and cost."),
     "calibrate": ("calibrate", "Measure the position noise of every locator."),
+    "calibrate-camera": ("calibrate_camera", "Calibrate a camera from photographs of a chessboard."),
     "budget": ("budget", "The uncertainty of every measurand: all sources, shares, and U = k u."),
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
     "hard": ("hard", "Answers beside references where numbers lose their digits."),

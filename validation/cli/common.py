@@ -72,6 +72,22 @@ def check_number(option: str, value: float | None, least: float, most: float) ->
         raise InvalidInput(f"{option} must be at most {most}, got {value}")
 
 
+def check_left_out(context: typer.Context, where: str, *options: str) -> None:
+    """See that options that have no use with another are not given to the command that runs.
+
+    Raises
+    ------
+    InvalidInput
+        If one is.
+    """
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name).name == "COMMANDLINE"
+        if given and parameter.opts[0] in options:
+            value = context.params[parameter.name]
+            told = " ".join(value) if isinstance(value, list) else value
+            raise InvalidInput(f"{parameter.opts[0]} must be left out with {where}, got {told}")
+
+
 def check_seed(seed: int | None, option: str = "seed") -> None:
     """See that a seed is one."""
     check_number(option, seed, 0, MOST_SEED)

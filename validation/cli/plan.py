@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,18 +11,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import scenes
-from validation.cli.common import Json, SceneName, check_number, commands, parse_poses, progress
+from validation.cli import plan_json
+from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
     import planner
-    from validation.plan_check import CheckedSetting, PlanCheck
+    from validation.plan_check import PlanCheck
     from validation.vary_check import VaryCheck
 
 commands = commands()
 _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
+_NOT_CAPABILITY = (
+    "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
+    "--views", "--views-share", "--vary", "--hold",
+)  # fmt: skip
 
 Objective = Annotated[
     str, typer.Option(help="object (the scene's unit, squared), image (px^2), or capability (U over tolerance).")
@@ -74,6 +78,7 @@ ViewsShare = Annotated[str | None, typer.Option(help="With --views: sensor or li
 
 @commands.command("plan")
 def plan_command(
+    context: typer.Context,
     scene: SceneName,
     objective: Objective = "object",
     over: Over = "minimax",
@@ -108,25 +113,16 @@ def plan_command(
     as_json: Json = False,
 ) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
-    if check is not None:
-        check_number("--check", check, 1, _MOST_CHECKED)
-    if not 0 <= separation <= 180:
-        limit = "least 0" if separation < 0 else "most 180"
-        raise scenes.InvalidInput(f"--separation: min_separation_deg must be at {limit}, got {separation:g}")
-    check_number("--camera-body", camera_body, 0, 1e12)
-    check_number("--light-body", light_body, 0, 1e12)
-    if same_mount and separation > 0:
-        raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {separation:g}")
+    from validation.cli import plan_capability, plan_views
+
+    _check_numbers(check, separation, camera_body, light_body, same_mount)
     check_file("--map", map_file, ".png")
     check_directory("--out", out)
-    poses = _poses(sensor=sensor, light=light, start=start)
+    poses = _poses(sensor=sensor, light=light)
+    first = parse_poses("--start", start)
     several = views is not None or views_share is not None
     if several:
-        from validation.cli import plan_views
-
-        without = {"--search": (search, "exhaustive"), "--edges": (edges, "given"), "--start": (start, "40,41"),
-                   "--tolerance": (" ".join(tolerance or []), ""), "--map": (map_file, None)}  # fmt: skip
-        plan_views.check_options(views, views_share, without)
+        plan_views.check_options(context, views, views_share)
     loaded = scenes.load(scene)
     import planner
 
@@ -137,32 +133,20 @@ def plan_command(
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
+    where = {"step_deg": step, "constraints": limits} | poses
     if objective == "capability":
-        from validation.cli import plan_capability
-
-        plan_capability.check_options({
-            "--over": (over, "minimax"), "--search": (search, "exhaustive"), "--model": (model, "calibrated"),
-            "--edges": (edges, "given"), "--start": (start, "40,41"), "--shares": (shares, "best"),
-            "--tolerance": (" ".join(tolerance or []), ""), "--check": (check, None), "--map": (map_file, None),
-            "--out": (out, None), "--views": (views, None), "--views-share": (views_share, None),
-        })  # fmt: skip
-        poses.pop("start")
-        plan_capability.run(loaded, {"step_deg": step, "constraints": limits} | poses, as_json)
+        check_left_out(context, "--objective capability", *_NOT_CAPABILITY)
+        plan_capability.run(loaded, where, as_json)
         return
-    how = {"over": over, "model": model, "search": search, "edges": edges, "step_deg": step, "constraints": limits}
-    how["shares"] = shares
     count = 0 if no_check else _renders(loaded) if check is None else check
+    where |= {"over": over, "model": model}
     if several:
-        if vary is not None:
-            raise scenes.InvalidInput(f"--vary must be left out with --views, got {vary!r}")
-        how = {"over": over, "model": model, "step_deg": step, "constraints": limits, "share": views_share}
-        poses.pop("start")
-        plan_views.run(loaded, views, objective, how | poses, bool(count), out, as_json)
+        plan_views.run(loaded, views, objective, where | {"share": views_share}, bool(count), out, as_json)
         _say_unchecked(loaded, bool(count or no_check or as_json))
         return
-    how |= _varied(loaded, vary, hold)
+    how = where | {"search": search, "edges": edges, "shares": shares, "start": first} | _varied(loaded, vary, hold)
     tolerances = _tolerances(tolerance or [])
-    found, seconds = _plan(loaded, objective, how | poses)
+    found, seconds = _plan(loaded, objective, how)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = _check(found, count) if count else None
     scatter = _check_varied(found) if found.varied and count else None
@@ -170,6 +154,17 @@ def plan_command(
     _say_unchecked(loaded, bool(count or no_check or as_json))
     if scatter and not scatter.agrees:
         raise typer.Exit(1)
+
+
+def _check_numbers(check, separation: float, camera_body, light_body, same_mount: bool) -> None:
+    check_number("--check", check, 1, _MOST_CHECKED)
+    if not 0 <= separation <= 180:
+        limit = "least 0" if separation < 0 else "most 180"
+        raise scenes.InvalidInput(f"--separation: min_separation_deg must be at {limit}, got {separation:g}")
+    check_number("--camera-body", camera_body, 0, 1e12)
+    check_number("--light-body", light_body, 0, 1e12)
+    if same_mount and separation > 0:
+        raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {separation:g}")
 
 
 def _say_unchecked(scene: scenes.Scene, said: bool) -> None:
@@ -284,7 +279,7 @@ def _show(
 
     if as_json:
         varied = {"varied": vary_table.facts(found.varied, scatter)}
-        print(json.dumps(_facts(found, checked, safe, seconds, pictures) | varied, indent=1))
+        print(json.dumps(plan_json.facts(found, checked, safe, seconds, pictures) | varied, indent=1))
         return
     from validation.report import plan_table
 
@@ -294,126 +289,3 @@ def _show(
         shown_on.print(vary_table.report(found, scatter, seconds), highlight=False)
     for path in pictures:
         shown_on.print(f"picture: {path}", highlight=False)
-
-
-def _facts(
-    found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path]
-) -> dict:
-    """The plan for JSON."""
-    import planner
-
-    p = found.prediction
-    return {
-        "scene": found.scene.name,
-        "objective": found.objective,
-        "model": found.model,
-        "sensor": list(found.sensor),
-        "light": scenes.pairs(found.light),
-        "shares": found.shares,
-        "alone": found.alone,
-        "edges": list(planner.edges_of(found.scene)),
-        "over": found.over,
-        "variance": found.variance,
-        "limiting": found.limiting,
-        "worst_ratio": p.worst_ratio,
-        "measurands": [_measurand(each) for each in p.measurands],
-        "variance_object": p.variance_object,
-        "variance_image": p.variance_image,
-        "status": p.status,
-        "grid": {
-            "sensor": list(found.grid_sensor),
-            "light": scenes.pairs(found.grid_light),
-            "variance": found.grid_variance,
-        },
-        "alternating": _alternating(found),
-        "guarantee": found.guarantee,
-        "pairs": found.pairs,
-        "evaluated": found.evaluated,
-        "candidates": [_with_poses(candidate) for candidate in found.candidates],
-        "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
-        **_checked(checked),
-        "robust": None if safe is None else _with_poses(safe),
-        "pictures": [str(path) for path in pictures],
-        "seconds": seconds,
-    }
-
-
-def _measurand(each: planner.Forecast) -> dict:
-    zone = each.tolerance
-    sigma, sigma_image = (
-        math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image)
-    )
-    return {
-        "name": each.name,
-        "kind": each.kind,
-        "unit": each.unit,
-        "value": each.value_object,
-        "nominal": each.nominal,
-        "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-        "sigma": sigma,
-        "sigma_image": sigma_image,
-        "ratio": each.ratio if sigma is not None else None,
-        "status": each.status,
-        **_texture(each),
-    }
-
-
-def _texture(each: planner.Forecast) -> dict:
-    """Standard deviations over parts by textures, and the bias of this part; nothing without textures."""
-    if each.texture_variance_object is None:
-        return {}
-    names = ("sigma_texture", "sigma_texture_image", "bias")
-    values = each.texture_variance_object**0.5, each.texture_variance_image**0.5, each.bias_object
-    return {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}
-
-
-def _with_poses(found) -> dict:
-    """A candidate or a robust plan with its poses as pairs."""
-    return {**dataclasses.asdict(found), "sensor": list(found.sensor), "light": scenes.pairs(found.light)}
-
-
-def _alternating(found: planner.Plan) -> dict:
-    trace = [
-        {
-            "fixed": step.fixed,
-            "at": list(step.fixed_pose),
-            "found": step.found,
-            "best": list(step.found_pose),
-            "variance": step.variance,
-        }
-        for step in found.trace
-    ]
-    return {"variance": found.partial_variance if found.trace else None, "gap": found.gap, "trace": trace}
-
-
-def _checked(checked: PlanCheck | None) -> dict:
-    """What rendering the best settings gave; nothing known without."""
-    if checked is None:
-        return {"checked": [], "order_changed": None, "proposed": None, "check": None}
-    return {
-        "checked": [_setting(row) for row in checked.settings],
-        "order_changed": checked.order_changed,
-        "proposed": None if checked.proposed is None else _setting(checked.proposed),
-        "check": {
-            "without_formula": list(checked.without_formula),
-            "reason": checked.reason or None,
-            "seconds": checked.seconds,
-        },
-    }
-
-
-def _setting(row: CheckedSetting) -> dict:
-    variances = {
-        name: value if math.isfinite(value) else None
-        for name, value in (("calibrated", row.calibrated), ("propagated", row.propagated))
-    }
-    poses = {"sensor": list(row.sensor), "light": scenes.pairs(row.light), "edges": list(row.edges)}
-    return {
-        **poses,
-        **variances,
-        "ratio": row.ratio,
-        "status": row.status,
-        "without_formula": list(row.without_formula),
-        "rank_before": row.rank_before,
-        "rank_after": row.rank_after,
-    }

@@ -14,19 +14,6 @@ if TYPE_CHECKING:
     from planner.budgeting.plans import CapabilityPlan, Placed
 
 
-def check_options(others: dict[str, tuple[object, object]]) -> None:
-    """See that options that this objective has no use for say nothing.
-
-    Parameters
-    ----------
-    others : dict
-        Of each such option its value, and the value that says nothing.
-    """
-    for option, (value, none) in others.items():
-        if value != none:
-            raise scenes.InvalidInput(f"{option} must be left out with --objective capability, got {value}")
-
-
 def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
     """Plan and show."""
     from planner.budgeting.plans import STEP_DEG, plan_capability

@@ -12,7 +12,7 @@ import typer
 
 import scenes
 from planner.views import MOST_VIEWS
-from validation.cli.common import progress
+from validation.cli.common import check_left_out, progress
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
@@ -20,23 +20,15 @@ if TYPE_CHECKING:
     from validation.views_check import ViewsCheck
 
 
-def check_options(views: int | None, share: str | None, others: dict[str, tuple[object, object]]) -> None:
-    """See that the options make sense together.
-
-    Parameters
-    ----------
-    others : dict
-        Of each option that several pictures have no use for its value, and the value that says nothing.
-    """
+def check_options(context: typer.Context, views: int | None, share: str | None) -> None:
+    """See that the options make sense together."""
     if views is None:
         raise scenes.InvalidInput(f"--views must be given with --views-share, got nothing beside {share!r}")
     if not 1 <= views <= MOST_VIEWS:
         raise scenes.InvalidInput(f"--views must be 1 to {MOST_VIEWS}, got {views}")
     if share not in (None, "sensor", "light"):
         raise scenes.InvalidInput(f"--views-share must be one of sensor, light, got {share!r}")
-    for option, (value, none) in others.items():
-        if value != none:
-            raise scenes.InvalidInput(f"{option} must be left out with --views, got {value}")
+    check_left_out(context, "--views", "--search", "--edges", "--start", "--tolerance", "--map", "--vary", "--hold")
 
 
 def run(

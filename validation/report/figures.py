@@ -67,7 +67,9 @@ def _label(value: object) -> str:
 
 
 def _noisy(case: Case, store: RunFile, seed: int) -> np.ndarray:
-    """One exposure of a setting."""
+    """One exposure of a setting; of photographs their mean."""
+    if store.identity().get("photos"):
+        return store.image(case.index)
     rng = np.random.default_rng([seed, case.index])
     return render.expose(store.image(case.index), case.scene.noise, rng, 1)[0]
 

@@ -28,6 +28,7 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--renders": ("2", "3"), "--seed": ("1", str(2**63 - 1)), "--workers": ("1",), "--out": ("OUT",),
         "--dask": ("nonsense", "http://[", "tcp://x"), "--accuracy": ("nan", "2"), "--budget": ("0s", "x"),
         "--effects": ("auto", "all,", "x"), "--leave-out-px": ("1",), "--leave-out-variance": ("1",), "--json": (),
+        "--photos": ("OUT", "FILE", "."), "--exact-poses": (),
     }),
     "plan": (["SCENE", "--no-check", "--step", "45"], {
         "--objective": ("object", "image"), "--search": ("alternating",), "--model": ("paper", "bound"),
@@ -55,6 +56,11 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
     "report": (["DAMAGED"], {"--out": ("FILE/x",), "--json": (), "--parquet": ()}),
     "calibrate": (["SCENE", "--images", "1"], {"--seed": ("1",), "-o": ("OUT.png",)}),
     "cost": (["SCENE", "--seed", "-1"], {"--out": ("OUT",)}),
+    "calibrate-camera": (["IMAGE", "IMAGE", "FILE", "--square", "25"], {
+        "--square": ("1e-9", "1e9"), "--square-sd": ("0.1",), "--units": ("cm", "ell"), "--shape": ("9x6", "2x2", "x"),
+        "--model": ("none", "f,k1", "k4"), "--noise": ("1",), "-o": ("OUT.toml", "OUT.png"), "--scene": ("SCENE",),
+        "--residuals": ("OUT.png", "FILE/x.png"), "--json": (),
+    }),
     "hard": (["--area", "none"], {"--precision": ("OUT.png",)}),
     "": ([], {"--version": (), "--help": (), "--install": (), "nosuch": ()}),
 }  # fmt: skip

@@ -1,0 +1,1 @@
+"""Chessboards: their corners, and the camera that saw them."""

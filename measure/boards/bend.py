@@ -1,0 +1,51 @@
+"""How a lens bends the lines of a board, from where its corners lie."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from measure.boards.windows import steps
+
+_DEGREES = ((3, 14), (2, 8))  # of the polynomial, and the corners that it takes
+
+
+def bends(grid: np.ndarray) -> np.ndarray:
+    """Curvature of the two edges through each corner, 1/px, shape (rows, columns, 2); towards their left normal.
+
+    A homography keeps lines straight. What it leaves of the corners' places is a polynomial of low degree in place,
+    whose second derivative along an edge, across it, is the edge's curvature. 0 where there are too few corners.
+
+    Parameters
+    ----------
+    grid : ndarray, shape (rows, columns, 2)
+        Corners, (x, y) px.
+    """
+    rows, columns = grid.shape[:2]
+    degree = next((d for d, least in _DEGREES if rows * columns >= least and min(rows, columns) > d), 0)
+    ideal = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+    matrix = cv2.findHomography(ideal, grid.reshape(-1, 2))[0] if degree else None
+    if matrix is None:
+        return np.zeros(grid.shape)
+    straight = cv2.perspectiveTransform(ideal[None], matrix)[0]
+    middle, size = straight.mean(0), np.ptp(straight, axis=0).max() / 2
+    u, v = ((straight - middle) / size).T
+    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    left = grid.reshape(-1, 2) - straight
+    coefficients = np.linalg.lstsq(np.stack([u**i * v**j for i, j in powers], 1), left, rcond=None)[0]
+
+    def second(by_u: int, by_v: int) -> np.ndarray:
+        columns = [_derived(u, i, by_u) * _derived(v, j, by_v) for i, j in powers]
+        return np.stack(columns, 1) @ coefficients / size**2
+
+    toward = steps(grid).reshape(-1, 2, 2)
+    toward = toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+    x, y = toward[..., :1], toward[..., 1:]
+    turned = x**2 * second(2, 0)[:, None] + 2 * x * y * second(1, 1)[:, None] + y**2 * second(0, 2)[:, None]
+    return (turned[..., 1] * toward[..., 0] - turned[..., 0] * toward[..., 1]).reshape(rows, columns, 2)
+
+
+def _derived(t: np.ndarray, power: int, times: int) -> np.ndarray:
+    """Derivative of t^power."""
+    factor = np.prod([power - k for k in range(times)]) if times else 1.0
+    return factor * t ** max(power - times, 0)

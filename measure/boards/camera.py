@@ -1,0 +1,172 @@
+"""A camera calibrated from boards: the likeliest intrinsics, distortion and poses, with their covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from measure import status
+from measure.boards.adjustment import Adjusted, adjust, begin
+from measure.boards.chessboard import Board
+from measure.boards.parameters import Model, read_model
+from measure.photo.lens import Lens
+from scenes.covariance import Covariance
+from scenes.errors import InvalidInput
+
+FEWEST_BOARDS, FEWEST_CORNERS = 3, 8
+_FALSE_ALARM = 0.01
+_VAGUE = 0.1  # of the focal length: a standard deviation that determines nothing
+DEFAULT_MODEL = "k1,k2,p1,p2,k3"
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """What boards tell of a camera.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The free intrinsics, in OpenCV's order; ``fx`` alone stands for both focal lengths where the model has one.
+    values : ndarray, shape (k,)
+        Of those, px for fx, fy, cx, cy.
+    covariance : ndarray, shape (k, k)
+        Of those; enlarged by ``dispersion``.
+    lens : Lens
+        All intrinsics, as `measure.measure_quadrilateral` takes them.
+    image_shape : (height, width)
+    poses : ndarray, shape (boards, 6)
+        Rotation vector (radians) and translation (unit of the squares) from each board to the camera, as OpenCV's.
+    pose_covariance : ndarray, shape (boards, 6, 6)
+        With the uncertainty of the squares' size, and enlarged by ``dispersion``.
+    residuals : tuple of ndarray, shape (n, 2) each
+        Measured less reprojected corners, px; NaN where there is no corner.
+    rms_px : float
+        Root mean square length of the residuals.
+    chi_square, freedom, p_value : float, int, float
+        Squared residuals over the corners' covariance, and how often corners with that covariance leave at least so
+        much.
+    dispersion : float
+        1, or chi-square over its degrees of freedom where the status is ``misfit``: what the covariance was multiplied
+        by.
+    status : str
+        ``ok``, ``misfit`` (corners do not lie where they should within their covariance: another model is needed, or
+        the board is not flat), ``ill_conditioned`` (the boards do not determine the focal length to 10 %).
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+    lens: Lens
+    image_shape: tuple[int, int]
+    poses: np.ndarray
+    pose_covariance: np.ndarray
+    residuals: tuple[np.ndarray, ...]
+    rms_px: float
+    chi_square: float
+    freedom: int
+    p_value: float
+    dispersion: float
+    status: str
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Standard uncertainty of each value, shape (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Of the values, shape (k, k)."""
+        return self.covariance / np.outer(self.sd, self.sd)
+
+    @property
+    def for_budget(self) -> Covariance:
+        """The covariance as a scene's ``uncertainty.covariance``."""
+        even = (self.covariance + self.covariance.T) / 2
+        return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
+
+
+def calibrate_camera(
+    boards: Sequence[Board],
+    square_size: float,
+    image_shape: tuple[int, int],
+    model: str = DEFAULT_MODEL,
+    square_sd: float = 0.0,
+) -> CameraCalibration:
+    """Calibrate a camera from measured chessboards.
+
+    OpenCV's calibration is where it begins; then all corners' residuals, whitened by their covariance, are made least.
+    The covariance is the inverse of the normal matrix.
+
+    Parameters
+    ----------
+    boards : sequence of Board
+        Of one camera; at least 3 with at least 8 measured corners each, seen from different directions.
+    square_size : float
+        Side of the squares, in any unit of length, which is that of the poses. Intrinsics do not depend on it.
+    image_shape : (height, width)
+    model : str
+        Free distortion coefficients with commas between, of k1, k2, p1, p2, k3; the others are 0. ``f`` among them:
+        one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free.
+    square_sd : float
+        Standard uncertainty of ``square_size``, the same for all squares.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is bad, or there are too few boards, or they determine no camera.
+    """
+    free = read_model(model)
+    _check(square_size, square_sd, image_shape)
+    boards = list(boards)
+    if not all(isinstance(board, Board) for board in boards):
+        raise InvalidInput("boards must be Boards, got something else")
+    enough = sum(board.measured.sum() >= FEWEST_CORNERS for board in boards)
+    if enough < FEWEST_BOARDS or enough < len(boards):
+        raise InvalidInput(
+            f"boards must be at least {FEWEST_BOARDS}, of at least {FEWEST_CORNERS} measured corners each, "
+            f"got {enough} such of {len(boards)}"
+        )
+    found = adjust(boards, square_size, free, begin(boards, square_size, image_shape, free))
+    return _calibration(boards, free, image_shape, found, square_sd / square_size)
+
+
+def _check(square_size: Any, square_sd: Any, image_shape: Any) -> None:
+    for name, value, least in (("square_size", square_size, 0.0), ("square_sd", square_sd, -1e-300)):
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool) and np.isfinite(value)
+        if not number or not least < value <= 1e9:
+            raise InvalidInput(
+                f"{name} must be a number {'more than' if not least else 'of at least'} 0, got {value!r}"
+            )
+    size = image_shape if isinstance(image_shape, tuple | list) else ()
+    if len(size) != 2 or not all(isinstance(n, int | np.integer) and 0 < n <= 1 << 15 for n in size):
+        raise InvalidInput(f"image_shape must be (height, width) in px, got {image_shape!r}")
+
+
+def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
+    k = len(free.names)
+    freedom = found.rows - found.covariance.shape[0]
+    p_value = float(stats.chi2.sf(found.chi_square, freedom)) if freedom > 0 else float("nan")
+    dispersion = found.chi_square / freedom if p_value < _FALSE_ALARM else 1.0
+    covariance = dispersion * found.covariance[:k, :k]
+    poses = found.parameters[k:].reshape(-1, 6)
+    blocks = []
+    for i, pose in enumerate(poses):
+        some = slice(k + 6 * i, k + 6 * i + 6)
+        longer = scale_sd * np.concatenate([np.zeros(3), pose[3:]])  # larger squares were further away
+        blocks.append(dispersion * found.covariance[some, some] + np.outer(longer, longer))
+    values = found.parameters[:k]
+    vague = not np.isfinite(covariance).all() or np.sqrt(covariance[0, 0]) > _VAGUE * values[0]
+    state = status.ILL_CONDITIONED if vague else status.MISFIT if dispersion != 1.0 else status.OK
+    all_residuals = np.concatenate(found.residuals)
+    matrix, coefficients = free.camera(values)
+    return CameraCalibration(
+        names=free.names, values=values, covariance=covariance,
+        lens=Lens(fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2], distortion=tuple(coefficients)),
+        image_shape=(int(image_shape[0]), int(image_shape[1])), poses=poses, pose_covariance=np.array(blocks),
+        residuals=found.residuals, rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
+        chi_square=found.chi_square, freedom=freedom, p_value=p_value, dispersion=float(dispersion), status=state,
+    )  # fmt: skip

@@ -1,0 +1,185 @@
+"""The corners of a chessboard in an image, each with its covariance, its goodness of fit and a status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from measure import status
+from measure.boards.approximate import approximate_corners
+from measure.boards.bend import bends
+from measure.boards.fitting import Crossings, fit_crossings
+from measure.boards.windows import steps, windows
+from measure.photo.noise import noise_sigma
+from scenes.arrays import picture
+from scenes.errors import InvalidInput
+
+_FALSE_ALARM = 0.01  # of all corners of a board together
+_FAINTEST = 3.0  # times the noise: half the difference of bright and dark
+_ORDINARY = 0.8  # px of lens blur to begin with
+_ROUGH, _FINE = 0.05, 1e-3  # px: the last step of either round; its error is about the square
+_MOST = 200  # corners along a side
+
+
+@dataclass(frozen=True)
+class Board:
+    """A chessboard's inner corners in one image.
+
+    Attributes
+    ----------
+    shape : (columns, rows)
+    corners : ndarray, shape (n, 2)
+        (x, y), px, (0, 0) the centre of the first pixel; row by row; NaN where not measured.
+    covariance : ndarray, shape (n, 2, 2)
+        Of each corner, px^2. Different corners are independent: the noise is white, and no pixel serves two of them.
+        Where the status is ``misfit`` it is enlarged by the residuals' chi-square over its degrees of freedom.
+    status : tuple of str, n
+        Of `measure.status`.
+    p_value : ndarray, shape (n,)
+        Goodness of fit: how often the noise alone would leave at least so much; NaN where not measured.
+    noise : float
+        Standard deviation of a pixel's noise, grey levels, given or estimated.
+    blur_px : float
+        Median standard deviation of the lens blur, px.
+    """
+
+    shape: tuple[int, int]
+    corners: np.ndarray
+    covariance: np.ndarray
+    status: tuple[str, ...]
+    p_value: np.ndarray
+    noise: float
+    blur_px: float
+
+    @property
+    def measured(self) -> np.ndarray:
+        """Which corners have a value, shape (n,), bool."""
+        return np.array([each in status.MEASURED for each in self.status])
+
+    @property
+    def places(self) -> np.ndarray:
+        """Column and row of each corner on the board, shape (n, 2): to be multiplied by the squares' size."""
+        columns, rows = self.shape
+        return np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+
+
+def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | None = None) -> Board:
+    """Measure the inner corners of the chessboard in an image.
+
+    OpenCV tells roughly where they are; then each is the likeliest crossing of two blurred edges with levels linear in
+    place in all four quadrants, in a window up to half way to the next corners. How a lens bends the edges is told by
+    the corners together, in a second round.
+
+    Parameters
+    ----------
+    image : array_like, shape (height, width)
+        Grey levels.
+    shape : (columns, rows), optional
+        Inner corners; counted when not given.
+    noise : float, optional
+        Standard deviation of white noise, grey levels; from the image when not given.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such board in the image, or an argument is bad.
+    """
+    image = picture(image)
+    shape = check_shape(shape)
+    if noise is not None and not (np.isfinite(noise) and noise > 0):
+        raise InvalidInput(f"noise must be more than 0, got {noise!r}")
+    grid = approximate_corners(image, shape)
+    if grid is None:
+        wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
+        raise InvalidInput(f"image must show a whole chessboard {wanted}, got none")
+    noise = noise_sigma(image) if noise is None else float(noise)
+    return measured(image, grid, max(noise, _least_noise(image)))
+
+
+def check_shape(shape: Any) -> tuple[int, int] | None:
+    """Columns and rows of inner corners, if given.
+
+    Raises
+    ------
+    InvalidInput
+        If they are no two whole numbers from 3 to 200.
+    """
+    if shape is None:
+        return None
+    good = isinstance(shape, tuple | list) and len(shape) == 2 and all(isinstance(n, int | np.integer) for n in shape)
+    if not good or not all(3 <= n <= _MOST for n in shape):
+        raise InvalidInput(f"shape must be columns and rows of inner corners, 3 to {_MOST} each, got {shape!r}")
+    return int(shape[0]), int(shape[1])
+
+
+def _least_noise(image: np.ndarray) -> float:
+    """That of rounding to whole grey levels; of numbers that are not rounded, that of the arithmetic."""
+    return float(np.sqrt(1 / 12)) if (image == np.rint(image)).all() else 1e-9 * float(np.ptp(image)) + 1e-300
+
+
+def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
+    """The corners about ``grid``, shape (rows, columns, 2), px, under white noise of a standard deviation."""
+    columns, rows = grid.shape[1::-1]
+    found = windows(image, grid)
+    room = begun = found.room
+    if not room.any():
+        return _nothing((columns, rows), noise)
+    toward = steps(grid).reshape(-1, 2, 2)[room]
+    direction, blur = np.arctan2(toward[..., 1], toward[..., 0]), np.full(len(toward), np.log(_ORDINARY))
+    start = np.column_stack([grid.reshape(-1, 2)[room], direction, blur])
+    rough = fit_crossings(found.some(room), start, np.zeros(direction.shape), _ROUGH)
+    grid = _moved(grid, room, rough)
+    found = windows(image, grid)
+    room = begun & found.room
+    if not room.any():
+        return _nothing((columns, rows), noise)
+    some, still = found.some(room), room[begun]
+    fitted = fit_crossings(some, rough.shape[still], bends(grid).reshape(-1, 2)[room], _FINE)
+    return _board((columns, rows), room, fitted, noise, _clipped(image, some))
+
+
+def _nothing(shape: tuple[int, int], noise: float) -> Board:
+    """Squares too small, or at the image's margin."""
+    n = shape[0] * shape[1]
+    nan = np.full((n, 2, 2), np.nan)
+    return Board(shape, nan[:, 0], nan, (status.SHORT,) * n, nan[:, 0, 0], noise, np.nan)
+
+
+def _moved(grid: np.ndarray, room: np.ndarray, fitted: Crossings) -> np.ndarray:
+    """The grid with corners where they were found."""
+    flat = grid.reshape(-1, 2).copy()
+    good = np.flatnonzero(room)[fitted.converged]
+    flat[good] = fitted.shape[fitted.converged, :2]
+    return flat.reshape(grid.shape)
+
+
+def _clipped(image: np.ndarray, some) -> np.ndarray:
+    """Whether a window reaches an end of the scale: many pixels of a rounded image have the least or greatest level."""
+    if not (image == np.rint(image)).all():
+        return np.zeros(len(some.levels), bool)
+    ends = [level for level in (image.min(), image.max()) if (image == level).mean() > 0.001]
+    return np.array([any((row[here] == end).mean() > 0.02 for end in ends)
+                     for row, here in zip(some.levels, some.there, strict=True)])  # fmt: skip
+
+
+def _board(shape, room: np.ndarray, fitted: Crossings, noise: float, clipped: np.ndarray) -> Board:
+    n = room.size
+    corners, covariance, p_value = np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan), np.full(n, np.nan)
+    states = np.full(n, status.SHORT, dtype=object)
+    fit = stats.chi2.sf(fitted.square / noise**2, fitted.freedom)
+    limit = 1 - (1 - _FALSE_ALARM) ** (1 / n)
+    states[room] = np.select(
+        [fitted.contrast < _FAINTEST * noise, ~fitted.converged, fit < limit, clipped],
+        [status.LOW_CONTRAST, status.ILL_CONDITIONED, status.MISFIT, status.CLUTTER], status.OK,
+    )  # fmt: skip
+    good = np.isin(states[room], status.MEASURED)
+    which = np.flatnonzero(room)[good]
+    corners[which] = fitted.shape[good, :2]
+    excess = np.where(fit < limit, fitted.square / noise**2 / fitted.freedom, 1.0)[good, None, None]
+    covariance[which] = noise**2 * excess * fitted.unit_covariance[good]
+    p_value[which] = fit[good]
+    blur = float(np.exp(np.median(fitted.shape[:, 4])))
+    return Board(shape, corners, covariance, tuple(map(str, states)), p_value, noise, blur)

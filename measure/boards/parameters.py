@@ -1,0 +1,80 @@
+"""Which intrinsics of a camera are free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from scenes.covariance import ORDER
+from scenes.errors import InvalidInput
+
+_COEFFICIENTS = ORDER[4:]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Free intrinsics.
+
+    Attributes
+    ----------
+    names : tuple of str
+        In OpenCV's order; without fy where there is one focal length.
+    """
+
+    names: tuple[str, ...]
+
+    @property
+    def one_focal(self) -> bool:
+        """Whether fx stands for both."""
+        return "fy" not in self.names
+
+    def camera(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Camera matrix (3, 3) and five distortion coefficients from the free values."""
+        known = dict(zip(self.names, map(float, values), strict=True))
+        known.setdefault("fy", known["fx"])
+        matrix = np.array([[known["fx"], 0, known["cx"]], [0, known["fy"], known["cy"]], [0, 0, 1.0]])
+        return matrix, np.array([known.get(name, 0.0) for name in _COEFFICIENTS])
+
+    def values(self, matrix: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """The inverse of `camera`."""
+        numbers = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *np.ravel(coefficients)[:5]]
+        return np.array([float(dict(zip(ORDER, numbers, strict=True))[name]) for name in self.names])
+
+    def derivatives(self, by_all: np.ndarray) -> np.ndarray:
+        """Columns of the free values from those of fx, fy, cx, cy, k1, k2, p1, p2, k3, shape (n, 9)."""
+        found = by_all[:, [ORDER.index(name) for name in self.names]]
+        if self.one_focal:
+            found[:, 0] += by_all[:, 1]
+        return found
+
+    @property
+    def flags(self) -> int:
+        """Of OpenCV's calibration."""
+        fixed = {"k1": cv2.CALIB_FIX_K1, "k2": cv2.CALIB_FIX_K2, "k3": cv2.CALIB_FIX_K3}
+        flags = sum(flag for name, flag in fixed.items() if name not in self.names)
+        tangential = {"p1", "p2"} & set(self.names)
+        return flags + (0 if tangential else cv2.CALIB_ZERO_TANGENT_DIST)
+
+
+def read_model(text: str) -> Model:
+    """The model of a list of free coefficients.
+
+    Raises
+    ------
+    InvalidInput
+        If it is none.
+
+    Examples
+    --------
+    >>> read_model("k1,k2").names
+    ('fx', 'fy', 'cx', 'cy', 'k1', 'k2')
+    >>> read_model("f,k1").names
+    ('fx', 'cx', 'cy', 'k1')
+    """
+    names = [] if text == "none" else [part.strip() for part in str(text).split(",")]
+    if len(set(names)) < len(names) or not set(names) <= {"f", *_COEFFICIENTS}:
+        raise InvalidInput(f"model must be none, or some of f, {', '.join(_COEFFICIENTS)}, got {text!r}")
+    always = ("fx", "cx", "cy") if "f" in names else ("fx", "fy", "cx", "cy")
+    return Model((*always, *(name for name in _COEFFICIENTS if name in names)))

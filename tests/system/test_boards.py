@@ -1,0 +1,25 @@
+"""The proof of boards, reduced; and photographs of chessboards, where somebody has put some into ``ICE_PHOTOS``."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.boards import SMALL
+from tests.proofs.boards import ENOUGH, FALSE_ALARM, photographed, through_corners, through_images
+
+
+def test_calibrations_are_nearer_than_with_corner_sub_pix_and_as_exact_as_they_say():
+    rng = np.random.default_rng(3)
+    compared, found = through_images(SMALL, 4, 1, 2.0, rng, 420.0)
+    assert max(compared.ratios) <= ENOUGH
+    assert found.p_value > FALSE_ALARM / 2
+    cornered = through_corners(SMALL, 4, 30, rng, 420.0)
+    assert cornered.p_value > FALSE_ALARM / 2
+
+
+@pytest.mark.skipif(not os.environ.get("ICE_PHOTOS"), reason="ICE_PHOTOS names no folder of chessboard photographs")
+def test_photographs_are_told_better_than_by_corner_sub_pix():
+    found = photographed(Path(os.environ["ICE_PHOTOS"]))
+    assert found["ours"].rms_px <= found["theirs"].rms_px

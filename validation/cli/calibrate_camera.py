@@ -1,0 +1,119 @@
+"""``ice calibrate-camera``: intrinsics and distortion from photographs of a chessboard, with their covariance."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenes import InvalidInput
+from validation.cli.common import Json, check_number, commands, progress, say
+from validation.cli.outputs import check_file
+from validation.report.terminal import console
+
+commands = commands()
+_LONGEST = 1e9
+
+
+@commands.command("calibrate-camera")
+def calibrate_camera_command(
+    boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one chessboard, 3 or more.")],
+    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares.")],
+    square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0,
+    units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm",
+    shape: Annotated[
+        str | None, typer.Option(metavar="9x6", help="Inner corners: columns x rows; counted when not given.")
+    ] = None,
+    model: Annotated[
+        str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
+    ] = "k1,k2,p1,p2,k3",
+    noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of the noise, grey levels; else from each image.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="LENS.toml", help="For `ice measure --lens`.")
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(metavar="SCENE", help="Print its [camera] and [uncertainty] as they should read.")
+    ] = None,
+    residuals: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture of the residuals.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Calibrate a camera from photographs of a chessboard seen from different directions.
+
+    -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
+    boards do not determine the focal length.
+    """
+    from scenes.units import UNITS
+
+    check_number("--square", square, 1e-9, _LONGEST)
+    check_number("--square-sd", square_sd, 0, square)
+    check_number("--noise", noise, 1e-6, 1e6)
+    if units not in UNITS:
+        raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {units!r}")
+    wanted = _shape(shape)
+    check_file("--output", output, ".toml")
+    check_file("--residuals", residuals, ".png")
+    import measure
+    from measure.boards.parameters import read_model
+    from validation.boards import read_boards
+    from validation.report import camera_table
+
+    read_model(model)
+    with progress("corners") as shown:
+        seen = read_boards(boards, wanted, noise, shown)
+    for _, reason in seen.left_out:
+        print(f"left out: {reason}", file=sys.stderr)
+    found = measure.calibrate_camera(seen.boards, square, seen.image_shape, model, square_sd)
+    lines = camera_table.scene_lines(found, scene, output and _beside(output)) if scene is not None else None
+    if output is not None:
+        _write(output, camera_table.lens_file(found))
+        _write(_beside(output), camera_table.covariance_file(found))
+    if residuals is not None:
+        from validation.report import camera_figure  # matplotlib takes half a second to load
+
+        camera_figure.draw(found, seen.boards, residuals)
+    if as_json:
+        told = camera_table.facts(found, seen, units)
+        say(told if lines is None else {**told, "scene": lines}, True, "")
+    else:
+        _show(found, seen, units, lines)
+        for path in filter(None, (output, output and _beside(output), residuals)):
+            console().print(f"written: {path}", highlight=False)
+    raise typer.Exit(1 if found.status == measure.status.ILL_CONDITIONED else 0)
+
+
+def _show(found, seen, units: str, lines: str | None) -> None:
+    from validation.report import camera_table
+
+    shown = console()
+    shown.print(camera_table.boards(found, seen, units))
+    shown.print(camera_table.parameters(found))
+    shown.print(camera_table.summary(found), highlight=False)
+    if lines is not None:
+        print(f"\n{lines}")
+
+
+def _shape(text: str | None) -> tuple[int, int] | None:
+    from measure.boards.chessboard import check_shape
+
+    if text is None:
+        return None
+    try:
+        columns, rows = (int(part) for part in text.lower().split("x"))
+        return check_shape((columns, rows))
+    except ValueError:
+        raise InvalidInput(f"--shape must be columns x rows of inner corners as 9x6, got {text!r}") from None
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.stem}_covariance.json")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text)
+    except OSError as error:
+        raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None

@@ -1,0 +1,137 @@
+"""A plan as JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import scenes
+
+if TYPE_CHECKING:
+    import planner
+    from validation.plan_check import CheckedSetting, PlanCheck
+
+
+def facts(
+    found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path]
+) -> dict:
+    """The plan for JSON."""
+    import planner
+
+    p = found.prediction
+    return {
+        "scene": found.scene.name,
+        "objective": found.objective,
+        "model": found.model,
+        "sensor": list(found.sensor),
+        "light": scenes.pairs(found.light),
+        "shares": found.shares,
+        "alone": found.alone,
+        "edges": list(planner.edges_of(found.scene)),
+        "over": found.over,
+        "variance": found.variance,
+        "limiting": found.limiting,
+        "worst_ratio": p.worst_ratio,
+        "measurands": [_measurand(each) for each in p.measurands],
+        "variance_object": p.variance_object,
+        "variance_image": p.variance_image,
+        "status": p.status,
+        "grid": {
+            "sensor": list(found.grid_sensor),
+            "light": scenes.pairs(found.grid_light),
+            "variance": found.grid_variance,
+        },
+        "alternating": _alternating(found),
+        "guarantee": found.guarantee,
+        "pairs": found.pairs,
+        "evaluated": found.evaluated,
+        "candidates": [_with_poses(candidate) for candidate in found.candidates],
+        "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
+        **_checked(checked),
+        "robust": None if safe is None else _with_poses(safe),
+        "pictures": [str(path) for path in pictures],
+        "seconds": seconds,
+    }
+
+
+def _measurand(each: planner.Forecast) -> dict:
+    zone = each.tolerance
+    sigma, sigma_image = (
+        math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image)
+    )
+    return {
+        "name": each.name,
+        "kind": each.kind,
+        "unit": each.unit,
+        "value": each.value_object,
+        "nominal": each.nominal,
+        "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
+        "sigma": sigma,
+        "sigma_image": sigma_image,
+        "ratio": each.ratio if sigma is not None else None,
+        "status": each.status,
+        **_texture(each),
+    }
+
+
+def _texture(each: planner.Forecast) -> dict:
+    """Standard deviations over parts by textures, and the bias of this part; nothing without textures."""
+    if each.texture_variance_object is None:
+        return {}
+    names = ("sigma_texture", "sigma_texture_image", "bias")
+    values = each.texture_variance_object**0.5, each.texture_variance_image**0.5, each.bias_object
+    return {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}
+
+
+def _with_poses(found) -> dict:
+    """A candidate or a robust plan with its poses as pairs."""
+    return {**dataclasses.asdict(found), "sensor": list(found.sensor), "light": scenes.pairs(found.light)}
+
+
+def _alternating(found: planner.Plan) -> dict:
+    trace = [
+        {
+            "fixed": step.fixed,
+            "at": list(step.fixed_pose),
+            "found": step.found,
+            "best": list(step.found_pose),
+            "variance": step.variance,
+        }
+        for step in found.trace
+    ]
+    return {"variance": found.partial_variance if found.trace else None, "gap": found.gap, "trace": trace}
+
+
+def _checked(checked: PlanCheck | None) -> dict:
+    """What rendering the best settings gave; nothing known without."""
+    if checked is None:
+        return {"checked": [], "order_changed": None, "proposed": None, "check": None}
+    return {
+        "checked": [_setting(row) for row in checked.settings],
+        "order_changed": checked.order_changed,
+        "proposed": None if checked.proposed is None else _setting(checked.proposed),
+        "check": {
+            "without_formula": list(checked.without_formula),
+            "reason": checked.reason or None,
+            "seconds": checked.seconds,
+        },
+    }
+
+
+def _setting(row: CheckedSetting) -> dict:
+    variances = {
+        name: value if math.isfinite(value) else None
+        for name, value in (("calibrated", row.calibrated), ("propagated", row.propagated))
+    }
+    poses = {"sensor": list(row.sensor), "light": scenes.pairs(row.light), "edges": list(row.edges)}
+    return {
+        **poses,
+        **variances,
+        "ratio": row.ratio,
+        "status": row.status,
+        "without_formula": list(row.without_formula),
+        "rank_before": row.rank_before,
+        "rank_after": row.rank_after,
+    }

@@ -1,0 +1,181 @@
+"""A calibrated camera as tables, as a lens file, as lines of a scene, as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+import scenes
+from measure.boards.camera import CameraCalibration
+from scenes import InvalidInput
+from validation.boards import Boards
+
+_STRONG = 0.9  # correlation that is told of
+
+
+def boards(found: CameraCalibration, seen: Boards, units: str) -> Table:
+    """One row a board."""
+    table = Table(title="Boards", title_justify="left", box=None)
+    for name in ("file", "corners", "not ok", "noise", "blur px", "rms px", f"distance {units}", "+-"):
+        table.add_column(name, justify="left" if name == "file" else "right")
+    for each in _board_facts(found, seen):
+        size = f"{each['shape'][0]} x {each['shape'][1]}"
+        bad = ", ".join(f"{count} {name}" for name, count in each["status"].items() if name != "ok") or "-"
+        table.add_row(
+            Path(each["file"]).name, size, bad, f"{each['noise']:.2f}", f"{each['blur_px']:.2f}",
+            f"{each['rms_px']:.4f}", f"{each['distance']:.3f}", f"{each['distance_sd']:.2g}",
+        )  # fmt: skip
+    return table
+
+
+def parameters(found: CameraCalibration) -> Table:
+    """One row an intrinsic."""
+    table = Table(title="Camera", title_justify="left", box=None)
+    for name in ("", "value", "+- (1 sigma)", "unit"):
+        table.add_column(name, justify="left" if name in ("", "unit") else "right")
+    for name, value, sd in zip(found.names, found.values, found.sd, strict=True):
+        pixels = name in ("fx", "fy", "cx", "cy")
+        digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 12)) if 0 < sd < np.inf else 4
+        table.add_row(name, f"{value:.{digits}f}", f"{sd:.2g}", "px" if pixels else "")
+    return table
+
+
+def summary(found: CameraCalibration) -> str:
+    """What the residuals say, and the strongest correlations."""
+    lines = [
+        f"{found.status}: reprojection {found.rms_px:.4f} px rms; chi-square {found.chi_square:.1f} for "
+        f"{found.freedom} degrees of freedom, p = {found.p_value:.2g}"
+    ]
+    if found.dispersion != 1:
+        lines.append(
+            f"The corners lie further off than their covariance says: all covariances are multiplied by "
+            f"{found.dispersion:.3g}. Another --model, or a board that is not flat?"
+        )
+    pairs = _strong(found)
+    if pairs:
+        lines.append("strongly correlated: " + ", ".join(f"{a} and {b} {value:+.3f}" for a, b, value in pairs))
+    return "\n".join(lines)
+
+
+def lens_file(found: CameraCalibration) -> str:
+    """TOML as `measure.load_lens` reads it."""
+    lens, sd = found.lens, dict(zip(found.names, found.sd, strict=True))
+    lines = [f"# {found.status}: {found.rms_px:.4g} px rms, p = {found.p_value:.2g}; 1 sigma beside each number"]
+    lines += [f"{name} = {getattr(lens, name)!r}  # +- {sd[name]:.2g} px" if name in sd else
+              f"{name} = {getattr(lens, name)!r}  # as fx" for name in ("fx", "fy", "cx", "cy")]  # fmt: skip
+    told = ", ".join(f"{name} {sd[name]:.2g}" for name in ("k1", "k2", "p1", "p2", "k3") if name in sd)
+    lines.append(f"distortion = {list(map(float, lens.distortion))}  # +- {told or 'not free'}")
+    return "\n".join(lines) + "\n"
+
+
+def covariance_file(found: CameraCalibration) -> str:
+    """JSON as ``uncertainty.covariance`` reads it."""
+    return json.dumps(_covariance(found), indent=1) + "\n"
+
+
+def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> str:
+    """The lines of a scene's ``[camera]`` and ``[uncertainty]`` that the calibration says.
+
+    A scene's camera has one focal length, the geometric mean here, and its axis in the middle of the image; how far off
+    it is, is said in a comment.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene cannot be read, or its image has another size.
+    """
+    camera = scenes.load(scene).camera
+    height, width = found.image_shape
+    if (camera.width, camera.height) != (width, height):
+        raise InvalidInput(
+            f"{scene}: camera.width x height must be {width} x {height}, as the boards', got "
+            f"{camera.width} x {camera.height}"
+        )
+    lens = found.lens
+    off = lens.cx - (width - 1) / 2, lens.cy - (height - 1) / 2
+    given = json.dumps(beside.name) if beside else _inline(_covariance(found))
+    return "\n".join([
+        "[camera]",
+        f"focal_px = {float(np.sqrt(lens.fx * lens.fy))!r}  # fx {lens.fx:.3f}, fy {lens.fy:.3f}",
+        f"lens = {{ distortion = {list(map(float, lens.distortion))} }}",
+        f"# The axis meets the image {off[0]:+.2f}, {off[1]:+.2f} px from its middle, where a scene has it.",
+        "",
+        "[uncertainty]",
+        f"covariance = {given}",
+    ])  # fmt: skip
+
+
+def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
+    """The document of ``ice calibrate-camera --json``."""
+    lens = found.lens
+    told = {
+        "status": found.status,
+        "image": list(found.image_shape[::-1]),
+        "units": units,
+        "lens": {
+            **{name: getattr(lens, name) for name in ("fx", "fy", "cx", "cy")},
+            "distortion": list(lens.distortion),
+        },
+        "names": list(found.names),
+        "values": found.values.tolist(),
+        "sd": found.sd.tolist(),
+        "covariance": found.covariance.tolist(),
+        "correlation": found.correlation.tolist(),
+        "rms_px": found.rms_px,
+        "chi_square": found.chi_square,
+        "freedom": found.freedom,
+        "p_value": found.p_value,
+        "dispersion": found.dispersion,
+        "boards": _board_facts(found, seen),
+        "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
+    }
+    return _finite(told)
+
+
+def _board_facts(found: CameraCalibration, seen: Boards) -> list[dict[str, Any]]:
+    told = []
+    for file, board, left, pose, covariance in zip(
+        seen.files, seen.boards, found.residuals, found.poses, found.pose_covariance, strict=True
+    ):
+        away = pose[3:]
+        distance = float(np.linalg.norm(away))
+        told.append({
+            "file": str(file), "shape": list(board.shape), "noise": board.noise, "blur_px": board.blur_px,
+            "status": {name: board.status.count(name) for name in sorted(set(board.status))},
+            "rms_px": float(np.sqrt(2 * np.nanmean(left**2))), "pose": pose.tolist(),
+            "pose_sd": np.sqrt(np.diag(covariance)).tolist(), "distance": distance,
+            "distance_sd": float(np.sqrt(away @ covariance[3:, 3:] @ away) / distance),
+        })  # fmt: skip
+    return told
+
+
+def _strong(found: CameraCalibration) -> list[tuple[str, str, float]]:
+    """Pairs by correlation, the strongest first; at least one where there are any."""
+    with np.errstate(invalid="ignore"):
+        rho = found.correlation
+    pairs = [(a, b, float(rho[i, j])) for i, a in enumerate(found.names) for j, b in enumerate(found.names[:i])]
+    pairs = sorted((pair for pair in pairs if np.isfinite(pair[2])), key=lambda pair: -abs(pair[2]))
+    return [pair for pair in pairs if abs(pair[2]) > _STRONG] or pairs[:1]
+
+
+def _covariance(found: CameraCalibration) -> dict[str, Any]:
+    if not np.isfinite(found.covariance).all():
+        raise InvalidInput("BOARD must determine a camera, got boards that leave its covariance infinite")
+    told = found.for_budget
+    return {"names": list(told.names), "matrix": [list(row) for row in told.matrix]}
+
+
+def _inline(covariance: dict[str, Any]) -> str:
+    return f"{{ names = {json.dumps(covariance['names'])}, matrix = {json.dumps(covariance['matrix'])} }}"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
