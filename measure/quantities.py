@@ -15,7 +15,7 @@ from measure.features.rims import Circles, find_circle
 from measure.features.shape import find_shape
 from planner.features.kinds import Evaluated, in_image, on_plane
 from planner.features.measurand import Measurands, dense, measurands
-from planner.features.seen import Seen, plane_axes
+from planner.features.seen import Seen
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
 from scenes import Corner, Picture, Quantity
@@ -120,7 +120,7 @@ def found_in_images(
     centres = np.broadcast_to(expected.centres, (count, *expected.centres.shape)).copy()
     radii = np.broadcast_to(expected.radii, (count, *expected.radii.shape)).copy()
     for c, (name, errors) in enumerate(zip(known.circles, circle_errors, strict=True)):
-        centres[:, c] += errors[:, :2] @ np.array(plane_axes(expected.solid.circle(name).axis))
+        centres[:, c] += errors[:, :2] @ np.array(expected.sideways(expected.solid.round(name)))
         radii[:, c] += errors[:, 2]
     return Seen(
         solid=expected.solid,

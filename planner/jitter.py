@@ -11,7 +11,7 @@ from planner.features.kinds import on_plane
 from planner.features.measurand import Measurands, measurands
 from planner.features.seen import Seen
 from planner.imaging.pictures import Pictures
-from scenes import Centre, Scene
+from scenes import Centre, Curved, Scene, Wall
 
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
 
@@ -86,10 +86,12 @@ def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
         return found
     centres, radii = [], []
     for c, name in enumerate(found.circles):
-        centre, feature = here.seen.centres[..., c, :], Centre(circle=name)
+        centre, each = here.seen.centres[..., c, :], found.solid.round(name)
+        feature = Wall(surface=name) if isinstance(each, Curved) else Centre(circle=name)
         image = there.seen.point(feature, None)
-        plane = np.broadcast_to(found.solid.circle(name).axis, centre.shape)
-        seen = found.onto(image, plane, found.solid.circle(name).centre).at
+        sight = centre - here.seen.eye if isinstance(each, Curved) else np.broadcast_to(each.axis, centre.shape)
+        plane = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
+        seen = found.onto(image, plane, each.centre).at
         depths = there.seen.depth(there.seen.centres[..., c, :]), found.depth(seen)
         centres.append(seen)
         radii.append(found.radii[..., c] * depths[1] / depths[0])

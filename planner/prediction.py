@@ -9,7 +9,6 @@ import numpy as np
 
 from planner.features.measurand import measurand, measurands, normals
 from planner.features.propagation import corner_covariance
-from planner.features.seen import plane_axes
 from planner.forecast import Forecast, forecasts, worst
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import jacobian_ideal
@@ -19,7 +18,8 @@ from planner.models.errors import Errors
 from planner.models.texture import texture_errors
 from planner.ranks import WORST_FIRST, edge_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
-from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit
+from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
+from scenes.features import place_of
 from scenes.results import Shown
 from scenes.units import in_unit
 
@@ -289,11 +289,11 @@ def _covariances(pictures: Pictures, evaluated: Errors) -> np.ndarray:
     known, solid = evaluated.measurands, pictures.scene.solid
     view, found = known.view, []
     for feature in (known.quantities[0].features * 2)[:2]:
-        if isinstance(feature, Centre):
-            circle = solid.circle(feature.circle)
+        if isinstance(feature, Centre | Wall):
+            circle = solid.round(place_of(feature))
             slope = jacobian_ideal(circle.centre[None], pictures.sensors, pictures.scene.camera)[0]
-            slope = slope @ np.stack(plane_axes(circle.axis), -1)
-            whole = evaluated.circles[known.circles.index(feature.circle)][:2, :2]
+            slope = slope @ np.stack(known.seen.sideways(circle), -1)
+            whole = evaluated.circles[known.circles.index(circle.name)][:2, :2]
             found.append(slope @ whole @ slope.T if np.isfinite(whole).all() else np.diag([np.inf, np.inf]))
         elif isinstance(feature, Corner):
             found.append(_corner_covariance(feature, view, solid, evaluated))

@@ -8,11 +8,13 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from planner import Pictures, projected_edges
+from planner.features.limb_outline import limb_outline
 from planner.features.projected_edges import circles
 from planner.features.rim_sides import equal_angles, radials
+from planner.imaging.lens import image_centre
 from planner.imaging.projection import project
 from render.rays import Rays
-from scenes import Picture
+from scenes import Curved, Picture
 
 MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed the tip of a corner from a refined one
 STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
@@ -46,14 +48,25 @@ def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) ->
 
 
 def _around(picture: Picture) -> list[np.ndarray]:
-    """Pieces of the required circles' images, (2, 2) each, px."""
+    """Pieces of the images of the required circles and limbs, (2, 2) each, px."""
     pieces = []
     for name in circles(picture.scene):
-        circle = picture.scene.solid.circle(name)
+        circle = picture.scene.solid.round(name)
+        if isinstance(circle, Curved):
+            pieces += limb_pieces(picture, circle)
+            continue
         places = circle.centre + circle.radius * radials(circle, equal_angles())
         rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
         pieces += list(np.stack([rim, np.roll(rim, -1, 0)], 1))
     return pieces
+
+
+def limb_pieces(picture: Picture, curved: Curved) -> list[np.ndarray]:
+    """Pieces of a limb's image, (2, 2) each, px."""
+    outline = limb_outline(curved, np.array(list(picture.sensor)), picture.scene.camera)
+    at = outline.at + image_centre(picture.scene.camera)
+    pieces = np.stack([at, np.roll(at, -1, 0)], 1)
+    return list(pieces[np.isfinite(pieces).all((1, 2))])
 
 
 def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:

@@ -13,6 +13,7 @@ from planner.imaging.projection import frame
 from planner.imaging.reflectance import Index, diffuse
 from planner.imaging.sheets import sheets
 from render import bsdf, lights
+from render.curved import curved_shapes, stands_for
 from render.meshes import mesh
 from render.parts import Part
 from render.rays import SURFACES
@@ -79,9 +80,9 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
     """Each solid's surface with the paper's reflectance as textures; None where it has no such form (`render.texture`).
 
     Light between surfaces, and light or an aperture of some size need the reflectance for more than one
-    direction.
+    direction; curved surfaces have no plane to put a table on.
     """
-    if active & MANY_WAYS:
+    if active & MANY_WAYS or picture.scene.solid.curved:
         return None
     found = []
     for solid in _solids(picture.scene, active):
@@ -107,19 +108,25 @@ def _shown(mitsuba, solid: Solid, part: Part) -> list[Any]:
     """A solid's surface as one shape a material, and one a textured face; black where only a light is seen."""
     picture, active = part.picture, part.active
     if part.silhouette:
-        return [mesh(mitsuba, solid.triangles, lights.BLACK)]
+        return _of_material(mitsuba, solid, np.ones(len(solid.faces), bool), lights.BLACK)
     of_face, made = _materials(picture.scene, solid), []
     uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
     for material in dict.fromkeys(of_face):
         here = [each == material and face not in uneven for face, each in enumerate(of_face)]
-        here = np.array(here)[solid.triangle_faces]
-        if here.any():
-            made.append(mesh(mitsuba, solid.triangles[here], _surface(mitsuba, picture, active, material)))
+        if any(here):
+            made += _of_material(mitsuba, solid, np.array(here), _surface(mitsuba, picture, active, material))
     for face, sheet in uneven.items():
         piece = uneven_part(solid, face, sheet)
         surface = _surface(mitsuba, picture, active, of_face[face], piece)
         made.append(mesh(mitsuba, piece.triangles, surface, texels(piece)))
     return made
+
+
+def _of_material(mitsuba, solid: Solid, here: np.ndarray, bsdf: dict) -> list[Any]:
+    """Faces ``here``, bool (F,): the plane ones as one mesh, curved ones as they are."""
+    flat = (here & ~stands_for(solid))[solid.triangle_faces]
+    plane = [mesh(mitsuba, solid.triangles[flat], bsdf)] if flat.any() else []
+    return plane + curved_shapes(mitsuba, solid, bsdf, here)
 
 
 def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material, part: Face | None = None) -> dict:

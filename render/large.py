@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter
 
 from planner import edges_of
 from planner.imaging.projection import project
-from render.adaptive import MISSED, crossed
+from render.adaptive import MISSED, crossed, limb_pieces
 from scenes import Picture
 
 LARGE = 1 << 20  # pixels of an image whose fine pixels are not all rendered
@@ -97,10 +97,14 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
     circles = {circle.name: circle.edges for circle in scene.solid.circles}
+    limbs = [each for each in scene.solid.curved if each.name in edges_of(scene)]
+    circles |= dict.fromkeys((each.name for each in limbs), ())
     names = [piece for name in edges_of(scene) for piece in circles.get(name, (name,))]
-    ends = scene.solid.vertices[[scene.solid.edge(name).ends for name in names]]
+    ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
-    x, y = np.nan_to_num(project(places, np.array(list(picture.sensor)), scene.camera), nan=-1e9).T
+    places = project(places, np.array(list(picture.sensor)), scene.camera)
+    pieces = [np.linspace(*ends, 2 + max(shape)) for each in limbs for ends in limb_pieces(picture, each)]
+    x, y = np.nan_to_num(np.concatenate([places, *pieces]), nan=-1e9).T
     column, row = np.rint(x - left).astype(int), np.rint(y - top).astype(int)
     inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
     found = np.zeros(shape, bool)

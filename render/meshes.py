@@ -8,13 +8,14 @@ import numpy as np
 
 
 def mesh(
-    mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None, emitter: dict | None = None
-) -> Any:
+    mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None, emitter: dict | None = None,
+    normals: np.ndarray | None = None,
+) -> Any:  # fmt: skip
     """Triangles, shape (T, 3, 3), and where their corners lie in a texture, shape (T, 3, 2), if they have one.
 
     With an ``emitter`` their outside shines.
 
-    Without vertex normals Mitsuba shades each triangle by its own plane: exactly flat.
+    Without ``normals`` of the corners, shape (T, 3, 3), Mitsuba shades each triangle by its own plane: exactly flat.
     """
     properties = mitsuba.Properties()
     properties["bsdf"] = mitsuba.load_dict(bsdf)
@@ -22,11 +23,14 @@ def mesh(
         properties["emitter"] = mitsuba.load_dict(emitter)
     corners = triangles.reshape(-1, 3)
     sizes = {"vertex_count": len(corners), "face_count": len(triangles)}
-    shape = mitsuba.Mesh("solid", **sizes, props=properties, has_vertex_texcoords=texels is not None)
+    has = {"has_vertex_texcoords": texels is not None, "has_vertex_normals": normals is not None}
+    shape = mitsuba.Mesh("solid", **sizes, props=properties, **has)
     values = mitsuba.traverse(shape)
     values["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
     values["faces"] = np.arange(len(corners), dtype=np.uint32)
     if texels is not None:
         values["vertex_texcoords"] = np.ascontiguousarray(texels, np.float32).ravel()
+    if normals is not None:
+        values["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
     values.update()
     return shape

@@ -7,12 +7,15 @@ from scenes.lens import Lens
 from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
 from scenes.materials import FaceMaterial, Material
-from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance
+from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance, Wall
 from scenes.noise import Noise
+from scenes.parts.ball import Ball
 from scenes.parts.block import Block
+from scenes.parts.curved import Curved
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Circle, Edge, Solid, block
 from scenes.parts.step_file import Step
+from scenes.parts.turned import Turned
 from scenes.picture import Picture, mounted
 from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
@@ -23,10 +26,10 @@ from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "AnyLight", "Backlight", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Disc", "Dome", "Edge",
-    "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp", "Lens", "Light", "Locator",
-    "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture", "Pose", "Quantity", "Ring", "Scene",
-    "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task", "Tolerance", "Uncertain", "UncertainNumber",
-    "Uncertainty", "Unit", "as_point", "block", "find", "load",
-    "mounted", "names", "pairs", "several", "shown",
+    "UNITS", "AnyLight", "Backlight", "Ball", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Curved",
+    "Disc", "Dome", "Edge", "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp",
+    "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture",
+    "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task",
+    "Tolerance", "Turned", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "Wall", "as_point", "block",
+    "find", "load", "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

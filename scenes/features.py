@@ -6,14 +6,14 @@ from itertools import combinations
 
 import numpy as np
 
-from scenes.measurands import Centre, Corner, Quantity, Side
+from scenes.measurands import Centre, Corner, Quantity, Side, Wall
 from scenes.parts.solid import Solid
 
 _FLAT = 1e-6  # of the object's size: how far a feature may be from the plane of the others
 _PARALLEL = 1e-6  # sine of an angle that is none
 
 
-def check_feature(solid: Solid, key: str, feature: Corner | Centre | Side) -> None:
+def check_feature(solid: Solid, key: str, feature: Corner | Centre | Side | Wall) -> None:
     """See that the object has a feature.
 
     Raises
@@ -21,7 +21,7 @@ def check_feature(solid: Solid, key: str, feature: Corner | Centre | Side) -> No
     ValueError
         If it has not.
     """
-    check = {Corner: _check_corner, Centre: _check_centre, Side: _check_side}[type(feature)]
+    check = {Corner: _check_corner, Centre: _check_centre, Side: _check_side, Wall: _check_wall}[type(feature)]
     check(solid, key, feature)
 
 
@@ -48,13 +48,15 @@ def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:
         raise ValueError(f"{key} must be edges within 30 degrees of parallel, got {', '.join(quantity.edges)}")
 
 
-def place_of(feature: Corner | Centre | Side) -> str:
-    """Name of the vertex, circle or edge that a feature is."""
-    return getattr(feature, {Corner: "vertex", Centre: "circle", Side: "edge"}[type(feature)])
+def place_of(feature: Corner | Centre | Side | Wall) -> str:
+    """Name of the vertex, circle, edge or surface that a feature is."""
+    return getattr(feature, {Corner: "vertex", Centre: "circle", Side: "edge", Wall: "surface"}[type(feature)])
 
 
-def point_of(solid: Solid, feature: Corner | Centre) -> np.ndarray:
+def point_of(solid: Solid, feature: Corner | Centre | Wall) -> np.ndarray:
     """Where a corner or a centre is in space, shape (3,)."""
+    if isinstance(feature, Wall):
+        return solid.round(feature.surface).centre
     return solid.circle(feature.circle).centre if isinstance(feature, Centre) else solid.vertex(feature.vertex)
 
 
@@ -78,6 +80,8 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     circles = [solid.circle(f.circle) for f in quantity.features if isinstance(f, Centre)]
     points = points_of(solid, quantity)
     near = _FLAT * solid.extent
+    if any(isinstance(feature, Wall) for feature in quantity.features):
+        return None
     if circles:
         flat = (np.abs((points - circles[0].centre) @ circles[0].axis) <= near).all()
         return circles[0].axis if flat else None
@@ -118,6 +122,12 @@ def _check_centre(solid: Solid, key: str, centre: Centre) -> None:
     known = [circle.name for circle in solid.circles]
     if centre.circle not in known:
         raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
+
+
+def _check_wall(solid: Solid, key: str, wall: Wall) -> None:
+    known = [curved.name for curved in solid.curved]
+    if wall.surface not in known:
+        raise ValueError(f"{key}.surface must be one of {', '.join(known) or '(none here)'}, got {wall.surface!r}")
 
 
 def _check_side(solid: Solid, key: str, side: Side) -> None:

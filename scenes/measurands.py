@@ -17,10 +17,10 @@ _WANTED = {
     "width": "ee",
     "offset": "pe",
     "angle": "ee",
-    "diameter": "c",
+    "diameter": "r",
     "position": "pee",
-}  # of each kind the features in their order: p a corner or centre, c a centre, e an edge
-_WORDS = {"p": "a corner or a circle", "c": "a circle", "e": "an edge"}
+}  # of each kind the features in their order: p a corner or centre, r a circle or a curved surface, e an edge
+_WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "e": "an edge"}
 
 
 class Corner(Model):
@@ -41,6 +41,18 @@ class Centre(Model):
         return (self.circle,)
 
 
+class Wall(Model):
+    """A curved surface of the object, by its limb."""
+
+    surface: str
+    """Its name."""
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Its own name."""
+        return (self.surface,)
+
+
 class Side(Model):
     """A straight edge."""
 
@@ -54,7 +66,7 @@ class Side(Model):
 
 
 def _tag_of_feature(value: Any) -> str:
-    for tag, kind, key in (("centre", Centre, "circle"), ("side", Side, "edge")):
+    for tag, kind, key in (("centre", Centre, "circle"), ("side", Side, "edge"), ("wall", Wall, "surface")):
         if isinstance(value, kind) or (isinstance(value, dict) and key in value):
             return tag
     return "corner"
@@ -62,7 +74,10 @@ def _tag_of_feature(value: Any) -> str:
 
 Feature = Annotated[Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")], Discriminator(_tag_of_feature)]
 AnyFeature = Annotated[
-    Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")] | Annotated[Side, Tag("side")],
+    Annotated[Corner, Tag("corner")]
+    | Annotated[Centre, Tag("centre")]
+    | Annotated[Side, Tag("side")]
+    | Annotated[Wall, Tag("wall")],
     Discriminator(_tag_of_feature),
 ]
 
@@ -113,7 +128,7 @@ class Quantity:
 
     name: str
     kind: str
-    features: tuple[Corner | Centre | Side, ...]
+    features: tuple[Corner | Centre | Side | Wall, ...]
     nominal: float | None = None
     tolerance: Tolerance | None = None
     weight: float = 1.0
@@ -134,7 +149,8 @@ class Measurand(Model):
 
     ``distance`` between two corners or centres of circles; ``width`` from the middle of the first edge to the line of
     the second; ``offset`` of a corner or centre from the line of an edge; ``angle`` between two edges; ``diameter`` of
-    a circle; ``position`` of a corner or centre from two datum edges, as two offsets with two nominal values.
+    a circle, a ball or a round wall, a cone's in its middle; ``position`` of a corner or centre from two datum edges,
+    as two offsets with two nominal values.
     """
 
     name: Title
@@ -175,8 +191,8 @@ class Measurand(Model):
         )
 
 
-def _is(wanted: str, feature: Corner | Centre | Side) -> bool:
-    kinds = {"p": (Corner, Centre), "c": Centre, "e": Side}
+def _is(wanted: str, feature: Corner | Centre | Side | Wall) -> bool:
+    kinds = {"p": (Corner, Centre), "r": (Centre, Wall), "e": Side}
     return isinstance(feature, kinds[wanted])
 
 

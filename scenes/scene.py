@@ -22,10 +22,12 @@ from scenes.materials import FaceMaterial, Material
 from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
 from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
+from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
 from scenes.parts.solid import Solid, assembled
 from scenes.parts.step_file import Step
+from scenes.parts.turned import Turned
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.surfaces import Surfaces, surfaces
@@ -44,7 +46,11 @@ def _tag_of_object(value: Any) -> str:
 
 
 Object = Annotated[
-    Annotated[Block, Tag("block")] | Annotated[Mesh, Tag("mesh")] | Annotated[Step, Tag("step")],
+    Annotated[Block, Tag("block")]
+    | Annotated[Mesh, Tag("mesh")]
+    | Annotated[Step, Tag("step")]
+    | Annotated[Ball, Tag("ball")]
+    | Annotated[Turned, Tag("turned")],
     Discriminator(_tag_of_object),
 ]
 
@@ -248,6 +254,7 @@ class Scene(Model):
         check_names("lamps", self.lamps)
         check_names("filters", self.filters)
         _ = self.surfaces  # names of faces
+        self._check_curved()
         check_textures(self.textures, self.solid)
         check_uncertain(self, self.uncertain)
         self.uncertainty.check_once(self.uncertain)
@@ -316,6 +323,15 @@ class Scene(Model):
             raise ValueError(
                 f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(task.end, key)!r}"
             )
+
+    def _check_curved(self) -> None:
+        """What limbs are not known with."""
+        if not self.solid.curved:
+            return
+        if self.camera.lens.bends:
+            raise ValueError("camera.lens must be without distortion for a curved object, got one that bends")
+        if self.textures:
+            raise ValueError(f"textures must be none for a curved object, got {len(self.textures)}")
 
     def _check_surroundings(self) -> None:
         """Floor below the object."""

@@ -7,14 +7,15 @@ change of the radius. The centre so found is the circle's own, not that of the e
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
 from measure import status
-from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_along
+from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
+from measure.features.tools import RimTool, held
 from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
 from planner.features.locator import MIN_CONTRAST, edge_blur, reach
 from planner.features.rim_look import RimLook, look, places_around
@@ -24,7 +25,7 @@ from planner.features.seen import plane_axes
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project_ideal
-from scenes import Circle, Picture
+from scenes import Circle, Curved, Picture
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places
@@ -36,53 +37,6 @@ _PASSES = 6
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 
 
-@dataclass(frozen=True, eq=False)
-class RimTool:
-    """What measures one circle from one expected place.
-
-    Attributes
-    ----------
-    locator : CrossingLocator
-    design : ndarray, shape (m, 3)
-        Derivative of each place's offset by the circle's parameters, ideal px for the scene's unit.
-    weights : ndarray, shape (m,)
-        Of the places in the least squares: the length that each stands for, and where the light is known the squared
-        contrast over the noise's variance; 0 where it is not taken.
-    inward : ndarray, shape (m,)
-        How far inside the rim the zero crossing lies, for the rim is curved and its sides are uneven, ideal px.
-    state : str
-        ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
-    optics : Optics
-    """
-
-    locator: CrossingLocator
-    design: np.ndarray
-    weights: np.ndarray
-    inward: np.ndarray
-    state: str
-    optics: Optics
-
-    @cached_property
-    def response(self):
-        """Derivative of the offsets by the locator's pixels at unit contrast, (m, P)."""
-        return self.locator.unit_response()
-
-    def fit(self, valid: np.ndarray) -> np.ndarray:
-        """Least-squares maps (n, 3, m) from offsets at the valid places (n, m) to the circle's parameters."""
-        weights = self.weights * valid
-        gram = np.einsum("nm,mi,mj->nij", weights, self.design, self.design)
-        scale = np.sqrt(np.einsum("nii->ni", gram))
-        good = (scale > 0).all(-1)
-        scale[~good], gram[~good] = 1.0, np.eye(3)
-        unit = gram / (scale[:, :, None] * scale[:, None, :])
-        good &= np.linalg.eigvalsh(unit)[:, 0] > 1e-8
-        unit[~good] = np.eye(3)
-        found = np.linalg.inv(unit) / (scale[:, :, None] * scale[:, None, :])
-        found = np.einsum("nij,mj,nm->nim", found, self.design, weights)
-        found[~good] = np.nan
-        return found
-
-
 @dataclass(frozen=True)
 class Circles:
     """One circle in n images.
@@ -90,7 +44,8 @@ class Circles:
     Attributes
     ----------
     errors : ndarray, shape (n, 3)
-        Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius.
+        Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius;
+        of a curved surface those of `Curved.parameters`.
     covariance : ndarray, shape (n, 3, 3)
     state : ndarray of str, shape (n,)
     near : ndarray of bool, shape (n,)
@@ -104,7 +59,7 @@ class Circles:
 
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
-    """A circle of the object in images (n, height, width)."""
+    """A circle or a curved surface of the object in images (n, height, width)."""
     return _find(images, picture, name, (0.0, 0.0, 0.0), _PASSES)
 
 
@@ -190,8 +145,10 @@ def _rounded(tool: RimTool, errors: np.ndarray) -> tuple[float, ...]:
 
 @lru_cache(maxsize=256)
 def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
-    """What measures a circle of the object, expected with some errors."""
+    """What measures a circle or a curved surface of the object, expected with some errors."""
     scene, solid = picture.scene, picture.scene.solid
+    if isinstance(solid.round(name), Curved):
+        return limb_tool(picture, solid.round(name), moved)
     optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
     angle = equal_angles(places_around(pictures, nominal, SPACING * optics.scale_px, _MOST))
@@ -216,14 +173,8 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
     weight, inward = np.where(taken, weight, 0.0), np.nan_to_num(inward)
     recorded_normals = gradient / size[:, None]
-    locator = gradient_along(optics, angle[keep], _held(places[keep], optics), recorded_normals[keep], size[keep])
+    locator = gradient_along(optics, angle[keep], held(places[keep], optics), recorded_normals[keep], size[keep])
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
-
-
-def _held(places: np.ndarray, optics: Optics) -> np.ndarray:
-    """Places, those outside the image held at its border: they are not taken, but a kernel needs pixels."""
-    margin = optics.window_px + 4 * optics.scale_px + 1
-    return np.clip(np.nan_to_num(places), margin, np.maximum(np.array(optics.shape[::-1]) - 1 - margin, margin))
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:

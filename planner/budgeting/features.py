@@ -14,6 +14,8 @@ import numpy as np
 
 from planner.budgeting.station import Station
 from planner.features.circles import Rim, rim
+from planner.features.limb_outline import limb_outline
+from planner.features.limbs import limb_rim
 from planner.features.locator import MIN_CONTRAST
 from planner.features.measurand import Measurands, measurands, normals
 from planner.features.rim_sides import equal_angles, outward_normals, radials
@@ -21,6 +23,7 @@ from planner.imaging.lens import undistorted
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import edge_points, project_ideal
 from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from scenes import Curved
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +81,22 @@ class Features:
         """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (3, n)."""
         found = []
         for name in self.known.circles:
-            circle = self.pictures.scene.solid.circle(name)
+            circle = self.pictures.scene.solid.round(name)
+            if isinstance(circle, Curved):
+                found.append(self._limb(circle))
+                continue
             seen = rim(self.pictures, circle)
             angle = equal_angles(seen.design.shape[-2])
             normal, _, _ = outward_normals(self.pictures, circle, angle)
             points = circle.centre + circle.radius * radials(circle, angle)
             found.append((points, normal, _fit(seen)))
         return found
+
+    def _limb(self, curved: Curved) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of a limb: to first order its image moves along its normal as a point of the surface there does."""
+        outline = limb_outline(curved, self.pictures.sensors, self.pictures.scene.camera)
+        points = np.where(outline.seen[:, None], outline.points, curved.centre)
+        return points, np.nan_to_num(outline.outward), _fit(limb_rim(self.pictures, curved))
 
     def _circle(self, station: Station, c: int) -> np.ndarray:
         points, normal, fit = self._rims[c]

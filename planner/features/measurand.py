@@ -159,7 +159,7 @@ def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
     starts = from_axis(solid.vertices[np.array([edge.ends[0] for edge in edges], int)], sensors, scene.camera)
     corners = corner_features(scene)
     images = from_axis(np.array([solid.vertex(c.vertex) for c in corners]).reshape(-1, 3), sensors, scene.camera)
-    rims = [solid.circle(name) for name in circles(scene)]
+    rims = [solid.round(name) for name in circles(scene)]
     lead = sensors.shape[:-1]
     return Seen(
         solid=solid,

@@ -16,7 +16,8 @@ from planner.imaging.lens import image_centre, recorded
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, from_axis
 from planner.imaging.visibility import longest_span, turned
-from scenes import Centre, Corner, Edge, Scene
+from scenes import Centre, Corner, Edge, Scene, Wall
+from scenes.features import place_of
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,9 @@ def straight(scene: Scene) -> tuple[str, ...]:
 
 
 def circles(scene: Scene) -> tuple[str, ...]:
-    """The different circles that they need."""
+    """The different circles and curved surfaces that they need."""
     features = (feature for quantity in scene.quantities for feature in quantity.features)
-    return tuple(dict.fromkeys(feature.circle for feature in features if isinstance(feature, Centre)))
+    return tuple(dict.fromkeys(place_of(feature) for feature in features if isinstance(feature, Centre | Wall)))
 
 
 def corner_features(scene: Scene) -> tuple[Corner, ...]:

@@ -42,6 +42,12 @@ def sampled_line(middle, tangent, length, blur_px: float, scale: float) -> tuple
     return mean, (amplitude * np.cos(phase) * lever).sum(-1) * 6 / length
 
 
+def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px: float, scale: float) -> np.ndarray:
+    """Shift (...) along unit normals (..., 2), px, of a lone edge's crossing at places (..., 2), px."""
+    amplitude = np.interp(normals @ _ORDERS.T, _TABLE, _amplitudes(blur_px, scale))
+    return (amplitude * np.sin(2 * np.pi * places @ _ORDERS.T)).sum(-1)
+
+
 @lru_cache(maxsize=16)
 def _amplitudes(blur_px: float, scale: float) -> np.ndarray:
     """Largest shift, px, of the crossing by one of `_ORDERS` for the cosines of `_TABLE`; its sine goes with the phase.

@@ -2,7 +2,8 @@
 
 The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px)
 at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
-change of its radius (the scene's unit). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E; then 2 E +
+change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
+`Curved.parameters`. They are numbered in that order: 2 e, 2 e + 1 for the edge e of E; then 2 E +
 3 c, ... for the circle c. Image coordinates are ideal px from the image's middle, in which lines are straight.
 """
 
@@ -15,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.imaging.projection import Frame, frame, sensor_position
-from scenes import Camera, Centre, Circle, Corner, Side, Solid
+from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
 from scenes.features import place_of, point_of
 
 Moves = Mapping[int, np.ndarray]
@@ -94,9 +95,9 @@ class Seen:
     def axes(self) -> Frame:
         return frame(self.sensors)
 
-    def point(self, feature: Corner | Centre, plane: np.ndarray | None) -> Point:
+    def point(self, feature: Corner | Centre | Wall, plane: np.ndarray | None) -> Point:
         """A corner or a centre: in the image, or on the plane of a unit normal (..., 3)."""
-        if isinstance(feature, Centre):
+        if isinstance(feature, Centre | Wall):
             return self._centre(feature, plane is not None)
         at, moves = self.corners[feature], self._corner_moves(feature)
         found = Point(at, moves)
@@ -126,12 +127,16 @@ class Seen:
         found = Point(at, moves)
         return found if plane is None else self.onto(found, plane, ends.mean(0))
 
-    def circle(self, feature: Centre) -> tuple[Circle, Point, np.ndarray, int]:
-        """A circle, its centre in space, its radius (...) and the number of its radius among the parameters."""
-        c = self.circles.index(feature.circle)
-        circle, first = self.solid.circle(feature.circle), 2 * len(self.names) + 3 * c
-        moves = {first + i: axis for i, axis in enumerate(plane_axes(circle.axis))}
+    def circle(self, feature: Centre | Wall) -> tuple[Circle | Curved, Point, np.ndarray, int]:
+        """A circle or a curved surface, its centre, its radius (...) and the number of that among the parameters."""
+        c = self.circles.index(place_of(feature))
+        circle, first = self.solid.round(place_of(feature)), 2 * len(self.names) + 3 * c
+        moves = {first + i: axis for i, axis in enumerate(self.sideways(circle))}
         return circle, Point(self.centres[..., c, :], moves), self.radii[..., c], first + 2
+
+    def sideways(self, each: Circle | Curved) -> tuple[np.ndarray, np.ndarray]:
+        """The two directions (..., 3) in which the centre of a circle or a curved surface is found."""
+        return each.sideways(self.eye) if isinstance(each, Curved) else plane_axes(each.axis)
 
     def depth(self, places: np.ndarray) -> np.ndarray:
         """Distance of places (..., 3) from the sensor along its axis, shape (...)."""
@@ -141,7 +146,7 @@ class Seen:
         """The same of points (n, 3), shape (..., n)."""
         return np.einsum("...ni,...i->...n", points - self.eye[..., None, :], self.axes.forward)
 
-    def _centre(self, feature: Centre, in_space: bool) -> Point:
+    def _centre(self, feature: Centre | Wall, in_space: bool) -> Point:
         _, point, _, _ = self.circle(feature)
         if in_space:
             return point

@@ -40,8 +40,9 @@ class EdgeContrast(NamedTuple):
 
 
 def is_plain(scene: Scene) -> bool:
-    """Whether there is one convex body before darkness: nothing hides, shades, or is seen behind an edge."""
-    return scene.bodies.is_convex and not has_background(scene)
+    """Whether there is one convex body of plane faces before darkness: nothing hides, shades, or is seen behind an
+    edge."""
+    return scene.bodies.is_convex and not has_background(scene) and not scene.solid.curved
 
 
 def has_background(scene: Scene) -> bool:

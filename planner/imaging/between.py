@@ -18,10 +18,10 @@ from scenes import Scene
 def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
     """Signal that points (..., 3) on faces (...) of the object have from its other faces.
 
-    Diffuse light alone; 0 on faces of obstacles and in pictures that are not looked at closely.
+    Diffuse light alone; 0 on faces of obstacles, of turned parts, and in pictures that are not looked at closely.
     """
     scene = pictures.scene
-    if not pictures.closely or scene.solid.is_convex or not points.size:
+    if not pictures.closely or scene.solid.is_convex or scene.solid.curved or not points.size:
         return 0.0
     shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])

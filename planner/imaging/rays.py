@@ -11,6 +11,7 @@ from scenes import Solid
 
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
+_MANY, _FEW = 2000, 64  # triangles from which on so few rays are a bundle: those of one pose run close to each other
 _ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 
@@ -38,8 +39,9 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
     shape = origins.shape[:-1]
     origins, vectors = origins.reshape(-1, 3), vectors.reshape(-1, 3)
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
-    for at in range(0, len(origins), _BUNDLE):
-        bundle = slice(at, at + _BUNDLE)
+    together = _BUNDLE if len(plates.faces) <= _MANY else _FEW
+    for at in range(0, len(origins), together):
+        bundle = slice(at, at + together)
         near = plates.some(_may_meet(plates, origins[bundle], vectors[bundle]))
         face[bundle], t[bundle] = _first(near, origins[bundle], vectors[bundle])
     return face.reshape(shape), t.reshape(shape)

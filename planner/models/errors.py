@@ -13,8 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from planner.features.circles import Rim, rim
+from planner.features.limbs import limb_rim
 from planner.features.measurand import Measurands, measurands
 from planner.imaging.pictures import Pictures
+from scenes import Circle, Curved
 
 LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -101,11 +103,15 @@ def combined(
     """From the lines' and the circles' errors to those of all quantities."""
     known, solid = measurands(pictures), pictures.scene.solid
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        rims = [rim(pictures, solid.circle(name), fall_off=fall_off) for name in known.circles]
+        rims = [_outline(pictures, solid.round(name), fall_off) for name in known.circles]
         circles = tuple(circle_covariance(each) for each in rims)
     noise = np.broadcast_to(noise_variance, contrast2.shape)
     crowded = tuple(each.crowded for each in rims)
     return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded)
+
+
+def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> Rim:
+    return limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each, fall_off=fall_off)
 
 
 def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner import Pictures
-from render.phenomena.base import NOTHING, Effect, Influence, Tolerance
+from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Tolerance
 from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
 from render.phenomena.pose import PoseJitter
 from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
@@ -153,7 +153,8 @@ def _decide(effect: Effect, pictures: Pictures, tolerance: Tolerance) -> Decisio
     absent = effect.absent(pictures)
     if absent is not None:
         return Decision(effect, False, absent, NOTHING)
-    influence = effect.influence(pictures)
+    # formulas of influence are those of edges: of a limb all is simulated that can matter
+    influence = EVERYTHING if pictures.scene.solid.curved else effect.influence(pictures)
     if effect.cost == 1.0:
         return Decision(effect, True, "free", influence)
     on = tolerance.exceeded_by(influence)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from scenes.parts.curved import Curved
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -81,6 +83,8 @@ class Solid:
         Vertex indices of each face's inner boundaries, clockwise seen from outside; empty where no face has any.
     face_names : tuple of str
         One name a face; f1, f2, ... when not given.
+    curved : tuple of Curved
+        Surfaces that some of the faces stand for.
     """
 
     vertex_names: tuple[str, ...]
@@ -92,6 +96,7 @@ class Solid:
     circles: tuple[Circle, ...] = ()
     holes: tuple[tuple[tuple[int, ...], ...], ...] = ()
     face_names: tuple[str, ...] = ()
+    curved: tuple[Curved, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.face_names:
@@ -186,6 +191,10 @@ class Solid:
         """The named circular edge."""
         return next(circle for circle in self.circles if circle.name == name)
 
+    def round(self, name: str) -> Circle | Curved:
+        """The named circular edge or curved surface."""
+        return next(each for each in (*self.circles, *self.curved) if each.name == name)
+
     def mesh(self) -> trimesh.Trimesh:
         """The surface as triangles, vertices merged, normals outwards."""
         import trimesh
@@ -243,7 +252,8 @@ def block(size: tuple[float, float, float]) -> Solid:
 
 
 def assembled(first: Solid, *others: Solid) -> Solid:
-    """Several solids as one; names of the others' parts are marked by a number, circles are those of the first.
+    """Several solids as one; names of the others' parts are marked by a number, circles and curved
+    surfaces are those of the first.
 
     Examples
     --------
@@ -282,5 +292,6 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         triangles=np.concatenate(triangles),
         triangle_faces=np.concatenate(owners),
         circles=first.circles,
+        curved=first.curved,
         face_names=tuple(face_names),
     )

@@ -73,7 +73,11 @@ def levels_inside(
 def sampled_profile(surface: Surface, strand: Strand, sensor, camera: Camera, lamps: Lamps, reach: float) -> Profile:
     """The profile over ``reach`` px, nearly best: through the exact level at Chebyshev's places of sqrt(d)."""
     places = (chebyshev.chebpts1(_NODES) + 1) / 2
-    levels = levels_inside(surface, strand, sensor, camera, reach * places**2, lamps)
+    return fitted(places, levels_inside(surface, strand, sensor, camera, reach * places**2, lamps), reach)
+
+
+def fitted(places: np.ndarray, levels: np.ndarray, reach: float) -> Profile:
+    """The profile over ``reach`` px through levels (n, J) at ``places`` (J,), roots of shares of the reach."""
     scaled = np.vander(places, _ORDER + 1, increasing=True)
     solved = np.linalg.lstsq(scaled, levels.T)[0]
     left_out = np.abs(levels.T - scaled @ solved).max(0)

@@ -1,0 +1,64 @@
+"""What measures a curved surface by its limb: places along it, a locator there, and the least squares of three numbers.
+
+Where the light is known the shift by the shading, which is no step, is taken off; else a limb beside darkness is
+measured as `clutter`, for nobody knows how its level falls.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from measure import status
+from measure.estimators.gradient import gradient_along
+from measure.features.optics import Optics
+from measure.features.tools import RimTool, held
+from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
+from planner.features.limb_look import LimbLook, limb_look, seen_along
+from planner.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
+from planner.features.locator import MIN_CONTRAST, edge_blur
+from planner.imaging.lens import image_centre
+from planner.imaging.pictures import Pictures
+from scenes import Curved, Picture
+
+_SPACING = 2.0  # smoothing scales between places
+_MOST = 64  # times the planner's places
+
+
+def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> RimTool:
+    """What measures a curved surface, expected with errors of its three parameters."""
+    scene, pictures = picture.scene, Pictures.of(picture)
+    optics, curved = Optics.of(scene), nominal.moved(pictures.sensor_at, moved)
+    outline = limb_outline(curved, pictures.sensors, scene.camera, _count(pictures, nominal, optics))
+    seen = limb_look(pictures, curved, outline) if pictures.lights else None
+    weight, state = _weights(pictures, curved, outline, seen)
+    width = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
+    inward = np.nan_to_num(outline.curvature) * width**2 / 2 if seen is None else -seen.shift
+    keep = np.flatnonzero(weight > 0) if (weight > 0).any() else np.arange(1)
+    normals = np.where(outline.seen[:, None], outline.outward, [1.0, 0.0])
+    crossings = np.nan_to_num(outline.at) - inward[:, None] * normals  # a pixel may lie between
+    places, none = held(crossings + image_centre(scene.camera), optics), np.zeros(len(keep))
+    locator = gradient_along(optics, np.arange(float(len(weight)))[keep], places[keep], normals[keep])
+    return RimTool(locator, np.nan_to_num(outline.design)[keep], weight[keep], none, state, optics)
+
+
+def _count(pictures: Pictures, curved: Curved, optics: Optics) -> int:
+    """Places about `_SPACING` smoothing scales apart, a multiple of the planner's."""
+    length = np.nansum(limb_outline(curved, pictures.sensors, pictures.scene.camera).arc)
+    return LIMB_POINTS * int(np.clip(np.ceil(length / (_SPACING * optics.scale_px * LIMB_POINTS)), 1, _MOST))
+
+
+def _weights(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook | None) -> tuple[np.ndarray, str]:
+    """Weights of places (n,), 0 where they are not taken, and the status that this makes; rules as of circles."""
+    shown, arc = seen_along(pictures, curved, outline), np.nan_to_num(outline.arc)
+    if shown.sum() < LEAST_SEEN * shown.size:
+        return np.zeros(shown.size), status.NOT_VISIBLE
+    clear = clear_of_ends(outline, pictures.scene)
+    if seen is None:
+        return np.where(shown & clear, arc, 0.0), status.CLUTTER
+    strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
+    if strong.mean() < LEAST_SEEN:
+        return np.zeros(shown.size), status.LOW_CONTRAST
+    weight, good = arc * seen.squared / seen.noise_variance, strong & seen.good & clear
+    if good.mean() < max(LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR), LEAST_SEEN):
+        return np.where(strong, weight, 0.0), status.CLUTTER
+    return np.where(good, weight, 0.0), status.OK
