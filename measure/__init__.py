@@ -9,6 +9,8 @@ from measure.features.relations import line_angle, point_distance
 from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse
 from measure.find.search import find
+from measure.fitting.fit import fit
+from measure.fitting.result import Fit
 from measure.measurands import Measurements, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
@@ -26,6 +28,7 @@ __all__ = [
     "Candidate",
     "EdgeResponse",
     "Ellipse",
+    "Fit",
     "Found",
     "Lens",
     "MeasuredValue",
@@ -44,6 +47,7 @@ __all__ = [
     "distances",
     "find",
     "find_ellipse",
+    "fit",
     "fit_ellipse",
     "image_bound",
     "line_angle",

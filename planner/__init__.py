@@ -8,6 +8,7 @@ from planner.features.measurand import required_edges
 from planner.features.projected_edges import projected_edges
 from planner.forecast import Forecast
 from planner.imaging.pictures import Pictures
+from planner.imaging.whole import image
 from planner.jitter import PoseSpread, pose_scatter, pose_spread
 from planner.maps import Map, pose_map, variance_map
 from planner.planning import Candidate, Plan, plan
@@ -48,6 +49,6 @@ __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
     "Forecast", "Map", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
     "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "edges_of", "exhaustive",
-    "local_minima", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "pose_spread", "predict",
-    "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "image", "local_minima", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "pose_spread",
+    "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

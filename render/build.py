@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.imaging.appearance import analyser_axis
 from planner.imaging.irradiance import bands
-from planner.imaging.projection import frame
+from planner.imaging.projection import camera_frame
 from planner.imaging.reflectance import Index, diffuse
 from planner.imaging.sheets import sheets
 from render import bsdf, lights
@@ -156,7 +156,7 @@ def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Materi
 def view(mitsuba, picture: Picture, active, size, crop, samples: int) -> dict:
     """Description of the sensor, for a crop of the whole frame of fine pixels."""
     scene, sensor = picture.scene, picture.sensor
-    camera, axes = scene.camera, frame(np.array(list(sensor)))
+    camera, axes = scene.camera, camera_frame(scene.camera, np.array(list(sensor)))
     position = scene.position("sensor", sensor)
     rows, columns = crop
     lens = {"type": "perspective"}

@@ -11,7 +11,7 @@ from planner.imaging.appearance import analyser_axis, polarisation_axis
 from planner.imaging.backlight import passed
 from planner.imaging.emitters import emitters, nodes, reach_of
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame, light_position
+from planner.imaging.projection import Frame, light_frame, light_position
 from render.bsdf import Lamp
 from render.meshes import mesh
 from scenes import Backlight, Bar, Disc, Dome, Light, Luminaire, Picture, Pose, Ring, Scene
@@ -36,7 +36,8 @@ def seen(mitsuba: Any, picture: Picture) -> dict:
     light, poses = picture.scene.lights[0], np.array(list(picture.lights[0]))
     pictures = Pictures.of(picture)
     part = passed(pictures, 0, analyser_axis(picture.scene, pictures.sensors))
-    world = _frame(mitsuba, poses, pictures.lights_at[0]) @ _sides(mitsuba, light)
+    axes = light_frame(picture.scene.camera, light, poses)
+    world = _frame(mitsuba, axes, pictures.lights_at[0]) @ _sides(mitsuba, light)
     radiance = picture.scene.camera.exposure * light.intensity * float(np.squeeze(part))
     return {"light0": _shining({"type": "rectangle", "to_world": world}, radiance)}
 
@@ -55,23 +56,23 @@ def lamps(picture: Picture, active: frozenset[str]) -> tuple[Lamp, ...]:
 def _emitters(mitsuba: Any, scene: Scene, light: Luminaire, pose: Pose) -> list[Any]:
     """One light. A white Lambertian surface sends exposure / pi of what a light of intensity 1 gives it."""
     exposure, poses = math.pi * scene.camera.exposure, np.array(list(pose))
-    position = light_position(scene.camera, light, poses)
+    position, axes = light_position(scene.camera, light, poses), light_frame(scene.camera, light, poses)
     if isinstance(light, Light):
-        return [_ball(mitsuba, light, poses, position, exposure * light.intensity)]
+        return [_ball(mitsuba, light, axes, position, exposure * light.intensity)]
     if isinstance(light, Backlight) and light.cone_deg < 90:
         return _beams(scene, light, poses, exposure)
     made = nodes(light, reach_of(scene))
-    return [_area(mitsuba, light, poses, position, exposure * made.powers.sum() / made.area)]
+    return [_area(mitsuba, light, axes, position, exposure * made.powers.sum() / made.area)]
 
 
-def _ball(mitsuba: Any, light: Light, poses: np.ndarray, position: np.ndarray, white: float) -> dict:
+def _ball(mitsuba: Any, light: Light, axes: Frame, position: np.ndarray, white: float) -> dict:
     """A point, or a sphere; a disc where that is so small that Mitsuba's single precision would fail."""
     if light.radius == 0:
         value = {"type": "spectrum", "value": white * light.distance**2}
         return {"type": "point", "position": position.tolist(), "intensity": value}
     radiance = white * light.distance**2 / (math.pi * light.radius**2)
     if light.radius < _SMALL * light.distance:
-        disc = {"type": "disk", "to_world": _frame(mitsuba, poses, position).scale(light.radius)}
+        disc = {"type": "disk", "to_world": _frame(mitsuba, axes, position).scale(light.radius)}
         return _shining(disc, radiance)
     return _shining({"type": "sphere", "center": position.tolist(), "radius": light.radius}, radiance)
 
@@ -87,14 +88,13 @@ def _beams(scene: Scene, light: Backlight, poses: np.ndarray, exposure: float) -
     return found
 
 
-def _area(mitsuba: Any, light: Luminaire, poses: np.ndarray, position: np.ndarray, radiance: float):
+def _area(mitsuba: Any, light: Luminaire, axes: Frame, position: np.ndarray, radiance: float):
     """A flat light, or part of a cone or a sphere, of a radiance."""
-    world = _frame(mitsuba, poses, position)
+    world = _frame(mitsuba, axes, position)
     if isinstance(light, Disc):
         return _shining({"type": "disk", "to_world": world.scale(light.radius)}, radiance)
     if isinstance(light, Bar | Backlight):
         return _shining({"type": "rectangle", "to_world": world @ _sides(mitsuba, light)}, radiance)
-    axes = frame(poses)
     corners = _ring(light) if isinstance(light, Ring) else _dome(light)
     triangles = position + corners @ np.stack([axes.right, axes.down, axes.forward])
     emitter = {"type": "area", "radiance": {"type": "spectrum", "value": radiance}}
@@ -109,9 +109,8 @@ def _sides(mitsuba: Any, light: Bar | Backlight) -> Any:
     return turned.rotate([0, 0, 1], light.turn_deg).scale([light.length / 2, light.width / 2, 1.0])
 
 
-def _frame(mitsuba: Any, poses: np.ndarray, position: np.ndarray) -> Any:
+def _frame(mitsuba: Any, axes: Frame, position: np.ndarray) -> Any:
     """To the scene from a light's axes: right, down, and towards the reference point (parallel to it from aside)."""
-    axes = frame(poses)
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([axes.right, axes.down, axes.forward], -1)
     matrix[:3, 3] = position

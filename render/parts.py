@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.imaging.backlight import backlights
 from planner.imaging.lens import image_centre
-from planner.imaging.projection import frame
+from planner.imaging.projection import camera_frame, frame
 from render.texture import pointed
 from scenes import Picture
 
@@ -65,7 +65,8 @@ def _lone(picture: Picture, which: int) -> Picture:
 def within_cone(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
     """Fine pixels of a crop (rows, columns) whose rays run within the cone in which the picture's backlight shines."""
     camera, light = picture.scene.camera, picture.scene.lights[0]
-    sensor, towards = frame(np.array(list(picture.sensor))), frame(np.array(list(picture.lights[0]))).forward
+    sensor = camera_frame(camera, np.array(list(picture.sensor)))
+    towards = frame(np.array(list(picture.lights[0]))).forward
     y, x = (((np.arange(part.start, part.stop) + 0.5) / supersample - 0.5) for part in crop)
     middle = image_centre(camera)
     right, down = np.meshgrid((x - middle[0]) / camera.focal_px, (y - middle[1]) / camera.focal_px)

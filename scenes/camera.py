@@ -34,6 +34,9 @@ class Camera(Model):
     """What the light adds to darkness on a white diffuse surface at ``look_at`` that faces it [grey levels]."""
     look_at: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
     """The point that it looks at, centre of the spheres of poses; the origin as in the paper [length]."""
+    roll_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    """By which it is turned about its axis, from its image's right towards down; what is mounted at it turns too
+    [degrees]."""
     lens: Lens = Lens()
     """What makes the lens more than a pinhole."""
     analyser_deg: float | None = None

@@ -16,7 +16,7 @@ from planner.imaging.appearance import behind, has_background, signal
 from planner.imaging.lens import image_centre
 from planner.imaging.limbs.shading import Profile, fitted
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame
+from planner.imaging.projection import camera_frame
 from planner.imaging.rays import first_face
 from scenes import Curved
 
@@ -119,7 +119,7 @@ def _profile(
     places = np.sort((chebyshev.chebpts1(_NODES) + 1) / 2)
     away = (far * places**2)[:, None]
     at = np.nan_to_num(outline.at)[..., None, :] - away * np.nan_to_num(outline.outward)[..., None, :]
-    axes, eye = frame(pictures.sensors), pictures.sensor_at[..., None, None, :]
+    axes, eye = camera_frame(pictures.scene.camera, pictures.sensors), pictures.sensor_at[..., None, None, :]
     right, down, forward = (axis[..., None, None, :] for axis in (axes.right, axes.down, axes.forward))
     way = at[..., :1] * right + at[..., 1:] * down + camera.focal_px * forward
     met = curved.surface.intersections(np.broadcast_to(eye, way.shape), way)

@@ -18,7 +18,7 @@ from planner.imaging import sensor
 from planner.imaging.appearance import seen_by_rays
 from planner.imaging.lens import image_centre, lens_jacobian
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame, from_axis
+from planner.imaging.projection import camera_frame, from_axis
 from scenes import Circle
 
 _BESIDE, _SHARES = np.array([-np.sqrt(3), 0.0, np.sqrt(3)]), np.array([1, 4, 1]) / 6  # Gauss-Hermite, tangentially
@@ -166,7 +166,7 @@ def _uneven(levels: np.ndarray) -> np.ndarray:
 
 def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     """Signal at image points (k, 2) from the image's middle, ideal px."""
-    axes = frame(pictures.sensors)
+    axes = camera_frame(pictures.scene.camera, pictures.sensors)
     rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points) @ np.stack([axes.right, axes.down])
     return seen_by_rays(pictures, rays)
 

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.imaging.projection import Frame, frame, sensor_position
+from planner.imaging.projection import Frame, camera_frame, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
 from scenes.features import place_of, point_of
 
@@ -93,7 +93,7 @@ class Seen:
 
     @cached_property
     def axes(self) -> Frame:
-        return frame(self.sensors)
+        return camera_frame(self.camera, self.sensors)
 
     def point(self, feature: Corner | Centre | Wall, plane: np.ndarray | None) -> Point:
         """A corner or a centre: in the image, or on the plane of a unit normal (..., 3)."""

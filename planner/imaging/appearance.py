@@ -17,7 +17,7 @@ from planner.imaging.between import light_between
 from planner.imaging.emitters import is_point
 from planner.imaging.irradiance import bands, beam, electric_field, squared_distance, widened
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, facing, frame
+from planner.imaging.projection import camera_frame, edge_points, facing
 from planner.imaging.rays import first_face, reaches
 from planner.imaging.reflectance import diffuse, reflected
 from planner.imaging.sheets import printed
@@ -168,7 +168,7 @@ def analyser_axis(scene: Scene, sensors: np.ndarray) -> np.ndarray | None:
     """Direction in space that the analyser passes, shape (..., 3); None without one."""
     if scene.camera.analyser_deg is None:
         return None
-    axes, angle = frame(sensors), np.radians(scene.camera.analyser_deg)
+    axes, angle = camera_frame(scene.camera, sensors), np.radians(scene.camera.analyser_deg)
     return np.cos(angle) * axes.right + np.sin(angle) * axes.down
 
 

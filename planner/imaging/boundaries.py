@@ -14,7 +14,7 @@ from planner.imaging.appearance import face_signal, is_plain, side_signals
 from planner.imaging.between import light_between
 from planner.imaging.blurred_segment import Segments
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import depth, edge_points, facing, frame, from_axis
+from planner.imaging.projection import camera_frame, depth, edge_points, facing, from_axis
 from planner.imaging.visibility import seen as visible_at
 from scenes import Edge, Solid
 
@@ -188,7 +188,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     """
     scene, solid, camera = pictures.scene, pictures.scene.solid, pictures.scene.camera
     of_each = Pictures(scene, *_of_each(pictures, picture), pictures.closely)
-    at, axes = of_each.sensor_at[:, None], frame(of_each.sensors)
+    at, axes = of_each.sensor_at[:, None], camera_frame(camera, of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
     near, far = (depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
     spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))

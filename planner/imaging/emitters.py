@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.imaging.projection import frame, light_position
+from planner.imaging.projection import light_frame, light_position
 from scenes import AnyLight, Backlight, Bar, Camera, Disc, Dome, Light, Luminaire, Scene
 
 ERROR = 1e-5  # of the irradiance, of a light that nothing hides a part of
@@ -85,7 +85,8 @@ def reach_of(scene: Scene) -> float:
 
 
 def _placed(camera: Camera, light: Luminaire, which: int, poses: np.ndarray, made: Nodes) -> list[Emitter]:
-    middle, axes = light_position(camera, light, poses), np.stack(frame(poses), -2)  # (..., 3 axes, 3)
+    middle = light_position(camera, light, poses)
+    axes = np.stack(light_frame(camera, light, poses), -2)  # (..., 3 axes, 3)
     found = []
     for k, power in enumerate(made.powers.tolist()):
         normal = None if made.normals is None else np.einsum("a,...ai->...i", made.normals[k], axes)

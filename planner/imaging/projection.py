@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.imaging.lens import image_centre, lens_jacobian, recorded
-from scenes import Camera, Luminaire, Solid
+from scenes import Backlight, Camera, Luminaire, Solid
 
 _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
 
@@ -42,6 +42,22 @@ def frame(poses: np.ndarray) -> Frame:
     return Frame(right, down, -direction(poses))
 
 
+def camera_frame(camera: Camera, poses: np.ndarray) -> Frame:
+    """The same of a camera that is turned about its axis by ``roll_deg``, from right towards down."""
+    axes, roll = frame(poses), np.radians(camera.roll_deg)
+    if not roll:
+        return axes
+    cosine, sine = np.cos(roll), np.sin(roll)
+    return Frame(cosine * axes.right + sine * axes.down, cosine * axes.down - sine * axes.right, axes.forward)
+
+
+def light_frame(camera: Camera, light: Luminaire, poses: np.ndarray) -> Frame:
+    """Axes of a light: right, down, and towards the reference point; one at the camera, before the object, turns with
+    it."""
+    turns = light.mount == "camera" and not isinstance(light, Backlight)
+    return camera_frame(camera, poses) if turns else frame(poses)
+
+
 def sensor_position(camera: Camera, poses: np.ndarray) -> np.ndarray:
     """Where the sensor stands, cm, shape (..., 3)."""
     return np.array(camera.look_at) + camera.distance * direction(poses)
@@ -54,7 +70,7 @@ def light_position(camera: Camera, light: Luminaire, poses: np.ndarray) -> np.nd
     """
     centre = np.array(camera.look_at) + light.distance * direction(poses)
     if any(light.offset):
-        axes = frame(poses)
+        axes = light_frame(camera, light, poses)
         centre = centre + light.offset[0] * axes.right + light.offset[1] * axes.down
     return centre
 
@@ -84,7 +100,7 @@ def project_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.n
 
 def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """The same from the image's middle, px: what is small against the image keeps its digits in differences."""
-    axes = frame(poses)
+    axes = camera_frame(camera, poses)
     beside = (points - np.array(camera.look_at)) @ np.stack([axes.right, axes.down], -1)
     away = depth(points, poses, camera)[..., None]
     return camera.focal_px * beside / np.where(away > 0, away, np.nan)
@@ -103,7 +119,7 @@ def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarra
 
 def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Derivative of `project_ideal` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
-    axes = frame(poses)
+    axes = camera_frame(camera, poses)
     z = depth(points, poses, camera)[..., None, None]
     screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
     beside = (points - np.array(camera.look_at)) @ np.moveaxis(screen[..., 0, :, :], -2, -1)

@@ -21,7 +21,7 @@ from planner.imaging.appearance import diffuse_signal, side_signals
 from planner.imaging.boundaries import sided
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, facing, frame, jacobian_ideal
+from planner.imaging.projection import camera_frame, edge_points, facing, jacobian_ideal
 from planner.imaging.sheets import Sheet, sheets
 from planner.models.along import place_nodes, used_trims
 from scenes import Solid
@@ -249,7 +249,8 @@ def _finest(pictures: Pictures, name: str, faces: list[int]) -> float:
 
 def _on_face(pictures: Pictures, view, e: int, along: np.ndarray, across: np.ndarray, face: int) -> np.ndarray:
     """Points (j, k, 3) of a face's plane that are seen at distances along (k,) and across (j,) an edge, ideal px."""
-    camera, solid, axes = pictures.scene.camera, pictures.scene.solid, frame(pictures.sensors)
+    camera, solid = pictures.scene.camera, pictures.scene.solid
+    axes = camera_frame(camera, pictures.sensors)
     tangent, normal = view.along[e] / view.lengths[e], normals(view)[e]
     image = view.ends[e, 0] + along[:, None] * tangent + across[:, None, None] * normal - image_centre(camera)
     rays = image @ np.stack([axes.right, axes.down]) / camera.focal_px + axes.forward

@@ -7,6 +7,7 @@ import typer
 from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
+from tests.proofs.fits import fits
 from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
@@ -20,6 +21,7 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 app.command()(boards)
 app.command()(conditions)
 app.command()(crowded)
+app.command()(fits)
 app.command()(kill)
 app.command()(large)
 app.command()(lights)

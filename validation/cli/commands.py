@@ -15,6 +15,8 @@ COMMANDS = {
     "plan": ("plan", "Find where sensor and light should stand, and check it by rendering."),
     "render": ("render", "Render one image of a scene."),
     "measure": ("measure", "Measure an image: a scene's measurands, or what a photograph shows."),
+    "fit": ("fit", "Fit a scene's camera, poses, light and noise to photographs of its part."),
+    "predict": ("predict", "Predict how precisely a scene's measurands are measured, without an image."),
     "new": ("scene", "Write a commented scene of a mesh file."),
     "show": ("scene", "List and draw the vertices, edges and circles that a scene has to name."),
     "scenes": ("scene", "List the bundled scenes."),

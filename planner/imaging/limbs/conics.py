@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.imaging.limbs.quadrics import touching_cone
-from planner.imaging.projection import frame, sensor_position
+from planner.imaging.projection import camera_frame, sensor_position
 from scenes import Camera, InvalidInput
 from scenes.parts.surfaces import Quadric
 
@@ -39,7 +39,7 @@ def image_conic(quadric: Quadric, sensor: np.ndarray, camera: Camera) -> np.ndar
     camera : Camera
     """
     pose = np.array(list(sensor), float)
-    axes = frame(pose)
+    axes = camera_frame(camera, pose)
     turned = np.stack([axes.right, axes.down, camera.focal_px * axes.forward], -1)
     found = turned.T @ touching_cone(quadric, sensor_position(camera, pose)) @ turned
     return found / np.abs(found).max()

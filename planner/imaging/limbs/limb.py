@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.imaging.limbs.contour import Branch, contour
 from planner.imaging.limbs.statuses import BEHIND, CONCAVE, OK
-from planner.imaging.projection import depth, frame, from_axis, sensor_position
+from planner.imaging.projection import camera_frame, depth, from_axis, sensor_position
 from scenes import Camera
 from scenes.parts.surfaces import Surface, Torus
 from scenes.parts.surfaces.roots import quadratic_roots
@@ -143,7 +143,7 @@ def _strand(surface, pose, camera, eye, branch: Branch, u: np.ndarray) -> tuple[
 
 
 def _made(surface, pose, camera, points, u, arc, bend, operator, sight, closed) -> Strand:
-    axes, normals = frame(pose), surface.normals(points)
+    axes, normals = camera_frame(camera, pose), surface.normals(points)
     across = np.stack([normals @ axes.right, normals @ axes.down], -1)
     size = np.linalg.norm(across, axis=-1)
     outward = across / size[:, None]
@@ -166,7 +166,7 @@ def _made(surface, pose, camera, points, u, arc, bend, operator, sight, closed) 
 
 def _curvature(points, normals, operator, sight, outward, size, pose, camera) -> np.ndarray:
     """Turn of the image's normal over the length of image, along the contour's tangent N x S v."""
-    axes = frame(pose)
+    axes = camera_frame(camera, pose)
     along = np.cross(normals, np.einsum("nij,nj->ni", operator, sight))
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     turned = np.einsum("nij,nj->ni", operator, along)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
 from planner.imaging.limbs.limb import Strand
-from planner.imaging.projection import depth, frame, from_axis, sensor_position
+from planner.imaging.projection import camera_frame, depth, from_axis, sensor_position
 from scenes import Camera
 from scenes.parts.surfaces import Surface
 
@@ -58,7 +58,7 @@ def levels_inside(
 ) -> np.ndarray:
     """Exact level at distances (J,) px inside a strand's n points along the image's normal, (n, J); 0 past the body."""
     pose = np.array(list(sensor), float)
-    axes, eye = frame(pose), sensor_position(camera, pose)
+    axes, eye = camera_frame(camera, pose), sensor_position(camera, pose)
     at = strand.at[:, None] - np.asarray(inside)[None, :, None] * strand.outward[:, None]
     way = at[..., :1] * axes.right + at[..., 1:] * axes.down + camera.focal_px * axes.forward
     met = surface.intersections(eye, way)
@@ -124,7 +124,7 @@ def _slip(strand: Strand, normal: np.ndarray, aside: np.ndarray, pose: np.ndarra
 
 def _image_of(step: np.ndarray, strand: Strand, pose: np.ndarray, camera: Camera) -> np.ndarray:
     """Derivative of the image of the strand's points by a step (n, 3), px, (n, 2)."""
-    axes = frame(pose)
+    axes = camera_frame(camera, pose)
     z = depth(strand.points, pose, camera)[:, None]
     screen = np.stack([axes.right, axes.down])
     at = from_axis(strand.points, pose, camera)

@@ -1,0 +1,1 @@
+"""A scene that is fitted to photographs of it."""

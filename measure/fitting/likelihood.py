@@ -1,0 +1,119 @@
+"""The most likely parameters of a scene, given photographs of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from measure.fitting.parameters import Parameters
+from measure.fitting.photograph import Pixels, Shots
+from planner.imaging.pictures import Pictures
+from planner.imaging.sensor import recorded
+from planner.imaging.whole import signal_at
+from scenes import Noise
+
+_EVALUATIONS = 40
+_SETTLED, _NEARLY = 1e-6, 1e-3  # relative changes at which the search ends, of sharp and of coarse images
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Photographs, the pixels of them that count, and how they are weighted.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    shots : tuple of Shots
+        One for each pose.
+    pixels : tuple of Pixels
+    shrink : int
+        Photographs and camera are made so many times smaller, for a first look at them.
+    smooth : float
+        By so many (shrunk) px the photographs are smoothed, and so is the model.
+    """
+
+    parameters: Parameters
+    shots: tuple[Shots, ...]
+    pixels: tuple[Pixels, ...]
+    shrink: int = 1
+    smooth: float = 0.0
+
+    def signal(self, values: np.ndarray, k: int) -> np.ndarray:
+        """Signal above darkness at the pixels of the k-th pose, (P,)."""
+        pictures = seen_coarsely(self.parameters.pictures_at(values, k), self.shrink, self.smooth)
+        return signal_at(pictures, self.pixels[k].x, self.pixels[k].y)
+
+    def levels(self, values: np.ndarray, noise: Noise, k: int) -> np.ndarray:
+        """Expected grey levels there, cut off at the end of the scale as the sensor does, (P,)."""
+        return recorded(noise, self.signal(values, k) + self._dark(values, noise)).level
+
+    def _dark(self, values: np.ndarray, noise: Noise) -> float:
+        names = self.parameters.names
+        return float(values[names.index("noise.dark_level")]) if "noise.dark_level" in names else noise.dark_level
+
+    def observed(self) -> np.ndarray:
+        """All photographs at their pixels, one after the other."""
+        return np.concatenate(
+            [p.of(s.coarse(self.shrink, self.smooth)) for p, s in zip(self.pixels, self.shots, strict=True)]
+        )
+
+    def expected(self, values: np.ndarray, noise: Noise) -> np.ndarray:
+        return np.concatenate([self.levels(values, noise, k) for k in range(len(self.shots))])
+
+    def variance(self, values: np.ndarray, noise: Noise) -> np.ndarray:
+        """Variance of the noise of the means of repeated photographs; the fixed pattern does not average out."""
+        found = []
+        for k, shots in enumerate(self.shots):
+            signal, dark = self.signal(values, k), self._dark(values, noise)
+            temporal = recorded(noise.model_copy(update={"dark_level": dark}), signal + dark).noise_variance
+            temporal = np.broadcast_to(np.maximum(temporal, 1e-6), signal.shape)
+            found.append(temporal / shots.count + noise.dsnu**2 + (noise.prnu * np.maximum(signal, 0.0)) ** 2)
+        return np.concatenate(found)
+
+    def jacobian(self, values: np.ndarray, noise: Noise, which: np.ndarray) -> np.ndarray:
+        """Derivative of what is expected by the parameters ``which`` (f,), (P, f): differences of one side."""
+        middle = self.expected(values, noise)
+        found = np.empty((middle.size, len(which)))
+        for column, i in enumerate(which):
+            step = np.zeros(values.size)
+            step[i] = self.parameters.free[i].step
+            found[:, column] = (self.expected(values + step, noise) - middle) / step[i]
+        return found
+
+
+def seen_coarsely(pictures: Pictures, shrink: int, smooth: float) -> Pictures:
+    """The same with a camera of fewer, larger pixels and more blur; half a pixel may be lost at the image's border."""
+    if shrink == 1 and not smooth:
+        return pictures
+    scene, camera = pictures.scene, pictures.scene.camera
+    fewer = {
+        "width": camera.width // shrink, "height": camera.height // shrink, "focal_px": camera.focal_px / shrink,
+        "blur_px": float(np.hypot(camera.blur_px / shrink, smooth)),
+    }  # fmt: skip
+    return pictures.with_scene(scene.model_copy(update={"camera": camera.model_copy(update=fewer)}))
+
+
+def most_likely(
+    problem: Problem, start: np.ndarray, noise: Noise, which: np.ndarray, variance: np.ndarray | float
+) -> np.ndarray:
+    """Values (q,) of least weighted squares; only the parameters ``which`` move, within their bounds."""
+    observed, sigma = problem.observed(), np.sqrt(variance)
+    settled = _NEARLY if problem.smooth else _SETTLED
+    free = [problem.parameters.free[i] for i in which]
+    low, high = (np.array([getattr(each, side) for each in free]) for side in ("low", "high"))
+    inner = 1e-6 * np.where(np.isfinite(high - low), high - low, 1.0)
+
+    def full(part: np.ndarray) -> np.ndarray:
+        values = start.copy()
+        values[which] = part
+        return values
+
+    found = least_squares(
+        lambda part: (problem.expected(full(part), noise) - observed) / sigma,
+        np.clip(start[which], low + inner, high - inner),
+        lambda part: problem.jacobian(full(part), noise, which) / np.reshape(sigma, (-1, 1)),
+        bounds=(low, high), x_scale="jac", max_nfev=_EVALUATIONS, xtol=settled, ftol=settled, gtol=None,
+    )  # fmt: skip
+    return full(found.x)

@@ -1,0 +1,73 @@
+"""The whole picture without the renderer: one convex body before darkness, exactly blurred."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planner.imaging.appearance import is_plain
+from planner.imaging.arrangement import arrangement_of
+from planner.imaging.blurred import BlurredModel
+from planner.imaging.pictures import Pictures
+from scenes import InvalidInput, Picture, Scene
+
+_NONE = np.empty(0, int)
+
+
+def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.ndarray:
+    """Noise-free grey levels, as `render.image` has them, from the image model alone.
+
+    Parameters
+    ----------
+    scene : Scene or Picture
+        One convex body before darkness, without textures.
+    sensor, light : Pose or pair of float
+        Degrees; left out for a picture.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        Darkness included, not cut off at the end of the scale.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene is another one, or it is not known where its lights stand.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> image(scenes.load("task1"), (30, 135), (15, 315)).shape
+    (240, 256)
+    """
+    picture = Picture.of(scene, sensor, light)
+    check_drawable(picture.scene)
+    if not picture.lights:
+        raise InvalidInput("light must be given, got none")
+    camera = picture.scene.camera
+    y, x = (part.ravel() for part in np.mgrid[: camera.height, : camera.width])
+    found = signal_at(Pictures.of(picture), x, y) + picture.scene.noise.dark_level
+    return found.reshape(camera.height, camera.width)
+
+
+def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Signal above darkness at pixels (P,) of one picture, grey levels."""
+    model = BlurredModel(arrangement_of(pictures), x, y, _NONE)
+    return model.image(model.start())
+
+
+def check_drawable(scene: Scene) -> None:
+    """See that `image` knows such scenes.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    if not is_plain(scene):
+        raise InvalidInput(
+            "scene must be one convex body before darkness, got one in which things hide or shade others"
+        )
+    if scene.textures:
+        raise InvalidInput("scene must be without textures, got some")

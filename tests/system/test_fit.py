@@ -1,0 +1,165 @@
+"""Scenes are fitted to photographs whose truth is hidden, from Python and from the command line."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+import measure
+import planner
+import render
+import scenes
+from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt
+from validation import picture_file
+from validation.cli.application import app
+
+
+@pytest.fixture(scope="module")
+def shot():
+    """One hidden scene, its picture and a photograph."""
+    rng = np.random.default_rng(11)
+    hidden = Hidden.drawn(rng)
+    clean = render.image(hidden.truth)
+    return hidden, clean, render.expose(clean, hidden.truth.scene.noise, rng, 1)[0]
+
+
+@pytest.fixture(scope="module")
+def small(task1):
+    """A hidden scene of 96 x 90 px that its own analytic picture shows, and fits of four photographs of it."""
+    rng = np.random.default_rng(5)
+    smaller = {"width": 96, "height": 90, "focal_px": 300.0}
+    hidden = Hidden.drawn(rng)
+    part = {"camera": hidden.known.camera.model_copy(update=smaller)}
+    known = hidden.known.model_copy(update=part)
+    shown = hidden.truth.scene
+    truth = hidden.truth.with_scene(shown.model_copy(update={"camera": shown.camera.model_copy(update=smaller)}))
+    hidden = Hidden(truth, known, hidden.sensor, hidden.light)
+    photographs = render.expose(planner.image(truth), truth.scene.noise, rng, 4)
+    return hidden, photographs, [hidden.fit([image]) for image in photographs]
+
+
+def test_a_rendered_photograph_gives_its_scene_back(shot):
+    """Every parameter within 3.5 standard errors, from a start up to 8 degrees off; the fitted scene predicts well."""
+    hidden, clean, photograph = shot
+    found = hidden.fit([photograph])
+    assert found.status == "ok"
+    assert set(found.statuses) == {"ok"}
+    each = pulls(hidden, found)
+    assert len(each) == 13
+    assert max(map(abs, each.values())) < 3.5
+    moved = np.abs(np.array([found.value("sensor.polar"), found.value("sensor.azimuth")]) - list(hidden.sensor))
+    assert moved.max() > 2
+    ratio = predicted_beside_measured(hidden, clean, found, 3)
+    assert ratio is None or 0.7 < ratio < 1.4
+
+
+@pytest.mark.parametrize("how", ["jpeg", "gamma"])
+def test_what_the_model_does_not_know_is_a_misfit(shot, how):
+    hidden, _, photograph = shot
+    assert hidden.fit([spoilt(photograph, how)]).status == "misfit"
+
+
+def test_standard_errors_are_those_of_repeated_fits(small):
+    """Joint chi-square of all parameters; errors 1.5 times too small, twice too large, a blur off by 0.06 px show."""
+    hidden, _, found = small
+    told = [pulls(hidden, each) for each in found]
+    square, freedom = np.sum([joint(hidden, each) for each in found], axis=0)
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], freedom)
+    assert low < square < high
+    assert square * 1.5**2 > high
+    assert square / 2**2 < low
+    errors = np.array([each.standard_errors[each.names.index("camera.blur_px")] for each in found])
+    assert (np.array([row["camera.blur_px"] for row in told]) + 0.06 / errors > 3).all()
+
+
+def test_repetitions_tell_more(small):
+    """Four photographs of one pose: half the standard errors, and the noise by photon transfer."""
+    hidden, photographs, alone = small
+    found = hidden.fit(list(photographs))
+    assert found.members == ((0, 1, 2, 3),)
+    assert found.noise == "repeated"
+    ratio = found.standard_errors / alone[0].standard_errors
+    assert np.median(ratio) == pytest.approx(0.5, abs=0.1)
+    square, freedom = joint(hidden, found)
+    assert chi2.sf(square, freedom) > 1e-3
+
+
+def test_the_command_writes_a_scene_that_predicts(small, tmp_path, capsys):
+    hidden, photographs, _ = small
+    photo, fitted, picture = (tmp_path / name for name in ("photo.png", "fitted.toml", "rest.png"))
+    picture_file.write(photo, photographs[0])
+    start = [*_poses(hidden), "--free", "k1"]
+    scene = _written(hidden, tmp_path)
+    assert app(["fit", scene, str(photo), *start, "-o", str(fitted), "--residuals", str(picture), "--json"],
+               standalone_mode=False) == 0  # fmt: skip
+    told = json.loads(capsys.readouterr().out)
+    values = {row["name"]: row["value"] for row in told["parameters"]}
+    assert told["status"] in ("ok", "ill_conditioned")
+    assert picture.stat().st_size > 10_000
+    loaded = scenes.load(fitted)
+    assert loaded.camera.exposure == values["camera.exposure"]
+    assert loaded.camera.lens.coefficients[0] == values["camera.lens.distortion[0]"]
+    assert loaded.noise.sigma == pytest.approx(values["noise.sigma"])
+    assert list(loaded.settings[0].sensor) == [values["sensor.polar"], values["sensor.azimuth"]]
+    setting = loaded.settings[0]
+    code = app(["predict", str(fitted), "--json"], standalone_mode=False) or 0
+    (row,) = json.loads(capsys.readouterr().out)["settings"]
+    told = planner.predict(loaded, setting.sensor, setting.light)
+    known = row["measurands"][0]["variance"]
+    assert (code, known) == ((0, told.variance_object) if np.isfinite(told.variance_object) else (1, None))
+    found = measure.fit(loaded, [photographs[1]])
+    assert max(abs(found.values[found.names.index(name)] - values[name]) for name in ("camera.blur_px",)) < 0.1
+
+
+def _poses(hidden):
+    return ["--sensor", "{},{}".format(*hidden.sensor), "--light", "{},{}".format(*hidden.light)]
+
+
+def _written(hidden, folder):
+    """The scene as its user would write it."""
+    known = hidden.known
+    size, camera = known.object.size, known.camera
+    text = (scenes.load.__globals__["BUNDLED"] / "task1.toml").read_text().split("[[settings]]")[0]
+    for there, here in (
+        ("width = 256", f"width = {camera.width}"), ("height = 240", f"height = {camera.height}"),
+        ("= 800.0", f"= {camera.focal_px}"), ("size = [12.5, 7.5, 2.5]", f"size = {list(size)}"),
+    ):  # fmt: skip
+        assert there in text
+        text = text.replace(there, here)
+    path = folder / "part.toml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fit", "bracket", "x.npy", "--sensor", "30,90", "--light", "30,90"], "scene must be one convex body"),
+        (["fit", "task1", "x.npy"], "photographs must be 256 x 240 px as the scene's camera, got 5 x 4"),
+        (["fit", "task1", "x.npy", "--free", "zoom"], "free must be some of focal, k1, got 'zoom'"),
+        (["fit", "task1", "x.npy", "-o", "x.txt"], "--output must end in .toml, got 'x.txt'"),
+        (["predict", "task1", "--light", "30,90"], "--sensor must be given with --light, got none"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("x.npy", np.zeros((4, 5)))
+    with pytest.raises(scenes.InvalidInput, match=message):
+        app(arguments, standalone_mode=False)
+
+
+def test_a_mesh_stays_where_it_is(tmp_path, rng):
+    """A fitted scene in another folder still finds the part's file."""
+    from validation import fitted_scene
+
+    wedge = scenes.load("wedge")
+    setting = wedge.settings[0]
+    camera = wedge.camera.model_copy(update={"width": 80, "height": 76, "focal_px": wedge.camera.focal_px / 3.2})
+    scene = wedge.model_copy(update={"camera": camera})
+    photograph = render.expose(planner.image(scene, setting.sensor, setting.light), wedge.noise, rng, 1)[0]
+    found = measure.fit(scene, [photograph], setting.sensor, setting.light)
+    (tmp_path / "there").mkdir()
+    written = fitted_scene.write(found, "wedge", tmp_path / "there" / "fitted.toml")
+    assert len(written.solid.vertices) == len(wedge.solid.vertices)
+    assert written.camera.distance == found.value("camera.distance")

@@ -1,0 +1,156 @@
+"""The parts of a fit: groups of photographs, noise curves, goodness of fit, parameters."""
+
+import numpy as np
+import pytest
+
+import planner
+from measure.fitting.fit import fit
+from measure.fitting.goodness import p_value, parts
+from measure.fitting.likelihood import Problem
+from measure.fitting.noise import by_neighbours, curve
+from measure.fitting.parameters import Parameters
+from measure.fitting.photograph import Pixels, Shots, grouped
+from scenes import InvalidInput, Picture, Pose
+
+
+@pytest.fixture(scope="module")
+def small(task1):
+    camera = task1.camera.model_copy(update={"width": 112, "height": 104, "focal_px": 350.0})
+    return task1.model_copy(update={"camera": camera})
+
+
+@pytest.fixture(scope="module")
+def problem(small):
+    picture = Picture.of(small, (35, 120), (25, 300))
+    parameters = Parameters.of((picture,))
+    image = planner.image(picture)
+    pixels = Pixels.around(parameters.pictures_at(parameters.start(), 0))
+    return Problem(parameters, (Shots(image, 1, None, (0,)),), (pixels,))
+
+
+def test_photographs_of_one_pose_are_told_from_others(small, rng):
+    clean = [planner.image(small, sensor, (25, 300)) for sensor in ((35, 120), (35, 120.6))]
+    images = [clean[k] + rng.normal(0, 2, clean[k].shape) for k in (0, 1, 0, 0, 1)]
+    assert [shots.members for shots in grouped(images)] == [(0, 2, 3), (1, 4)]
+    assert grouped(images)[0].scatter.mean() == pytest.approx(4.0, rel=0.05)
+
+
+def test_photographs_of_two_sizes_are_refused():
+    with pytest.raises(InvalidInput, match=r"photographs must be of one size, got 9 x 8, 8 x 8"):
+        grouped([np.zeros((8, 9)), np.zeros((8, 8))])
+    with pytest.raises(InvalidInput, match=r"photographs must be of one size, got none"):
+        grouped([])
+
+
+def test_photon_transfer_is_found_with_its_errors(rng):
+    """Pulls of 200 curves: mean 0, sd 1; errors of two thirds are seen to be wrong."""
+    signal, freedom, pulls = np.linspace(0, 150, 2000), np.full(2000, 5.0), []
+    for _ in range(200):
+        found = curve(signal, (3.0 + 0.05 * signal) * rng.chisquare(5, 2000) / 5, freedom)
+        pulls.append((np.array([found.dark, found.gain]) - (3.0, 0.05)) / np.sqrt(np.diag(found.covariance)))
+    square = np.square(pulls).sum(0)
+    assert (np.abs(np.mean(pulls, 0)) < 4 / np.sqrt(200)).all()
+    assert ((square > 130) & (square < 290)).all()  # chi-square of 200: 200 +- 20 (1 sd)
+    assert (square * 1.5**2 > 290).all()
+
+
+def test_no_gain_where_there_is_none_to_see():
+    found = curve(np.full(50, 3.0), np.full(50, 2.0), np.full(50, 1.0))
+    assert (found.dark, found.gain) == (pytest.approx(2.0), 0.0)
+    falls = curve(np.linspace(0, 10, 50), np.linspace(3, 1, 50), np.full(50, 1.0))
+    assert falls.gain == 0.0
+
+
+def test_neighbours_do_not_take_a_smooth_misfit_for_noise(problem, rng):
+    """A slope of 12 grey levels over the picture, of variance 12: the residual has it, its differences have not."""
+    shots = problem.shots[0]
+    signal = problem.signal(problem.parameters.start(), 0)
+    noisy = shots.mean - 20.0 + rng.normal(0, 2, shots.mean.shape) + np.linspace(-6, 6, shots.mean.shape[1])
+    values = by_neighbours(Shots(noisy, 1, None, (0,)), problem.pixels[0], signal, 4.0)
+    told = curve(values[0], values[1], np.full(values[0].size, values[2]))
+    assert told.dark + told.gain * 50 == pytest.approx(4.0, rel=0.1)
+    assert np.var(problem.pixels[0].of(noisy) - signal) > 8
+
+
+def test_derivatives_are_those_of_central_differences(problem):
+    """Largest error of any parameter's column at most a percent of its largest value: steps of one side."""
+    parameters, noise = problem.parameters, problem.parameters.scene.noise
+    values, which = parameters.start(), np.arange(len(parameters.free))
+    found = problem.jacobian(values, noise, which)
+    for i in which:
+        step = np.zeros(values.size)
+        step[i] = 3 * parameters.free[i].step
+        ahead, behind = (problem.expected(values + sign * step, noise) for sign in (1, -1))
+        central = (ahead - behind) / (2 * step[i])
+        assert np.abs(found[:, i] - central).max() < 0.01 * np.abs(central).max(), parameters.names[i]
+
+
+def test_goodness_knows_noise_from_what_is_none(problem, rng):
+    """White noise passes; a double edge, a stain of less than a standard deviation, and a curve of 0.8 do not.
+
+    The curve is looked for at a known pose: a free light explains much of it on a face or two.
+    """
+    parameters = problem.parameters
+    values, which = parameters.start(), np.arange(len(parameters.free))
+    noise = parameters.scene.noise
+    sigma = np.sqrt(problem.variance(values, noise))
+    white = problem.jacobian(values, noise, which) / sigma[:, None]
+    covariance = np.linalg.inv(white.T @ white)
+    level = problem.expected(values, noise)
+
+    def told(extra):
+        rest = (rng.normal(0, sigma) + extra) / sigma
+        rest = rest - white @ (covariance @ (white.T @ rest))
+        return p_value(parts(rest, level / sigma, level, problem.pixels, white, covariance), np.inf)
+
+    good = np.array([told(0.0) for _ in range(60)])
+    assert (good < 0.05).mean() < 0.2
+    assert good.min() > 1e-4
+    assert told(np.roll(level, 1) - level) < 1e-6
+    y, x = problem.pixels[0].y - 40, problem.pixels[0].x - 50
+    assert told(2.0 * (np.hypot(x, y) < 12)) < 1e-6
+    white = white[:, [parameters.names.index(name) for name in ("camera.exposure", "noise.dark_level")]]
+    covariance = np.linalg.inv(white.T @ white)
+    assert told(255 * (level / 255) ** 0.8 - level) < 1e-6
+    assert told(0.0) > 1e-4
+
+
+def test_values_beyond_the_pole_are_told_as_usual(small):
+    parameters = Parameters.of((Picture.of(small, (3, 120), (25, 300)),))
+    values = parameters.start()
+    values[parameters.names.index("sensor.polar")] = -2.0
+    there, _ = parameters.settled(values, np.eye(values.size))
+    pose = {name: there[parameters.names.index(name)] for name in ("sensor.polar", "sensor.azimuth", "camera.roll_deg")}
+    assert pose == {"sensor.polar": 2.0, "sensor.azimuth": 300.0, "camera.roll_deg": -180.0}
+    images = [planner.imaging.whole.signal_at(parameters.pictures_at(v, 0), *np.indices((100, 100)).reshape(2, -1))
+              for v in (values, there)]  # fmt: skip
+    np.testing.assert_allclose(*images, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"free": ["gamma"]}, r"free must be some of focal, k1, got 'gamma'"),
+        ({"noise": "none"}, r"noise must be estimated or given, got 'none'"),
+        ({"images": [np.zeros((9, 9))]}, r"photographs must be 112 x 104 px as the scene's camera, got 9 x 9"),
+        ({"light": (15, 3)}, r"sensor must be given with light, got none"),
+        ({"sensor": (15, 3)}, r"light must be given with sensor, got none"),
+    ],
+)
+def test_bad_input(small, given, message):
+    with pytest.raises(InvalidInput, match=message):
+        fit(small, **({"images": [np.zeros((104, 112))]} | given))
+
+
+def test_a_scene_without_settings_needs_a_pose(small):
+    with pytest.raises(InvalidInput, match="sensor must be given for a scene without settings, got none"):
+        fit(small.model_copy(update={"settings": ()}), [np.zeros((104, 112))])
+
+
+def test_darkness_tells_nothing(small, rng):
+    """A photograph of nothing: no infinite errors, no traceback, and what is not told is said to be held."""
+    found = fit(small, [rng.normal(20, 2, (104, 112))], Pose(35, 120), Pose(25, 300))
+    assert set(found.statuses) == {"ill_conditioned"}
+    assert found.status == "low_contrast"
+    assert (found.values == found.start).all()
+    assert not found.covariance.any()

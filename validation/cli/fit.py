@@ -1,0 +1,118 @@
+"""``ice fit``: a scene's camera, poses, light and noise from photographs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import scenes
+from scenes import InvalidInput, image_file
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
+from validation.cli.outputs import check_file
+from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from measure.fitting.result import Fit
+
+commands = commands()
+_MOST_PHOTOGRAPHS = 1000
+
+
+@commands.command("fit")
+def fit_command(
+    scene: SceneName,
+    photographs: Annotated[list[Path], typer.Argument(metavar="PHOTO...", help="PNG, TIFF, JPEG or .npy.")],
+    sensor: Annotated[
+        str | None, typer.Option(metavar="P,A", help="Where the search begins; the nearest setting if left out.")
+    ] = None,
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="The same of the free light, or of each.")] = None,
+    free: Annotated[str, typer.Option(metavar="LIST", help="Free besides: focal, k1, with commas between.")] = "",
+    noise: Annotated[str, typer.Option(help="estimated, or given by the scene.")] = "estimated",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Write the fitted scene.")
+    ] = None,
+    residuals: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw what the fit leaves of the photographs.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit a scene to photographs of its part, by maximum likelihood with the image model."""
+    poses = None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
+    if len(photographs) > _MOST_PHOTOGRAPHS:
+        raise InvalidInput(f"PHOTO... must be at most {_MOST_PHOTOGRAPHS} files, got {len(photographs)}")
+    check_file("--output", output, ".toml")
+    check_file("--residuals", residuals, ".png")
+    loaded = scenes.load(scene)
+    images = [image_file.read(path) for path in photographs]
+    import measure
+
+    found = measure.fit(loaded, images, *poses, free=tuple(filter(None, free.split(","))), noise=noise)
+    if output:
+        from validation import fitted_scene
+
+        fitted_scene.write(found, scene, output)
+    if residuals:
+        from validation.report import residuals as picture
+
+        picture.draw(found, images, residuals)
+    if as_json:
+        say({"scene": loaded.name, **facts(found), "fitted": None if output is None else str(output)}, True, "")
+    else:
+        console().print(_table(loaded.name, found))
+        console().print(_said(found), highlight=False)
+    raise typer.Exit(1 if found.status in ("misfit", "low_contrast") else 0)
+
+
+def facts(found: Fit) -> dict[str, Any]:
+    """What has been fitted, for JSON."""
+    rows = zip(found.names, found.units, found.start, found.values, found.standard_errors, found.statuses, strict=True)
+    return {
+        "status": found.status,
+        "p_value": found.p_value if math.isfinite(found.p_value) else None,
+        "noise": found.noise,
+        "parameters": [
+            {
+                "name": name, "unit": unit, "start": float(start), "value": float(value),
+                "standard_error": float(error) if status == "ok" else None, "status": status,
+            }
+            for name, unit, start, value, error, status in rows
+        ],
+        "covariance": found.covariance.tolist(),
+        "poses": [
+            {"sensor": list(shown.sensor), "lights": [list(pose) for pose in shown.lights], "photographs": len(group)}
+            for shown, group in zip(found.pictures, found.members, strict=True)
+        ],
+    }  # fmt: skip
+
+
+def _table(name: str, found: Fit) -> Table:
+    from rich.table import Table
+
+    made = Table(title=f"{name} fitted to {sum(map(len, found.members))} photograph(s)", title_justify="left", box=None,
+                 padding=(0, 1), title_style="bold")  # fmt: skip
+    for column in ("parameter", "start", "fitted", "standard error", "unit", ""):
+        made.add_column(column, justify="left" if column in ("parameter", "unit", "") else "right", no_wrap=True)
+    rows = zip(found.names, found.units, found.start, found.values, found.standard_errors, found.statuses, strict=True)
+    for name, unit, start, value, error, status in rows:
+        told = f"{error:.2g}" if status == "ok" else "-"
+        held = "" if status == "ok" else "held: the photographs do not tell it"
+        made.add_row(name, f"{start:.6g}", f"{value:.6g}", told, unit, held)
+    return made
+
+
+def _said(found: Fit) -> str:
+    whence = {
+        "estimated": "noise from differences of neighbouring pixels", "given": "noise as the scene has it",
+        "repeated": "noise from repeated photographs (photon transfer)",
+    }[found.noise]  # fmt: skip
+    if found.status == "low_contrast":
+        return "low_contrast: nothing in the photograph stands out of its noise"
+    text = f"{found.status} (goodness of fit: p = {found.p_value:.2g}); {len(found.pictures)} pose(s), {whence}"
+    if found.status == "misfit":
+        text += "\nThe photographs are not what the model says: neither values nor standard errors are to be trusted."
+    return text

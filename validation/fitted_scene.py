@@ -1,0 +1,66 @@
+"""The file of a fitted scene: the user's own document with what the photographs have told."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import scenes
+from measure.fitting.result import Fit
+from scenes import InvalidInput
+from scenes.files import read_toml
+from scenes.numbers import number_at
+from scenes.scene import Scene
+from scenes.uncertain import taken_out
+from scenes.written import toml
+
+_CAMERA = ("distance", "roll_deg", "exposure", "blur_px", "focal_px")
+_NOISE = ("sigma", "gain", "dark_level")
+_SAID_ELSE = ("black_level", "working_distance_mm", "focal_length_mm")  # other names of what has been fitted
+
+
+def write(found: Fit, source: str, path: Path) -> Scene:
+    """Write the fitted scene of a bundled scene or file, and load it; comments of the source are not kept.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be written, or what was fitted makes no scene: a sensor within the part, say.
+    """
+    origin = scenes.find(source)
+    document = _document(found, _plain(read_toml(origin)))
+    _moved(document, origin.parent, path.parent)
+    head = f"# {origin.name} as photographs show it: camera, noise and settings were fitted (status {found.status}).\n"
+    try:
+        path.write_text(head + toml({"name": path.stem, **{k: v for k, v in document.items() if k != "name"}}), "utf-8")
+    except OSError as error:
+        raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None
+    return scenes.load(path)
+
+
+def _plain(document: dict[str, Any]) -> dict[str, Any]:
+    """Numbers with an uncertainty as plain numbers: what they were uncertain by, the photographs have told."""
+    return {key: value for key, value in taken_out(document).items() if key != "uncertain"}
+
+
+def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
+    scene = found.scene
+    camera = {key: value for key, value in document["camera"].items() if key not in _SAID_ELSE}
+    camera |= {key: number_at(scene, f"camera.{key}") for key in _CAMERA}
+    camera["look_at"] = list(scene.camera.look_at)
+    if any(scene.camera.lens.coefficients):
+        camera["lens"] = {**camera.get("lens", {}), "distortion": list(scene.camera.lens.coefficients)}
+    noise = document["noise"] | {key: number_at(scene, f"noise.{key}") for key in _NOISE}
+    settings = [setting.model_dump(mode="json", exclude_none=True) for setting in scene.settings]
+    return document | {"camera": camera, "noise": noise, "settings": settings, "same_scale": []}
+
+
+def _moved(document: dict[str, Any], source: Path, target: Path) -> None:
+    """Files that the scene names, from where the new file lies; changed in place."""
+    for table in (document.get("object", {}), *document.get("textures", [])):
+        if isinstance(table.get("file"), str):
+            table["file"] = os.path.relpath(source / table["file"], target.absolute())
+    told = document.get("uncertainty", {})
+    if isinstance(told.get("covariance"), str):
+        told["covariance"] = os.path.relpath(source / told["covariance"], target.absolute())
