@@ -49,6 +49,9 @@ class Estimator(Protocol):
     def respond(self, clean: np.ndarray) -> np.ndarray:
         """Derivative of (level, slope) of each edge by the pixels at a noise-free image, (2 E, height * width)."""
 
+    def respond_within(self, clean: np.ndarray) -> np.ndarray:
+        """The same by the pixels that it looks at alone, (2 E, P)."""
+
 
 def noisy(rows: np.ndarray, optics: Optics, images: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Covariance of linear functions ``rows`` (k, P) of some pixels of images, (k, k) or (n, k, k).

@@ -57,6 +57,7 @@ def calibrate_camera_command(
     check_file("--output", output, ".toml")
     check_file("--residuals", residuals, ".png")
     import measure
+    from measure import status
     from measure.boards.parameters import read_model
     from validation.boards import read_boards
     from validation.report import camera_table
@@ -82,7 +83,7 @@ def calibrate_camera_command(
         _show(found, seen, units, lines)
         for path in filter(None, (output, output and _beside(output), residuals)):
             console().print(f"written: {path}", highlight=False)
-    raise typer.Exit(1 if found.status == measure.status.ILL_CONDITIONED else 0)
+    raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
 
 
 def _show(found, seen, units: str, lines: str | None) -> None:

@@ -58,7 +58,7 @@ def _half_width(name: str, surface: Surface, distance: float, radius: float = 2.
 
     def reference() -> Reference:
         far, size = mpf(distance), mpf(radius)
-        if thin:  # of the tube's circle: its limb is that of the tangent from the axis' point
+        if isinstance(surface, Torus):  # of the tube's circle: its limb is that of the tangent from the axis' point
             middle, tube = mpf(surface.radius), mpf(surface.tube)
             tilt = mp.asin(tube / mp.hypot(middle, far)) + mp.atan(middle / far)
             return Reference.precise(_FOCAL * mp.tan(tilt), 4.0)
