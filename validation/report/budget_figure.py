@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from planner.uncertainty.budget import Budget
+from validation.report.canvas import TEXT, WIDTH, save
 
 _MOST = 12  # contributions of a measurand that are drawn
 
@@ -17,8 +18,8 @@ _MOST = 12  # contributions of a measurand that are drawn
 def draw(budgets: tuple[Budget, ...], path: Path) -> Path:
     """One panel a measurand: contributions (standard uncertainties in its unit), the largest on top, and u_c."""
     figure, panels = plt.subplots(
-        len(budgets), 1, figsize=(8, 0.7 + sum(0.6 + 0.22 * _rows(b) for b in budgets)), squeeze=False,
-        gridspec_kw={"height_ratios": [0.6 + 0.22 * _rows(b) for b in budgets]}, layout="constrained",
+        len(budgets), 1, figsize=(WIDTH, 0.7 + sum(0.9 + 0.22 * _rows(b) for b in budgets)), squeeze=False,
+        gridspec_kw={"height_ratios": [0.9 + 0.22 * _rows(b) for b in budgets]}, layout="constrained",
     )  # fmt: skip
     for panel, budget in zip(panels[:, 0], budgets, strict=True):
         rows = sorted(budget.contributions, key=lambda row: -abs(row.contribution))[:_MOST]
@@ -26,12 +27,11 @@ def draw(budgets: tuple[Budget, ...], path: Path) -> Path:
         sizes = [abs(row.contribution) for row in rows] + [budget.u]
         panel.barh(names, sizes, color=["C0"] * len(rows) + ["C1"])
         panel.invert_yaxis()
-        panel.set_title(f"{budget.name}: U = {budget.U:.2g} {budget.unit}, k = {budget.k:.3g}", fontsize=10, loc="left")
-        panel.set_xlabel(f"standard uncertainty [{budget.unit}]", fontsize=8)
-        panel.tick_params(labelsize=8)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
-    return path
+        panel.set_title(f"{budget.name}: U = {budget.U:.2g} {budget.unit}, k = {budget.k:.3g}", fontsize=11, loc="left")
+        panel.set_xlabel(f"standard uncertainty [{budget.unit}]", fontsize=TEXT)
+        panel.tick_params(labelsize=TEXT)
+        panel.locator_params(axis="x", nbins=4)
+    return save(figure, path)
 
 
 def _rows(budget: Budget) -> int:

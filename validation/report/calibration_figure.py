@@ -11,11 +11,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from measure.calibration import Calibration
+from validation.report.canvas import WIDTH, legend_below, save
 
 
 def draw(found: Calibration, path: Path) -> Path:
     """Standard deviation of an edge point against noise / contrast, log-log, as PNG."""
-    figure, axis = plt.subplots(figsize=(7.5, 5.5), layout="constrained")
+    figure, axis = plt.subplots(figsize=(WIDTH, 6.4), layout="constrained")
     for k, curve in enumerate(found.curves):
         good = np.isfinite(curve.sigma_px)
         label = f"{curve.name}: $\\kappa^2$ {curve.kappa2:.2f}, correlated over {curve.correlation_px:.1f} px"
@@ -27,14 +28,11 @@ def draw(found: Calibration, path: Path) -> Path:
     paper = f"the paper: $\\kappa^2$ {found.paper_kappa2}"
     axis.plot(ratios, np.sqrt(found.paper_kappa2) * ratios, "k--", lw=1, label=paper)
     bound = found.bound / found.closed_correlation_px
-    axis.plot(
-        ratios, np.sqrt(bound) * ratios, "k-", lw=1, label=f"Cramer-Rao bound at the same correlation: {bound:.2f}"
-    )
+    axis.plot(ratios, np.sqrt(bound) * ratios, "k-", lw=1, label=f"Cramer-Rao bound, correlated alike: {bound:.2f}")
     axis.set(
         xscale="log", yscale="log", xlabel="noise / contrast", ylabel="standard deviation of an edge point, px",
-        title=f"{found.scene}: blur {found.blur_px:g} px, smoothing {found.scale_px:g} px (dotted: linearity ends)",
+        title=f"{found.scene}: blur {found.blur_px:g} px, smoothing {found.scale_px:g} px\n(dotted: linearity ends)",
     )  # fmt: skip
-    axis.legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    axis.title.set_fontsize(11)
+    legend_below(axis)
+    return save(figure, path)

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 
 from validation.cost.parameter import Parameter
 from validation.cost.sweep import Sweep
-from validation.report.figures import save
+from validation.report.canvas import TEXT, WIDTH, legend_below, save
 
 
 def draw(found: Sweep, directory: Path) -> list[Path]:
@@ -22,21 +22,20 @@ def draw(found: Sweep, directory: Path) -> list[Path]:
 
 
 def _draw(parameter: Parameter, path: Path) -> Path:
-    figure, axes = plt.subplots(figsize=(6.8, 5.4), layout="constrained")
+    figure, axes = plt.subplots(figsize=(WIDTH, 6.2), layout="constrained")
     joined = parameter.name not in ("estimators", "effects")
     for label, (x, y) in parameter.curves().items():
         axes.plot(x, y, "o-" if joined else "o", ms=4, lw=1, label=f"{parameter.series} {label}" if label else None)
     if parameter.name == "pareto":
         _front(parameter, axes)
-    axes.set(xscale="log", yscale="log", xlabel=parameter.x, ylabel=parameter.y)
-    axes.set_title(parameter.title, fontsize=10, parse_math=False)
+    axes.set(xscale="log", yscale="log", ylabel=parameter.y)
+    axes.set_title(textwrap.fill(parameter.title, 60), fontsize=11, parse_math=False)
     if parameter.series:
-        axes.legend(frameon=False, fontsize=8)
+        legend_below(axes, 2)
     axes.grid(which="both", alpha=0.2)
     lines = [f"{f.what}: {f.slope:+.2f}" + (f", theory {f.theory:+.2f}" if f.theory else "") for f in parameter.fits]
-    lines += textwrap.wrap(parameter.note, 100)
-    if lines:
-        figure.supxlabel("\n".join(lines), fontsize=7)
+    lines += textwrap.wrap(parameter.note, 64)
+    axes.set_xlabel("\n".join([parameter.x, *lines]), fontsize=TEXT)
     return save(figure, path)
 
 

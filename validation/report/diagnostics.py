@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.report.figures import save
+from validation.report.canvas import WIDTH, legend_below, save
 
 _EDGES = np.linspace(-8, 8, 1601)
 
@@ -59,7 +59,7 @@ def residuals(found: Validation) -> np.ndarray:
 def draw_residuals(found: Validation, path: Path) -> Path:
     """Residual of each setting, with the limits of one row and of the whole table."""
     values = residuals(found)
-    figure, axis = plt.subplots(figsize=(7, 3.2), layout="constrained")
+    figure, axis = plt.subplots(figsize=(WIDTH, 3.8), layout="constrained")
     places = np.fromiter((row.index + 1 for row in found.rows if row.main.ratio), int)
     axis.plot(places, values, "o", ms=5 if values.size < 100 else 2)
     axis.axhline(0, color="k", lw=0.8)
@@ -69,36 +69,35 @@ def draw_residuals(found: Validation, path: Path) -> Path:
         axis.axhline(-level, color="0.4", ls=style, lw=1)
     reach = 1.4 * max(limit, np.abs(values).max(initial=0))
     axis.set(xlabel="setting", ylabel="residual, standard errors", ylim=(-reach, reach))
-    axis.legend(frameon=False, ncols=2, loc="upper right", fontsize=9)
+    legend_below(axis, 2)
     return save(figure, path)
 
 
 def draw_distribution(distances: Distances, path: Path) -> Path:
     """Histogram and normal plot of the standardised distances."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.8), layout="constrained")
+    figure, (left, right) = plt.subplots(2, 1, figsize=(WIDTH, 7.6), layout="constrained")
     coarse = distances.counts.reshape(-1, 20).sum(1)
     edges = _EDGES[::20]
     left.stairs(coarse / max(distances.total, 1) / np.diff(edges), edges, fill=True, alpha=0.5, label="measured")
     x = np.linspace(-4.5, 4.5, 300)
     left.plot(x, stats.norm.pdf(x), "k", lw=1, label="predicted")
     left.set(xlim=(-4.5, 4.5), xlabel="(distance - mean) / predicted sigma", ylabel="density")
-    left.legend(frameon=False, fontsize=9)
     below = np.cumsum(distances.counts)[:-1] / max(distances.total, 1)
     some = (distances.counts[:-1] > 0) & (below < 1)  # where a value lies, not the gaps of the tails
-    right.plot(stats.norm.ppf(below[some]), _EDGES[1:-1][some], ".", ms=2.5, label="measured")
-    right.plot([-4.5, 4.5], [-4.5, 4.5], "k-", lw=0.8, label="predicted")
+    right.plot(stats.norm.ppf(below[some]), _EDGES[1:-1][some], ".", ms=2.5)
+    right.plot([-4.5, 4.5], [-4.5, 4.5], "k-", lw=0.8)
     right.set(xlabel="normal quantile", ylabel="(distance - mean) / predicted sigma")
-    right.legend(frameon=False, fontsize=9)
+    legend_below(left, 2)
     return save(figure, path)
 
 
 def draw_time(found: Validation, path: Path) -> Path:
     """Working seconds of all workers, by what they were spent on."""
     spent = {name: value for name, value in found.seconds.items() if name not in ("wall", "workers")}
-    figure, axis = plt.subplots(figsize=(7, 0.6 + 0.32 * len(spent)), layout="constrained")
+    figure, axis = plt.subplots(figsize=(WIDTH, 0.8 + 0.32 * len(spent)), layout="constrained")
     bars = axis.barh(list(spent), list(spent.values()))
     axis.bar_label(bars, fmt="%.1f", padding=3)
     axis.invert_yaxis()
-    axis.margins(x=0.1)
+    axis.margins(x=0.15)
     axis.set(xlabel="working seconds of all workers")
     return save(figure, path)

@@ -20,6 +20,7 @@ from scenes import Picture, Pose, Scene, pairs, shown
 from validation.batch.campaign import Campaign, Case
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
+from validation.report.canvas import TEXT, WIDTH, legend_below, save
 
 _SHOWN = 16  # settings whose images are drawn
 _POINTS = 5000  # of a plot of settings
@@ -95,13 +96,15 @@ def edge_pixels(scene: Scene, sensor: Pose, picture: np.ndarray) -> np.ndarray:
 def _panel(pictures, sensor: Pose, lights: list[Pose], kind: str, grey: tuple[float, float], path: Path) -> Path:
     columns = 2 if len(pictures) > 1 else 1
     rows = -(-len(pictures) // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(4 * columns, 3.9 * rows), squeeze=False, layout="constrained")
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(WIDTH, 0.5 + 0.98 * WIDTH / columns * rows), squeeze=False, layout="constrained"
+    )
     figure.suptitle(f"sensor {sensor}: {kind}")
     for axis in axes.flat:
         axis.set(xticks=[], yticks=[])
     for axis, picture, light in zip(axes.flat, pictures, lights, strict=False):
         axis.imshow(picture, cmap="gray", vmin=grey[0], vmax=grey[1], interpolation="nearest")
-        axis.set_title(f"light {shown(pairs(light))}", fontsize=10)
+        axis.set_title(f"light {shown(pairs(light))}", fontsize=TEXT)
     return save(figure, path)
 
 
@@ -111,7 +114,7 @@ def _agreement(found: Validation, path: Path) -> Path:
     rows = [row for row in (found.rows[int(i)] for i in every) if row.main.ratio]
     which = "" if every.size == len(found.rows) else f" ({every.size} of {len(found.rows)} settings)"
     figure, (top, bottom) = plt.subplots(
-        2, 1, figsize=(7, 7.5), sharex=True, height_ratios=[3, 1.3], layout="constrained"
+        2, 1, figsize=(WIDTH, 7.2), sharex=True, height_ratios=[3, 1.4], layout="constrained"
     )
     propagated = np.array([row.main.propagated for row in rows])
     ratio = np.array([row.main.ratio for row in rows])
@@ -135,16 +138,10 @@ def _agreement(found: Validation, path: Path) -> Path:
     else:
         top.text(0.5, 0.5, "no setting was measured", ha="center", transform=top.transAxes)
     top.set_ylabel("measured variance, px$^2$")
-    top.set_title(f"{found.scene}: variance of the measured distance{which}", parse_math=False)
-    top.legend(frameon=False)
+    top.set_title(f"{found.scene}: variance of the distance{which}", fontsize=11, parse_math=False)
+    legend_below(top)
     bottom.errorbar(propagated, ratio, spread, fmt="o", color="C0", ms=5)
     bottom.plot(calibrated, ratio * propagated / np.where(calibrated > 0, calibrated, 1), "x", color="C1")
     bottom.axhline(1, color="k", lw=0.8)
     bottom.set(xlabel="predicted variance, px$^2$", ylabel="measured / predicted")
     return save(figure, path)
-
-
-def save(figure, path: Path) -> Path:
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path

@@ -42,6 +42,8 @@ class Chart:
     Attributes
     ----------
     found : Map
+    biased : bool
+        Whether the bias of straight edges was looked for.
     best : Pose
         Of the sensor or the light that moves.
     title : str
@@ -49,6 +51,7 @@ class Chart:
 
     plan: Plan
     found: Map
+    biased: bool
     best: Pose
     title: str
 
@@ -79,8 +82,8 @@ class Chart:
         return (LogNorm if high > _DECADE * low else Normalize)(low, high)
 
 
-def draw_map(figure, axis, chart: Chart) -> None:
-    """One map with its rings, azimuths, best place, scale and legend."""
+def draw_map(figure, axis, below, chart: Chart) -> None:
+    """One map with its rings, azimuths, best place and scale; its legend in the axes below it."""
     nearest = _nearest(chart)
     sigma = np.where(nearest < 0, np.nan, np.sqrt(np.append(chart.found.variance, np.nan)[nearest]))
     status = np.where(nearest < 0, "", np.append(chart.found.status, "")[nearest])
@@ -94,21 +97,22 @@ def draw_map(figure, axis, chart: Chart) -> None:
     x, y = _place(*chart.best)
     axis.plot(x, y, "o", mfc="w", mec="k", ms=10, mew=1.4)
     axis.plot(x, y, "+", color="#c00000", ms=9, mew=2.2)
-    best = Line2D([], [], marker="+", color="#c00000", ls="", ms=9, mew=2.2, label=f"best: {short(chart.best)}")
-    axis.set_title(chart.title, fontsize=11)
-    axis.legend(
-        handles=[best, *handles], loc="upper center", bbox_to_anchor=(0.5, -0.03), frameon=False, fontsize=10, ncols=1,
-        title="polar angle on the rings, azimuth around them, degrees", title_fontsize=10,
-    )  # fmt: skip
+    label = f"best: polar angle {chart.best.polar_deg:.0f}, azimuth {chart.best.azimuth_deg:.0f} degrees"
+    best = Line2D([], [], marker="+", color="#c00000", ls="", ms=9, mew=2.2, label=label)
+    axis.set_title(f"{chart.title}\nrings: polar angle, rays: azimuth, degrees", fontsize=11)
+    if not chart.biased:
+        handles.append(Line2D([], [], ls="", label="(the bias of straight edges is not looked for)"))
+    below.axis("off")
+    below.legend(handles=[best, *handles], loc="upper center", frameon=False, fontsize=10, borderaxespad=0)
     _scale(figure, axis, chart, norm)
 
 
 def _scale(figure, axis, chart: Chart, norm: Normalize) -> None:
-    """Colour bar beside a map."""
+    """Colour bar under a map."""
     bar = figure.colorbar(
-        ScalarMappable(norm, COLOURS), ax=axis, shrink=0.75, pad=0.09, extend="max",
+        ScalarMappable(norm, COLOURS), ax=axis, location="bottom", shrink=0.85, pad=0.02, aspect=30, extend="max",
         format=FuncFormatter(lambda v, _: f"{v:.3g}"),
-        ticks=LogLocator(10, (1, 2, 5)) if isinstance(norm, LogNorm) else MaxNLocator(6),
+        ticks=LogLocator(10, (1, 2, 5)) if isinstance(norm, LogNorm) else MaxNLocator(5),
     )  # fmt: skip
     bar.ax.minorticks_off()
     bar.ax.tick_params(labelsize=10)
@@ -171,7 +175,7 @@ def _rings(axis, reach: float) -> None:
         axis.plot([0, x], [0, y], color="0.2", lw=0.5)
         name = {0: "0 (x)", 90: "90 (y)"}.get(azimuth, f"{azimuth}")
         axis.text(1.04 * x, 1.04 * y, name, fontsize=10, ha=_side(x, "left", "right"), va=_side(y, "bottom", "top"))
-    axis.set(aspect="equal", xlim=(-1.3 * reach, 1.3 * reach), ylim=(-1.15 * reach, 1.15 * reach))
+    axis.set(aspect="equal", xlim=(-1.33 * reach, 1.33 * reach), ylim=(-1.16 * reach, 1.16 * reach))
     axis.axis("off")
 
 

@@ -18,13 +18,12 @@ from planner.imaging.lens import recorded
 from planner.imaging.projection import facing, project
 from planner.imaging.visibility import visible_spans
 from scenes import Picture, Pose
-from validation.report.figures import save
+from validation.report.canvas import WIDTH, save
 from validation.report.map_figure import Chart, draw_map, draw_surface, short
 
 _STEP = 2.0  # degrees, where a map takes some seconds; where it takes longer:
 _COARSE = 4.0
 _PIECES = 17  # of an edge as it is drawn: a lens may bend it
-_WIDTH = 5.2  # inches: text of 10 points is legible also where that is shown 390 px wide
 
 
 def draw(plan: Plan, directory: Path, maps: Path | None = None) -> list[Path]:
@@ -55,7 +54,7 @@ def _chart(plan: Plan, role: str) -> Chart:
     space = ViewingSpace(_STEP if is_separable(plan.scene) else _COARSE, (0, reach))
     biased = not circles(plan.scene)  # rims would take a minute
     found = pose_map(plan.scene, **fixed, space=space, model=plan.model, objective=plan.objective, biased=biased)
-    return Chart(plan, found, best, f"Where the {role} may stand{_held(plan, role)}")
+    return Chart(plan, found, biased, best, f"Where the {role} may stand{_held(plan, role)}")
 
 
 def _held(plan: Plan, role: str) -> str:
@@ -66,23 +65,22 @@ def _held(plan: Plan, role: str) -> str:
 
 
 def _maps(charts: list[Chart], path: Path) -> Path:
-    figure, axes = plt.subplots(
-        len(charts), 1, figsize=(_WIDTH, 5.4 * len(charts)), layout="constrained", squeeze=False
-    )
-    for axis, chart in zip(axes[:, 0], charts, strict=True):
-        draw_map(figure, axis, chart)
+    figure = plt.figure(figsize=(WIDTH, 7.1 * len(charts)), layout="constrained")
+    axes = figure.subplots(2 * len(charts), 1, height_ratios=[6, 1] * len(charts))
+    for axis, below, chart in zip(axes[0::2], axes[1::2], charts, strict=True):
+        draw_map(figure, axis, below, chart)
     return save(figure, path)
 
 
 def _surface(chart: Chart, path: Path) -> Path:
-    figure = plt.figure(figsize=(_WIDTH, 4.6), layout="constrained")
+    figure = plt.figure(figsize=(WIDTH, 4.6), layout="constrained")
     draw_surface(figure.add_subplot(projection="3d"), chart)
     return save(figure, path)
 
 
 def _seen(plan: Plan, path: Path) -> Path:
     """The object from the optimal sensor."""
-    figure, axis = plt.subplots(figsize=(_WIDTH, 5.4), layout="constrained")
+    figure, axis = plt.subplots(figsize=(WIDTH, 5.4), layout="constrained")
     draw_seen(axis, plan.scene, plan.sensor, plan.light, plan.prediction.corners)
     return save(figure, path)
 

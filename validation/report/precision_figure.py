@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 import scenes
 from planner import ViewingSpace
 from validation.hard.precision import SAFE, error_of_single
+from validation.report.canvas import TEXT, WIDTH
 
 SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)
 
@@ -22,9 +23,9 @@ def draw(path: Path, step_deg: float = 2.0) -> None:
         ("sensor moves, light (15, 315)", scenes.load("task1"), space.poses, fixed(LIGHT, space.poses.shape)),
         ("light moves, sensor (30, 135)", scenes.load("task1"), fixed(SENSOR, space.poses.shape), space.poses),
     )
-    figure = Figure(figsize=(10, 5), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 11), layout="constrained")
     for i, (title, scene, sensors, lights) in enumerate(panels, 1):
-        axes = figure.add_subplot(1, 2, i, projection="polar")
+        axes = figure.add_subplot(2, 1, i, projection="polar")
         error = error_of_single(scene, np.array(sensors), np.array(lights))
         seen = ~np.isnan(error)
         shown = np.log10(np.clip(error[seen], 1e-8, 1.0))
@@ -32,12 +33,17 @@ def draw(path: Path, step_deg: float = 2.0) -> None:
         dots = axes.scatter(azimuth, polar, c=shown, s=11, zorder=3, cmap="viridis", vmin=-8, vmax=0, linewidths=0)
         unsafe = (error[seen] > SAFE).mean()
         axes.set_title(
-            f"{title}\nworst {error[seen].max():.1g}, above {SAFE:.0%}: {unsafe:.1%} of the poses", fontsize=10
+            f"{title}\nworst {error[seen].max():.1g}, above {SAFE:.0%}: {unsafe:.1%} of the poses", fontsize=11
         )
         axes.set_rlim(0, 90)  # ty: ignore[missing-attribute]
         axes.set_axisbelow(True)
         axes.grid(alpha=0.3)
-        axes.tick_params(labelsize=7)
-    figure.colorbar(dots, ax=figure.axes, label="log10 relative error of the variance, float32 against float64")
-    figure.suptitle("Where single precision is safe (blank: nothing can be measured; radius: polar angle, degrees)")
-    figure.savefig(path, dpi=130)
+        axes.tick_params(labelsize=TEXT)
+    figure.colorbar(
+        dots, ax=figure.axes, location="bottom", shrink=0.9,
+        label="log10 relative error of the variance,\nfloat32 against float64",
+    )  # fmt: skip
+    figure.suptitle(
+        "Where single precision is safe\nblank: nothing can be measured; radius: polar angle, degrees", fontsize=11
+    )
+    figure.savefig(path, dpi=160)

@@ -14,15 +14,20 @@ from planner import Pictures
 from planner.imaging.projection import facing, project
 from planner.imaging.visibility import visible_spans
 from scenes import Circle, Edge, Pose, Scene
+from validation.report.canvas import WIDTH, save
 
 _PIECES = 9  # of an edge that a lens may bend
+_HEIGHTS, _AROUND = (2.5, 8.0), 1.0  # inches: of the object, and of title and label around it
 _LABEL = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.75}
 
 
 def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
     """Draw what the sensor sees of the object, its parts in colours by kind, with their names; a PNG file."""
     view = _View(scene, sensor)
-    figure, axis = plt.subplots(figsize=(11, 9), layout="constrained")
+    low, high = (f(view.image(scene.solid.vertices), axis=0) for f in (np.nanmin, np.nanmax))
+    across, down = np.maximum(high - low, 1e-9)
+    height = np.clip(0.85 * WIDTH * down / across, *_HEIGHTS)
+    figure, axis = plt.subplots(figsize=(WIDTH, height + _AROUND), layout="constrained")
     _faces(axis, view)
     for edge in scene.solid.sharp:
         _edge(axis, view, edge)
@@ -30,15 +35,12 @@ def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
         _circle(axis, view, circle)
     for name in scene.solid.corner_names:
         _vertex(axis, view, name)
-    camera, (low, high) = scene.camera, (f(view.image(scene.solid.vertices), axis=0) for f in (np.nanmin, np.nanmax))
-    margin = 0.06 * (high - low).max()
+    camera, margin = scene.camera, 0.06 * max(across, down)
     axis.add_patch(plt.Rectangle((-0.5, -0.5), camera.width, camera.height, fill=False, ec="0.5", ls="--", lw=0.8))
     axis.set(xlim=(low[0] - margin, high[0] + margin), ylim=(high[1] + margin, low[1] - margin), aspect="equal")
     axis.set(xlabel="x, px", ylabel="y, px")
-    axis.set_title(f"{scene.name} seen from {sensor}: vertices (black), edges (blue), circles (red)", fontsize=11)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return path
+    axis.set_title(f"{scene.name} seen from {sensor}\nvertices (black), edges (blue), circles (red)", fontsize=11)
+    return save(figure, path)
 
 
 class _View:

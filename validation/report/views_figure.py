@@ -11,30 +11,24 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from planner import Views
+from validation.report.canvas import TEXT, WIDTH, save
 from validation.report.plan_figures import draw_seen
-
-_ACROSS = 3  # pictures in a row
 
 
 def draw(found: Views, directory: Path) -> list[Path]:
     """Write views.png: the largest set of pictures, each titled with what is taken from it; its path in a list."""
     directory.mkdir(parents=True, exist_ok=True)
     last, path = found.sets[-1], directory / "views.png"
-    across = min(len(last.views), _ACROSS)
-    down = -(-len(last.views) // across)
-    figure, axes = plt.subplots(down, across, figsize=(5.4 * across, 5.6 * down), layout="constrained", squeeze=False)
-    for axis in axes.flat[len(last.views) :]:
-        axis.axis("off")
+    down = len(last.views)
+    figure, axes = plt.subplots(down, 1, figsize=(WIDTH, 5.8 * down), layout="constrained", squeeze=False)
     for number, (axis, view) in enumerate(zip(axes.flat, last.views, strict=False)):
         draw_seen(axis, found.scene, view.sensor, view.light, np.zeros((0, 2)))
         names = [q.name for q, used in zip(found.scene.quantities, last.combination.used[number], strict=True) if used]
-        axis.set_title(f"no. {number + 1}: {axis.get_title()}\n{_wrapped(names)}", fontsize=9)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-    return [path]
+        axis.set_title(f"no. {number + 1}: {axis.get_title()}\n{_wrapped(names)}", fontsize=TEXT)
+    return [save(figure, path)]
 
 
-def _wrapped(names: list[str], most: int = 60) -> str:
+def _wrapped(names: list[str], most: int = 56) -> str:
     """Names with commas between, on lines of limited length."""
     lines = [""]
     for name in names or ["nothing is taken from it"]:

@@ -1,0 +1,33 @@
+"""What all pictures share: a width at which text of 10 points is legible on a phone and in print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+WIDTH = 5.2  # inches; shown 390 px wide, 10 points are 10 px high
+TEXT = 10  # points: the least
+_DPI = 160
+
+
+def save(figure, path: Path) -> Path:
+    """Write a figure to a file and forget it; the file's path."""
+    figure.savefig(path, dpi=_DPI)
+    plt.close(figure)
+    return path
+
+
+def legend_below(axis, columns: int = 1, **how) -> None:
+    """A legend under an axis and its label, so that it covers no data."""
+    axis.figure.legend(
+        *axis.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=columns,
+        frameon=False,
+        fontsize=TEXT,
+        **how,
+    )
