@@ -47,7 +47,8 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
         meeting = [normals[..., [known.view.names.index(name) for name in corner.edges], :] for corner in corners]
         flat = np.zeros(rank.shape, bool)
         for pair in meeting:
-            flat = flat | (np.abs(np.linalg.det(pair)) < _MIN_SINE)
+            (a, b), (c, d) = np.moveaxis(pair, (-2, -1), (0, 1))  # NaN where an edge is seen end-on
+            flat = flat | (np.abs(a * d - b * c) < _MIN_SINE)
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
