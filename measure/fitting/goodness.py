@@ -82,16 +82,18 @@ def _part(residual: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray) ->
 
 
 def _edges(level: np.ndarray) -> np.ndarray:
+    """Pixels (T, height, width) whose neighbours in their rectangle are far from them."""
     found = np.zeros(level.shape, bool)
-    for axis in (0, 1):
-        apart = np.abs(np.diff(level, axis=axis)) > _EDGE
-        for side in (np.s_[:-1], np.s_[1:]):
-            found[side if axis == 0 else (slice(None), side)] |= apart
+    down, right = (np.abs(np.diff(level, axis=axis)) > _EDGE for axis in (1, 2))
+    found[:, :-1] |= down
+    found[:, 1:] |= down
+    found[:, :, :-1] |= right
+    found[:, :, 1:] |= right
     return found
 
 
-def _sums(columns: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def _sums(columns: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
     """Sums of columns (P, c) over blocks, over the square root of their pixels, (blocks, c)."""
-    height, width = (size // _BLOCK for size in shape)
-    whole = columns.reshape(*shape, -1)[: height * _BLOCK, : width * _BLOCK]
-    return whole.reshape(height, _BLOCK, width, _BLOCK, -1).sum((1, 3)).reshape(height * width, -1) / _BLOCK
+    count, height, width = shape[0], shape[1] // _BLOCK, shape[2] // _BLOCK
+    whole = columns.reshape(*shape, -1)[:, : height * _BLOCK, : width * _BLOCK]
+    return whole.reshape(count, height, _BLOCK, width, _BLOCK, -1).sum((2, 4)).reshape(-1, columns.shape[1]) / _BLOCK

@@ -52,8 +52,8 @@ def by_neighbours(
     """
     residual = (pixels.of(shots.mean) - signal).reshape(pixels.shape)
     level = signal.reshape(pixels.shape)
-    width = pixels.shape[1] // 2 * 2
-    left, right = (np.s_[:, i:width:2] for i in (0, 1))
+    width = pixels.shape[2] // 2 * 2
+    left, right = (np.s_[:, :, i:width:2] for i in (0, 1))
     flat = np.abs(level[left] - level[right]) < _FLAT * np.sqrt(expected)
     halves = (residual[left] - residual[right]) ** 2 / 2
     return ((level[left] + level[right]) / 2)[flat], halves[flat], 1.0

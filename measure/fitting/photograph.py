@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from planner.imaging.arrangement import arrangement_of, near_pixels
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project
 from scenes import InvalidInput
@@ -14,6 +15,8 @@ from scenes.arrays import picture as checked
 
 _MARGIN = 12.0  # px beside the object's image that tell the level of darkness; six blurs more
 _BLOCK = 4  # px
+_TILE, _FEWEST = 16, 200  # px; squares away from edges, at least
+_MOST = 200_000  # pixels, of which a model takes some 0.3 s
 _ALIKE = 1.5  # of the variance of white noise
 
 
@@ -84,34 +87,67 @@ def _alike(a: np.ndarray, b: np.ndarray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """Pixels (P,) of a window around the object's image.
+    """Pixels (P,) that tell of the part: T rectangles of one size.
 
     Attributes
     ----------
     x, y : ndarray of int, shape (P,)
-        In rows, from left to right.
+        Rectangle by rectangle, in rows, from left to right.
     shape : tuple of int
-        Height and width of the window.
+        T, height, width.
     """
 
     x: np.ndarray
     y: np.ndarray
-    shape: tuple[int, int]
+    shape: tuple[int, int, int]
 
     @classmethod
-    def around(cls, pictures: Pictures) -> Pixels:
-        """The window that holds the object's image and a margin."""
-        camera = pictures.scene.camera
-        corners = project(pictures.scene.solid.vertices, pictures.sensors, camera)
-        corners = corners[np.isfinite(corners).all(1)]
-        if not len(corners):
-            raise InvalidInput("sensor must see the object, got a pose from which it lies behind")
-        margin = _MARGIN + 6 * camera.blur_px
-        low = np.clip(np.floor(corners.min(0) - margin), 0, [camera.width - 1, camera.height - 1]).astype(int)
-        high = np.clip(np.ceil(corners.max(0) + margin) + 1, low + 1, [camera.width, camera.height]).astype(int)
-        y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
+    def around(cls, pictures: Pictures, most: int = _MOST) -> Pixels:
+        """The window that holds the object's image and a margin.
+
+        Of one with more than ``most`` pixels, squares of 16 x 16: all at edges, and of the others as many as that
+        leaves room for, evenly.
+        """
+        (left, top), (right, bottom) = _window(pictures)
+        if (right - left) * (bottom - top) <= most or min(right - left, bottom - top) < _TILE:
+            y, x = np.mgrid[top:bottom, left:right]
+            return cls(x.ravel(), y.ravel(), (1, *x.shape))
+        return cls._tiled(*_tiles(pictures, (left, top), (right, bottom), most))
+
+    @classmethod
+    def _tiled(cls, tops: np.ndarray, lefts: np.ndarray) -> Pixels:
+        steps = np.arange(_TILE)
+        y = np.broadcast_to((tops[:, None] + steps)[:, :, None], (tops.size, _TILE, _TILE))
+        x = np.broadcast_to((lefts[:, None] + steps)[:, None, :], (tops.size, _TILE, _TILE))
         return cls(x.ravel(), y.ravel(), x.shape)
 
     def of(self, image: np.ndarray) -> np.ndarray:
         """Their values in an image, (P,)."""
         return image[self.y, self.x]
+
+
+def _window(pictures: Pictures) -> tuple[np.ndarray, np.ndarray]:
+    """First and past the last (x, y) of the object's image with its margin, within the photograph."""
+    camera = pictures.scene.camera
+    corners = project(pictures.scene.solid.vertices, pictures.sensors, camera)
+    corners = corners[np.isfinite(corners).all(1)]
+    if not len(corners):
+        raise InvalidInput("sensor must see the object, got a pose from which it lies behind")
+    margin, size = _MARGIN + 6 * camera.blur_px, np.array([camera.width, camera.height])
+    low = np.clip(np.floor(corners.min(0) - margin), 0, size - 1).astype(int)
+    return low, np.clip(np.ceil(corners.max(0) + margin) + 1, low + 1, size).astype(int)
+
+
+def _tiles(pictures: Pictures, low, high, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Tops and lefts of the squares."""
+    across, down = ((high[i] - low[i]) // _TILE for i in (0, 1))
+    camera, arrangement = pictures.scene.camera, arrangement_of(pictures)
+    reach = 6 * camera.blur_px + 3
+    y, x = near_pixels(arrangement, (camera.height, camera.width), reach, arrangement.pieces)
+    column, row = (x - low[0]) // _TILE, (y - low[1]) // _TILE
+    good = (column >= 0) & (column < across) & (row >= 0) & (row < down)
+    edges = np.unique(row[good] * across + column[good])
+    rest = np.setdiff1d(np.arange(across * down), edges)
+    room = max(most // _TILE**2 - edges.size, _FEWEST)
+    chosen = np.concatenate([edges, rest[:: max(-(-rest.size // room), 1)]])
+    return low[1] + _TILE * (chosen // across), low[0] + _TILE * (chosen % across)

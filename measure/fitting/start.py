@@ -21,6 +21,7 @@ _SMOOTH, _SHARP = 1.5, 1.0  # shrunk px of the Gaussian; at least
 _TURNS = (-12.0, 0.0, 12.0)
 _KEPT = 3
 _POOR = 4.0  # of the best attempt's misfit to be expected from noise: then other starts are tried
+_GLANCE = 256  # px of a photograph's larger side, to see where the object is
 _FEW, _FAINT = 4, 20.0  # pixels that are averaged; standard deviations, of which white noise spans 8
 
 
@@ -102,28 +103,29 @@ def _left(parameters: Parameters, shots, values: np.ndarray, noise: Noise, share
 def _aligned(parameters: Parameters, shots, values: np.ndarray, noise: Noise) -> np.ndarray:
     """Level of darkness, and the first photograph's place, size and brightness of the object."""
     names, found = parameters.names, values.copy()
-    image = shots[0].coarse(1, _SHARP)
+    camera = parameters.scene.camera
+    shrink = max(max(camera.width, camera.height) // _GLANCE, 1)
+    image = shots[0].coarse(shrink, _SHARP)
     found[names.index("noise.dark_level")] = _dark(image)
     for _ in range(2):
-        model = _whole(parameters, found, noise)
-        there, here = _outline(image), _outline(model)
+        there, here = _outline(image), _outline(_whole(parameters, found, noise, shrink))
         if there is None or here is None:
             return values
         camera = parameters.scene_at(found).camera
-        pixel = camera.distance / camera.focal_px
+        away = (there[0] - here[0]) * shrink * camera.distance / camera.focal_px
         found[names.index("camera.distance")] *= np.clip(np.sqrt(here[1] / there[1]), 0.7, 1.4)
-        found[names.index("aim.right")] -= (there[0] - here[0])[0] * pixel
-        found[names.index("aim.down")] -= (there[0] - here[0])[1] * pixel
+        found[names.index("aim.right")] -= away[0]
+        found[names.index("aim.down")] -= away[1]
         found[names.index("camera.exposure")] *= np.clip(there[2] / here[2], 0.2, 5.0)
     low, high = (np.array([getattr(each, side) for each in parameters.free]) for side in ("low", "high"))
     return np.clip(found, low, high)
 
 
-def _whole(parameters: Parameters, values: np.ndarray, noise: Noise) -> np.ndarray:
+def _whole(parameters: Parameters, values: np.ndarray, noise: Noise, shrink: int) -> np.ndarray:
     camera = parameters.scene.camera
-    y, x = np.mgrid[: camera.height, : camera.width]
-    pixels = Pixels(x.ravel(), y.ravel(), x.shape)
-    return Problem(parameters, (), (pixels,)).levels(values, noise, 0).reshape(x.shape)
+    y, x = np.mgrid[: camera.height // shrink, : camera.width // shrink]
+    pixels = Pixels(x.ravel(), y.ravel(), (1, *x.shape))
+    return Problem(parameters, (), (pixels,), shrink, _SHARP).levels(values, noise, 0).reshape(x.shape)
 
 
 def _dark(image: np.ndarray) -> float:

@@ -13,6 +13,7 @@ from planner.imaging.pictures import Pictures
 from scenes import InvalidInput, Picture, Scene
 
 _NONE = np.empty(0, int)
+_AT_ONCE = 1 << 18  # pixels, which bounds the memory
 
 
 def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.ndarray:
@@ -46,9 +47,12 @@ def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.n
     if not picture.lights:
         raise InvalidInput("light must be given, got none")
     camera = picture.scene.camera
-    y, x = (part.ravel() for part in np.mgrid[: camera.height, : camera.width])
-    found = signal_at(Pictures.of(picture), x, y) + picture.scene.noise.dark_level
-    return found.reshape(camera.height, camera.width)
+    found = np.empty((camera.height, camera.width))
+    rows = max(_AT_ONCE // camera.width, 1)
+    for top in range(0, camera.height, rows):
+        y, x = np.mgrid[top : min(top + rows, camera.height), : camera.width]
+        found[top : top + rows] = signal_at(Pictures.of(picture), x.ravel(), y.ravel()).reshape(x.shape)
+    return found + picture.scene.noise.dark_level
 
 
 def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:

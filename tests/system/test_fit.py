@@ -61,7 +61,7 @@ def test_what_the_model_does_not_know_is_a_misfit(shot, how):
 
 
 def test_standard_errors_are_those_of_repeated_fits(small):
-    """Joint chi-square of all parameters; errors 1.5 times too small, twice too large, a blur off by 0.06 px show."""
+    """Joint chi-square of all parameters: errors 1.5 times too small or twice too large, and a wrong blur, show."""
     hidden, _, found = small
     told = [pulls(hidden, each) for each in found]
     square, freedom = np.sum([joint(hidden, each) for each in found], axis=0)

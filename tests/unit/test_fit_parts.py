@@ -35,6 +35,21 @@ def test_photographs_of_one_pose_are_told_from_others(small, rng):
     assert grouped(images)[0].scatter.mean() == pytest.approx(4.0, rel=0.05)
 
 
+def test_a_large_object_is_seen_in_squares(problem):
+    """All edges are in, no pixel twice, and the whole is about as many pixels as asked for."""
+    pictures = problem.parameters.pictures_at(problem.parameters.start(), 0)
+    whole, some = Pixels.around(pictures), Pixels.around(pictures, 2000)
+    assert whole.shape[0] == 1
+    assert some.shape[1:] == (16, 16)
+    assert some.x.size < whole.x.size
+    assert np.unique(some.y * 1000 + some.x).size == some.x.size
+    image = problem.shots[0].mean
+    steep = np.argwhere(np.hypot(*np.gradient(image)) > 5)
+    here = set(zip(some.y.tolist(), some.x.tolist(), strict=True))
+    assert all((y, x) in here for y, x in steep.tolist())
+    assert (some.of(image) == image[some.y, some.x]).all()
+
+
 def test_photographs_of_two_sizes_are_refused():
     with pytest.raises(InvalidInput, match=r"photographs must be of one size, got 9 x 8, 8 x 8"):
         grouped([np.zeros((8, 9)), np.zeros((8, 8))])

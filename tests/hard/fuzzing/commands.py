@@ -53,6 +53,13 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--threshold": ("1e9", "5"),
         "--lens": ("SCENE", "IMAGE"), "--json": (),
     }),
+    "fit": (["SCENE", "IMAGE", "--sensor", "30,135", "--light", "15,315"], {
+        "--sensor": _POSE, "--light": _POSE, "--free": ("focal", "k1", "focal,k1", ","), "--noise": ("given", "x"),
+        "-o": ("OUT.toml", "FILE/x.toml"), "--residuals": ("OUT.png",), "--json": (),
+    }),
+    "predict": (["SCENE"], {
+        "--sensor": _POSE, "--light": _POSE, "--model": ("paper", "bound", "x"), "--json": (),
+    }),
     "effects": (["SCENE"], {
         "--effects": ("auto", "all", "floor"), "--leave-out-px": ("1", "0"), "--leave-out-variance": ("1",),
         "--json": (),
