@@ -1,4 +1,4 @@
-"""``python -m tests.proofs`` with boards, conditions, crowded, kill, large, lights, parts, rate, stations or uneven."""
+"""``python -m tests.proofs`` with boards, conditions, crowded, kill, large, lights, limbs, parts, rate, stations or uneven."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tests.proofs.crowded import crowded
 from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
+from tests.proofs.limbs import limbs
 from tests.proofs.parts import parts
 from tests.proofs.rate import rate
 from tests.proofs.stations import stations
@@ -22,6 +23,7 @@ app.command()(crowded)
 app.command()(kill)
 app.command()(large)
 app.command()(lights)
+app.command()(limbs)
 app.command()(parts)
 app.command()(rate)
 app.command()(uneven)
