@@ -13,7 +13,7 @@ from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
 from measure.features.tools import RimTool, held
 from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
-from planner.features.limb_look import LimbLook, limb_look, seen_along
+from planner.features.limb_look import LimbLook, clear_of_others, limb_look, seen_along
 from planner.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
 from planner.features.locator import MIN_CONTRAST, edge_blur
 from planner.imaging.lens import image_centre
@@ -52,9 +52,9 @@ def _weights(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: Lim
     shown, arc = seen_along(pictures, curved, outline), np.nan_to_num(outline.arc)
     if shown.sum() < LEAST_SEEN * shown.size:
         return np.zeros(shown.size), status.NOT_VISIBLE
-    clear = clear_of_ends(outline, pictures.scene)
     if seen is None:
-        return np.where(shown & clear, arc, 0.0), status.CLUTTER
+        return np.where(shown & clear_of_ends(outline, pictures.scene), arc, 0.0), status.CLUTTER
+    clear = clear_of_others(pictures, curved, outline, seen)
     strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
     if strong.mean() < LEAST_SEEN:
         return np.zeros(shown.size), status.LOW_CONTRAST

@@ -8,19 +8,21 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from planner.features.limb_locator import box_cumulant, limb_crossing
-from planner.features.limb_outline import LimbOutline, framed
+from planner.features.limb_outline import LimbOutline, clear_of_ends, framed
 from planner.features.locator import edge_blur, reach
+from planner.features.rim_sides import equal_angles, radials, steady, to_curve
 from planner.features.sampling import sampled_places
 from planner.imaging import sensor
 from planner.imaging.appearance import behind, has_background, signal
 from planner.imaging.lens import image_centre
 from planner.imaging.limbs.shading import Profile, fitted
 from planner.imaging.pictures import Pictures
-from planner.imaging.projection import camera_frame
+from planner.imaging.projection import camera_frame, from_axis
 from planner.imaging.rays import first_face
 from scenes import Curved
 
 _NODES = 12  # places inside the limb at which the level is found
+_BEFORE = 1e-3  # of the way to a rim: nearer than its facets are to it
 _FARTHEST = 1.0  # px that a crossing may be moved
 _ROUGH = 0.02  # of the contrast that the profile's terms may leave out
 _STEEPER = 3.0  # times a lone step's slope that the crossing may have, and a third of it
@@ -96,6 +98,22 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
     camera, scale = pictures.scene.camera, pictures.scene.locator.scale_px
     at, outward = np.nan_to_num(outline.at) + image_centre(camera), np.nan_to_num(outline.outward)
     return sampled_places(at, outward, camera.blur_px, scale)
+
+
+def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
+    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n)."""
+    scene, found = pictures.scene, clear_of_ends(outline, pictures.scene)
+    if scene.bodies.is_convex:
+        return found
+    far, at = reach(scene.locator.scale_px, scene.camera.blur_px), np.nan_to_num(outline.at, nan=1e9)
+    for circle in scene.solid.circles:
+        places = circle.centre + circle.radius * radials(circle, equal_angles())
+        there = from_axis(places, pictures.sensors, scene.camera)
+        eye, to = np.broadcast_arrays(pictures.sensor_at[..., None, :], places)
+        _, t = first_face(scene.bodies, eye, to - eye, ())
+        found = found & (to_curve(at, there, t > 1 - _BEFORE) >= far)
+    lit = np.where(seen.good, seen.squared, 0.0)
+    return found & steady(lit, np.zeros(lit.shape), np.nan_to_num(outline.arc), far)
 
 
 def _free(scene, curved: Curved, start: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from planner.features.circles import Rim
-from planner.features.limb_look import LimbLook, limb_look
-from planner.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
+from planner.features.limb_look import LimbLook, clear_of_others, limb_look
+from planner.features.limb_outline import LIMB_POINTS, LimbOutline, limb_outline
 from planner.imaging.pictures import Pictures
 from scenes import Curved
 
@@ -23,8 +23,23 @@ def limb_rim(pictures: Pictures, curved: Curved) -> Rim:
 def _limb_rim(pictures: Pictures, curved: Curved) -> Rim:
     outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
     seen = limb_look(pictures, curved, outline)
-    clear = seen.good & clear_of_ends(outline, pictures.scene)
+    clear = seen.good & clear_of_others(pictures, curved, outline, seen)
     return rim_of(outline, seen, clear)
+
+
+def step_model_error(pictures: Pictures, curved: Curved) -> np.ndarray:
+    """What the three parameters would be off by if the limb of one picture were taken for a step, (3,).
+
+    By least squares, weighted as they are found; NaN where they are not.
+    """
+    outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
+    seen, each = limb_look(pictures, curved, outline), limb_rim(pictures, curved)
+    weight = np.where(each.clear, each.arc * each.squared / each.noise_variance, 0.0)
+    size = np.sqrt(weight @ each.design**2)
+    if not (size > 0).all():
+        return np.full(3, np.nan)
+    root = np.sqrt(weight)
+    return np.linalg.lstsq(root[:, None] * each.design / size, root * seen.shift, rcond=None)[0] / size
 
 
 def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> Rim:

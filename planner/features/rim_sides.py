@@ -150,13 +150,13 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
             far = other.centre + other.radius * spokes
             wall = -spokes if other.hole else spokes
             turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
-            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, far), turned))
+            nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), turned))
     own = {name for rim in solid.circles for name in rim.edges}
     for edge in solid.edges:
         if circle.face in edge.faces and edge.name not in own:
             start, stop = solid.vertices[list(edge.ends)]
             places = start + np.linspace(0, 1, _STRAIGHT)[:, None] * (stop - start)
-            nearest = np.minimum(nearest, _to_curve(there, _image(pictures, places)))
+            nearest = np.minimum(nearest, to_curve(there, _image(pictures, places)))
     return nearest
 
 
@@ -178,7 +178,7 @@ def _coaxial(circle: Circle, other: Circle) -> bool:
     )
 
 
-def _to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
+def to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
     """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n).
 
     Of a closed one where ``shown`` (..., k) says which of its pieces count, each from its first point.

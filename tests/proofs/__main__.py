@@ -11,6 +11,7 @@ from tests.proofs.fits import fits
 from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
+from tests.proofs.limbs import limbs
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
 from tests.proofs.rate import rate
@@ -25,6 +26,7 @@ app.command()(fits)
 app.command()(kill)
 app.command()(large)
 app.command()(lights)
+app.command()(limbs)
 app.command()(parts)
 app.command()(photographs)
 app.command()(rate)

@@ -10,6 +10,7 @@ import numpy as np
 from planner.features.projected_edges import image_fractions, straight
 from planner.imaging.appearance import edge_contrast
 from planner.imaging.pictures import Pictures
+from scenes import InvalidInput
 from validation.batch.campaign import Case
 from validation.cost.parameter import Fit, Parameter, slope
 
@@ -40,7 +41,15 @@ RULES: dict[str, Callable] = {"equal weights": equal, "trapezoid": trapezoid, "G
 
 
 def points_parameter(case: Case) -> Parameter:
-    """Largest relative error over the required edges of a line's end variance, by rule and number of points."""
+    """Largest relative error over the required edges of a line's end variance, by rule and number of points.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene needs no straight edge.
+    """
+    if not straight(case.scene):
+        raise InvalidInput(f"measurands must need a straight edge for points along it, got none in {case.scene.name}")
     exact, rows = _end_variance(case, *gauss(_EXACT)), []
     for name, rule in RULES.items():
         for count in _POINTS:

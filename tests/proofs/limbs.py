@@ -1,0 +1,128 @@
+"""Diameters by their limbs at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
+
+A ball under a point of light; a shaft under two, one on each side, for a point lights but one of its limbs; the shaft
+against a backlight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import measure
+import planner
+import render
+import scenes
+from planner.features.limbs import step_model_error
+from scenes import InvalidInput, Light, Scene
+from validation.statistics import Verdict, verdict
+
+_MOST_LIGHT, _MOST_TILT = 50.0, 12.0  # degrees: of the light from the sensor, of the sensor from the backlight's axis
+
+
+@dataclass(frozen=True)
+class Row:
+    """One diameter from one pose: in the scene's unit, variances not sigmas."""
+
+    name: str
+    sensor: tuple[float, float]
+    status: str
+    calibrated: float
+    propagated: float
+    measured: float
+    count: int
+    bias: float
+    as_step: float
+
+
+def scene_of(kind: str, small: bool = False) -> Scene:
+    """``ball``, ``shaft-front`` or ``shaft-back``; ``small`` with a quarter of the pixels."""
+    found = scenes.load(kind.split("-")[0])
+    if kind == "shaft-front":
+        found = found.lit_by(Light(distance=500.0), Light(distance=500.0))
+    camera = found.camera
+    if small:
+        half = {"width": camera.width // 2, "height": camera.height // 2, "focal_px": camera.focal_px / 2}
+        camera = camera.model_copy(update=half)
+    return found.model_copy(update={"settings": (), "camera": camera})
+
+
+def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tuple | None]:
+    """A sensor and its lights; a shaft lies along x, and along the image."""
+    across = float(rng.choice([90.0, 270.0]))
+    if kind == "shaft-back":
+        return (float(rng.uniform(1, _MOST_TILT)), across + float(rng.uniform(-20, 20))), None
+    if kind == "shaft-front":
+        sides = [(float(rng.uniform(45, 75)), turn + float(rng.uniform(-20, 20))) for turn in (90.0, 270.0)]
+        return (float(rng.uniform(1, 25)), across + float(rng.uniform(-20, 20))), tuple(sides)
+    polar, azimuth = float(rng.uniform(10, 80)), float(rng.uniform(0, 360))
+    turn = rng.uniform(-_MOST_LIGHT, _MOST_LIGHT, 2)
+    return (polar, azimuth), (float(np.clip(polar + turn[0], 0, 85)), azimuth + float(turn[1]))
+
+
+def rows_at(scene: Scene, sensor, light, images: int, seed: int, quality: render.Quality = render.Quality()):
+    """Every diameter of a scene from one pose."""
+    picture = scenes.Picture.of(scene, sensor, light)
+    told, clean = planner.predict(picture), render.image(picture, quality=quality)
+    known = measure.propagate(clean, picture, estimator="gradient").measurands
+    noisy = render.expose(clean, scene.noise, np.random.default_rng(seed), images)
+    found = measure.measure(noisy, picture, estimator="gradient")
+    rows = []
+    for m, forecast in enumerate(told.measurands):
+        values = found.value[np.isfinite(found.value[:, m]), m]
+        status = forecast.status if forecast.status != "ok" else known.status[m]
+        wall = scene.solid.round(scene.quantities[m].features[0].surface)
+        as_step = 2 * float(step_model_error(planner.Pictures.of(picture), wall)[2])
+        rows.append(
+            Row(
+                forecast.name, sensor, status, forecast.variance_object, float(known.covariance[m, m]),
+                float(values.var(ddof=1)) if len(values) > 1 else np.nan, len(values),
+                float(values.mean() - 2 * wall.radius) if len(values) else np.nan, as_step,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def judged(rows: list[Row], images: int) -> Verdict:
+    """Of those that promise to be right."""
+    good = [row for row in rows if row.status == "ok"]
+    return verdict(
+        [row.measured / row.propagated for row in good],
+        [row.count for row in good],
+        lost=[images - row.count for row in good],
+        bias_px=[row.bias for row in good],
+        sigma_px=[row.propagated**0.5 for row in good],
+    )
+
+
+def limbs(
+    count: Annotated[int, typer.Option(help="Poses a scene.")] = 20,
+    images: Annotated[int, typer.Option(help="Noisy images a pose.")] = 200,
+    only: Annotated[str, typer.Option(help="ball, shaft-front, shaft-back, or all.")] = "all",
+    seed: int = 1995,
+) -> None:
+    """Variance and bias of diameters from limbs at random poses."""
+    failed = False
+    for kind in ("ball", "shaft-front", "shaft-back") if only == "all" else (only,):
+        scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
+        while len({row.sensor for row in rows}) < count:
+            try:
+                rows += rows_at(scene, *poses(kind, rng), images, int(rng.integers(1 << 31)))
+            except InvalidInput:  # a sensor within the shaft
+                continue
+        for row in rows:
+            sigma = row.propagated**0.5
+            print(
+                f"{kind} {row.name} ({row.sensor[0]:.0f}, {row.sensor[1]:.0f}) {row.status}: sigma {sigma:.5f}, "
+                f"measured / propagated {row.measured / row.propagated:.3f}, calibrated / propagated "
+                f"{row.calibrated / row.propagated:.3f}, bias {row.bias / sigma:+.2f} sigma, "
+                f"as a step {row.as_step / sigma:+.1f}"
+            )
+        found = judged(rows, images)
+        good = sum(row.status == "ok" for row in rows)
+        print(f"{kind}: {good} of {len(rows)} ok; {found.text}")
+        failed |= not found.agrees
+    raise typer.Exit(int(failed))

@@ -1,0 +1,92 @@
+"""Curved bodies end to end: what moves their limbs, what is refused, and prediction beside measurement."""
+
+import numpy as np
+import pytest
+
+import scenes
+from planner.features.limb_outline import limb_outline
+from planner.features.limbs import limb_rim
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import sensor_position
+from render import Quality
+from scenes import Ball, InvalidInput, Turned
+from tests.proofs.limbs import rows_at, scene_of
+
+QUICK = Quality(edge_samples=16)
+CONE = Turned(kind="turned", profile=[(-5.0, 3.0), (5.0, 2.0), (5.0, 4.0), (9.0, 4.0)]).solid
+BALL = Ball(kind="ball", radius=3.0, centre=(0.5, -0.2, 0.3)).solid
+
+
+@pytest.mark.parametrize("curved", [*BALL.curved, *CONE.curved], ids=["ball", "cone", "cylinder"])
+@pytest.mark.parametrize("which", range(3))
+def test_limb_moves_as_its_design_says(curved, which):
+    """Central differences of the outline along its normal, relative to 1e-6."""
+    camera = scenes.load("ball").camera.model_copy(update={"look_at": (0, 0, 0)})
+    pose, step = np.array([70.0, 30.0]), 1e-4
+    nominal, eye = limb_outline(curved, pose, camera, 32), sensor_position(camera, pose)
+    error = np.eye(3)[which] * step
+    ahead, behind = (limb_outline(curved.moved(eye, tuple(sign * error)), pose, camera, 32) for sign in (1, -1))
+    seen = nominal.seen & ahead.seen & behind.seen
+    moved = ((ahead.at - behind.at) * nominal.outward).sum(-1)[seen] / (2 * step)
+    assert seen.any()
+    assert np.abs(moved - nominal.design[seen, which]).max() < 1e-6 * np.abs(nominal.design[seen]).max()
+
+
+def test_walls_of_a_turned_part_are_told_with_their_facets():
+    assert [(c.name, type(c.surface).__name__, c.radius, len(c.faces)) for c in CONE.curved] == [
+        ("d1", "Cone", 2.5, 48), ("d2", "Cylinder", 4.0, 48),
+    ]  # fmt: skip
+    for curved in CONE.curved:
+        corners = CONE.vertices[[v for f in curved.faces for v in CONE.faces[f]]]
+        assert np.abs(curved.surface.values(corners)).max() < 1e-12
+    assert not CONE.sharp
+
+
+@pytest.mark.parametrize(
+    ("part", "values", "match"),
+    [
+        ("object", {"kind": "turned", "profile": [[0, 1], [-1, 1]]}, "profile must be different points"),
+        ("object", {"kind": "turned", "profile": [[0, 1], [0, 2], [1, 2]]}, "profile must begin and end with a wall"),
+        ("object", {"kind": "ball", "radius": 0}, "radius"),
+        ("camera", {"lens": {"distortion": [0.1, 0, 0, 0, 0]}}, "lens must be without distortion"),
+    ],
+)
+def test_what_limbs_are_not_known_with_is_refused(part, values, match):
+    data = scenes.load("ball").model_dump(mode="json", exclude_defaults=True)
+    data[part] = values if part == "object" else data[part] | values
+    with pytest.raises(ValueError, match=match):
+        scenes.Scene.model_validate(data)
+
+
+def test_an_unknown_surface_is_refused():
+    data = scenes.load("ball").model_dump(mode="json", exclude_defaults=True)
+    data["measurands"][0]["features"] = [{"surface": "egg"}]
+    with pytest.raises(ValueError, match=r"surface must be one of ball, got 'egg'"):
+        scenes.Scene.model_validate(data)
+
+
+def test_a_light_on_one_side_shows_one_limb_of_a_shaft():
+    """Its other limb is dark before darkness: radius and place cannot be told apart."""
+    scene = scene_of("shaft-front", small=True)
+    lone = scene.lit_by(scene.lights[0])
+    found = limb_rim(Pictures.of(lone, np.array([10.0, 90.0]), np.array([60.0, 90.0])), lone.solid.round("d2"))
+    lit = (found.squared > 0) & found.clear
+    assert lit.any()
+    assert not (lit[: len(lit) // 2].any() and lit[len(lit) // 2 :].any())
+
+
+@pytest.mark.parametrize(("kind", "sensor", "light"), [("ball", (40, 90), (40, 60)), ("shaft-back", (3, 85), None)])
+def test_diameters_are_measured_as_predicted(kind, sensor, light):
+    """Reduced form of ``python -m tests.proofs limbs``: 100 images, variance within 3.5 standard errors."""
+    images = 100
+    for row in rows_at(scene_of(kind, small=True), sensor, light, images, 7, QUICK):
+        sigma, error = row.propagated**0.5, np.sqrt(2 / (images - 1))
+        assert row.status == "ok"
+        assert row.count == images
+        assert abs(row.measured / row.propagated - 1) < 3.5 * error
+        assert abs(row.calibrated / row.propagated - 1) < 0.1
+        assert abs(row.bias) < (0.3 + 3.5 / images**0.5) * sigma
+        if kind == "ball":
+            assert abs(row.as_step) > 5 * sigma  # what is corrected
+    with pytest.raises(InvalidInput, match="sensor"):
+        rows_at(scene_of(kind, small=True), (0, 0, 0), light, 2, 7)
