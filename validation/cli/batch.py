@@ -51,6 +51,7 @@ Accuracy = Annotated[
     typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
 ]
 Budget = Annotated[str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")]
+Explain = Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")]
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
 
@@ -68,6 +69,7 @@ def validate_command(
     effects: Effects = "auto",
     bias_px: LeaveOutPx = None,
     variance: LeaveOutVariance = None,
+    explain: Explain = False,
     log_json: LogJson = False,
     as_json: Json = False,
 ) -> None:
@@ -99,25 +101,30 @@ def validate_command(
                 how |= {"say": lambda line: print(line, file=sys.stderr), "progress": shown, "started": started}
                 found, goal = reach(loaded, accuracy, limit, **how)
         _write(loaded, found, how["out"])
-    _show(found, goal and replace(goal, seconds=time.perf_counter() - started), how["out"], as_json)
+    goal = goal and replace(goal, seconds=time.perf_counter() - started)
+    _show(found, goal, out, as_json, explain, None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene)
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
-def _show(found: Validation, goal: Reached | None, directory: Path, as_json: bool) -> None:
-    """The whole result, as JSON or as tables."""
+def _show(
+    found: Validation, goal: Reached | None, directory: Path, as_json: bool, explain: bool, scene: str | None
+) -> None:
+    """The whole result, as JSON or as tables; ``scene`` as it was named, None of a campaign."""
     if as_json:
         from validation.batch.document import pieces
 
         sys.stdout.writelines(pieces(found, {"goal": goal.to_json()} if goal else None))
         print()
         return
+    from validation.report import guide
     from validation.report.table import report
 
     shown_on = console()
-    shown_on.print(report(found))
+    shown_on.print(report(found, explain))
     if goal:
         shown_on.print(goal.text, highlight=False)
-    shown_on.print(f"Run file, table.csv and pictures: {directory}", highlight=False)
+    for line in (guide.directory_line(directory), guide.next_line(found, scene, directory)):
+        shown_on.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _goal(accuracy: float | None, budget: str | None) -> float | None:
