@@ -64,8 +64,8 @@ def words(text: str) -> Markup:
     >>> words("`ice plan` of v3-v6 & more")
     Markup('<code>ice plan</code> of <span class="name">v3-v6</span> &amp; more')
     """
-    shown = re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text)))
-    return Markup(re.sub(r"(?<=[ >])\w+(?:-\w+)+(?=[ <.,:;]|$)", r'<span class="name">\g<0></span>', shown))
+    shown = re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%")
+    return Markup(re.sub(r"(?<![\w&;<-])\w[\w.]*(?:-[\w.]*\w)+(?!\w)", r'<span class="name">\g<0></span>', shown))
 
 
 def markdown(text: str) -> str:
