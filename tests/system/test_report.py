@@ -92,7 +92,7 @@ def test_markdown_has_the_same_tables(found, page):
     lines = page.with_suffix(".md").read_text().splitlines()
     assert f"**{found[0].verdict.text}**" in lines
     rows = [line for line in lines if re.match(r"\| [1-4] \| (2.4|4.8) \|", line)]
-    assert len(rows) == 2 * 4
+    assert len(rows) == 3 * 4
     widths = {line.count("|") for line in lines if line.startswith("|")}
     assert max(widths) > 8
 
@@ -133,17 +133,45 @@ def test_in_a_browser(found, page, tmp_path):
     assert Page(dom.stdout).verdict == found[0].verdict.text
 
 
+LOOK = """
+const d = this.contentDocument, wide = d.documentElement.clientWidth;
+const free = [...d.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || e.matches('.wide'));
+const boxes = [...d.querySelectorAll('.wide')];
+const size = e => parseFloat(d.defaultView.getComputedStyle(e).fontSize);
+document.title = [
+  d.documentElement.scrollWidth, wide,
+  free.filter(e => e.getBoundingClientRect().right > wide + 0.5).length,
+  [...d.body.querySelectorAll('*')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0
+    && d.defaultView.getComputedStyle(e).overflowX != 'auto').length,
+  boxes.filter(e => !(e.nextElementSibling?.textContent.length > 40)).length,
+  [...d.querySelectorAll('.name')].filter(e => e.offsetHeight > 2 * size(e) && e.offsetWidth < wide / 3).length,
+  boxes.length,
+]
+"""
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
-def test_nothing_is_cut_off_on_a_phone(page, tmp_path):
-    """In a frame 390 px wide, for no window is as narrow: wide tables scroll in their own box, the page does not."""
-    phone = tmp_path / "phone.html"
-    look = "const d = this.contentDocument.documentElement; document.title = [d.scrollWidth, d.clientWidth]"
-    phone.write_text(
-        f'<title></title><iframe src="{page.as_uri()}" width=390 height=800 style="border:0" onload="{look}"></iframe>'
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("broken", [False, True])
+def test_nothing_is_cut_off(page, tmp_path, width, broken):
+    """In a frame, for no window is as narrow as a phone: wide tables scroll in their own box, all else fits.
+
+    The negative control has a line that fits nowhere.
+    """
+    text = page.read_text()
+    bad = '<p style="white-space: nowrap">' + 300 * "wide " + "</p></main>"
+    (tmp_path / "page.html").write_text(text.replace("</main>", bad) if broken else text)
+    frame = (
+        f"<title></title><iframe src='page.html' width={width} height=800 style='border:0' onload=\"{LOOK}\"></iframe>"
     )
-    dom = browse(tmp_path, phone, 800, "--allow-file-access-from-files", "--dump-dom")
-    wide, window = map(int, re.search("<title>([0-9,]+)</title>", dom.stdout)[1].split(","))
-    assert wide <= window <= 390
+    (tmp_path / "frame.html").write_text(frame)
+    dom = browse(tmp_path, tmp_path / "frame.html", 1400, "--allow-file-access-from-files", "--dump-dom")
+    found = list(map(int, re.search("<title>([0-9,]+)</title>", dom.stdout)[1].split(",")))
+    whole, window, outside, clipped, unexplained, split, tables = found
+    assert window <= width
+    assert (whole <= window and not clipped) == (not broken)
+    assert (outside, unexplained, split) == (0, 0, 0) or broken
+    assert tables >= 5
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")

@@ -32,7 +32,10 @@ def block(*measurands):
     ("measurand", "line"),
     [
         ({"kind": "width", "features": [V3, {"edge": "e4"}]}, "features must be an edge, then an edge for kind width"),
-        ({"kind": "diameter", "features": [{"edge": "e4"}]}, "features must be a circle or a curved surface for kind diameter, got e4"),
+        (
+            {"kind": "diameter", "features": [{"edge": "e4"}]},
+            "features must be a circle or a curved surface for kind diameter, got e4",
+        ),
         ({"kind": "offset", "features": [V3]}, "features must be a corner or a circle, then an edge for kind offset"),
         ({"kind": "depth", "features": [V3]}, "kind must be one of 'distance', 'width'"),
         ({"kind": "angle", "features": [{"edge": "e4"}, {"edge": "e7"}]}, "must be edges that are not parallel"),

@@ -60,6 +60,7 @@ Photos = Annotated[
 ExactPoses = Annotated[
     bool, typer.Option("--exact-poses", help="With --photos: poses are exactly those said, so judge mean errors, too.")
 ]
+Explain = Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")]
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
 
@@ -79,6 +80,7 @@ def validate_command(
     variance: LeaveOutVariance = None,
     photos: Photos = None,
     exact_poses: ExactPoses = False,
+    explain: Explain = False,
     log_json: LogJson = False,
     as_json: Json = False,
 ) -> None:
@@ -115,7 +117,9 @@ def validate_command(
                 how |= {"say": lambda line: print(line, file=sys.stderr), "progress": shown, "started": started}
                 found, goal = reach(loaded, accuracy, limit, **how)
         _write(loaded, found, how["out"])
-    _show(found, goal and replace(goal, seconds=time.perf_counter() - started), how["out"], as_json, taken)
+    goal = goal and replace(goal, seconds=time.perf_counter() - started)
+    one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
+    _show(found, goal, out, as_json, explain, one, taken)
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
@@ -145,9 +149,11 @@ def _show(
     goal: Reached | None,
     directory: Path,
     as_json: bool,
-    taken: photographs.Photographs | None = None,
+    explain: bool,
+    scene: str | None,
+    taken: photographs.Photographs | None,
 ) -> None:
-    """The whole result, as JSON or as tables."""
+    """The whole result, as JSON or as tables; ``scene`` as it was named, None of a campaign."""
     if as_json:
         from validation.batch.document import pieces
 
@@ -155,13 +161,15 @@ def _show(
         sys.stdout.writelines(pieces(found, more))
         print()
         return
+    from validation.report import guide
     from validation.report.table import report
 
     shown_on = console()
-    shown_on.print(report(found))
+    shown_on.print(report(found, explain))
     if goal:
         shown_on.print(goal.text, highlight=False)
-    shown_on.print(f"Run file, table.csv and pictures: {directory}", highlight=False)
+    for line in (guide.directory_line(directory), guide.next_line(found, scene, directory)):
+        shown_on.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _goal(accuracy: float | None, budget: str | None) -> float | None:

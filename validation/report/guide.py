@@ -1,0 +1,162 @@
+"""What a run's tables say to a reader who sees them for the first time: their terms, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable
+from pathlib import Path
+
+from validation.batch.result import Validation
+from validation.statistics import LEVEL
+
+_LOCATORS = {
+    "gradient": "zero of the second derivative",
+    "canny": "the classic pipeline, @ its threshold",
+    "isophote": "where the smoothed image takes the mean of both sides' levels",
+    "strip": "maximum likelihood along each edge",
+    "arrangement": "maximum likelihood of all faces around the edges together",
+}
+_STATUSES = {
+    "clutter": "what lies around an edge biases the value",
+    "short": "too little of an edge is left",
+    "low_contrast": "too little of an edge stands out of the noise",
+    "sign_change": "the contrast changes sign along an edge",
+    "not_visible": "an edge is hidden or outside the image",
+    "ill_conditioned": "edges nearly parallel, or the image tells too little of what is near",
+    "ambiguous": "another solution explains the image as well",
+    "misfit": "the image is not what the model says",
+}
+
+
+def paper_terms(found: Validation) -> list[str]:
+    """The columns of what the paper printed, one line each."""
+    lines = []
+    if any(row.paper_ice for row in found.rows):
+        lines.append(
+            "paper ICE: variance predicted by the paper, px^2. ours ICE: its formula, with one free scale for all rows."
+        )
+    if any(row.paper_real for row in found.rows):
+        lines.append(
+            "paper real 12.0, 10.0: variance of the paper's photographs, px^2, by edge threshold. - : it prints none."
+        )
+    return lines
+
+
+def variance_terms(methods: Iterable[str], images: int) -> list[str]:
+    """The columns of predicted and measured variances, one line each."""
+    return [
+        "calibrated: predicted without any image. propagated: predicted from one noise-free picture. 1e-4 px^2 each.",
+        f"measured: variance over {images} noisy pictures, 1e-4 px^2. {_locators(methods)}.",
+        "Cramer-Rao bound: what no unbiased measurement of the picture can go below, 1e-4 px^2.",
+    ]
+
+
+def _locators(methods: Iterable[str]) -> str:
+    known = dict.fromkeys(name.split("@")[0] for name in methods)
+    return ". ".join(f"{name}: {_LOCATORS[name]}" for name in known if name in _LOCATORS)
+
+
+def ratio_terms(main: str, methods: int) -> list[str]:
+    """The columns of ratios and errors, one line each."""
+    none = " ".join(["0"] * methods)
+    return [
+        "* : 1 lies outside the interval, as it does by chance in one row of 20.",
+        f'n: noisy pictures. failed: those without a value, one number a method ("{none}": none).' if methods > 1 else
+        "n: noisy pictures. failed: those without a value.",
+        "bias: mean error, as predicted and as measured. rmse: root mean square error, sqrt(variance + bias^2).",
+        f"The verdict is about {main}, as are bias and rmse.",
+    ]  # fmt: skip
+
+
+def unit_terms(statuses: Iterable[str], judged: bool) -> list[str]:
+    """The columns of the table in the scene's unit, one line each; ``judged``: whether the verdict is about them."""
+    which = "all are judged" if judged else "that of the image is judged"
+    return [
+        "value: of the object itself. sigma: standard deviation of one picture's; compare it with your tolerance.",
+        f"ratio: of variances, measured / propagated, with its 95 % interval; {which}. bias: mean less value.",
+        *status_terms(statuses),
+    ]
+
+
+def status_terms(found: Iterable[str]) -> list[str]:
+    """What each status but ``ok`` says, one line each."""
+    return [f"{name}: {_STATUSES[name]}." for name in dict.fromkeys(found) if name in _STATUSES]
+
+
+def correlation_terms() -> list[str]:
+    """What the correlations are of."""
+    return ["1: the columns rank the settings alike. It says nothing of their size, of which the ratios above tell."]
+
+
+def verdict_terms() -> list[str]:
+    """What the last paragraph compares."""
+    return [
+        f"p-value: chance of so large a difference if the prediction is right. Each is compared with a limit that makes"
+        f" a false alarm {100 * LEVEL:g} % likely over all rows (Sidak) and tests (Bonferroni)."
+    ]
+
+
+EXPLAINED = f"""\
+How to read this
+
+  What is done. Each setting is a place of the camera (sensor) and of the lamp (light), as (polar angle, azimuth) in
+  degrees. Its picture is rendered once without noise; then noisy pictures are made of it, each is measured, and the
+  scatter of the measured values is compared with what was predicted.
+
+  calibrated   Variance predicted from a formula of camera, light, surface and noise: no picture is needed. `ice plan`
+               minimises it.
+  propagated   Variance predicted from one noise-free picture, by what the measurement does to small errors of its
+               pixels. The verdict compares with it.
+  measured     Sample variance over the noisy pictures. Its 95 % interval (chi-square) is as wide as the number of
+               pictures makes it: 9 % with 1000, 3 % with 10000.
+  gradient     Finds an edge where the second derivative of the smoothed picture across it is zero.
+  canny@12     The classic pipeline: pixels whose gradient is above 12 grey levels a pixel, thinned, each refined.
+  Cramer-Rao   No unbiased measurement of the same picture can have less variance.
+  ICE          The name that the paper (Yi, Haralick, Shapiro 1995) gives to its predicted variance. Its unit of
+               intensity is not printed, so one scale is free for all rows of ours.
+  paper real   What the paper measured on photographs, five a setting, with thresholds of 12.0 and 10.0; N/A is "-".
+  failed       Pictures without a value, one number a method: "0 0 0" is none by any of three.
+  bias, rmse   Mean error, and sqrt(variance + bias^2). The predicted bias is that of the edge finder, without noise.
+  status       ok: value and sigma can be trusted. Others say why not; each that occurs is explained below its table.
+  *            1 lies outside the 95 % interval. One row of 20 has it by chance: count them, do not judge one.
+  Sidak        With many rows a small p-value occurs by chance. The limit for the smallest of m rows is
+               1 - (1 - a)^(1 / m). Three tests - each row's variance, all rows pooled, mean errors - have each an a;
+               they add up to {100 * LEVEL:g} %, the chance of a false alarm (Bonferroni).
+  agree        No test found a difference. contradict: one did, or most rows could not be measured.
+"""
+
+
+def directory_line(directory: Path) -> str:
+    """Where a run's files are."""
+    return f"Files: {directory} (table.csv, measurands.csv, result.json, figures/)"
+
+
+def next_line(found: Validation, scene: str | None, directory: Path) -> str:
+    """Where the report is, and what to try next, by the verdict; ``scene`` as the commands take it, None of several."""
+    report = f"Next: `ice report {shlex.quote(str(directory))}` writes {directory / 'report.html'}"
+    if scene is None:
+        return f"{report}."
+    scene = shlex.quote(scene)
+    if found.verdict.agrees:
+        return f"{report}; `ice plan {scene}` looks for better places of sensor and light."
+    if "not measured" in found.verdict.reasons:
+        return f"{report}; `ice plan {scene}` proposes settings that can be measured."
+    return f"{report}; `ice effects {scene} --check` tells whether an effect that was left out is why."
+
+
+def advice(agrees: bool) -> dict[str, str]:
+    """How to read each table of the report and what to do next, by its name in `page_tables`."""
+    wrong = "Rows with * that lie together (one sensor, one light) point to a cause: `ice effects SCENE --check`."
+    right = "About one row in 20 has a * by chance; `ice validate SCENE --accuracy 0.02` narrows the intervals."
+    return {
+        "ratios": f"The prediction holds where the interval of a row contains 1. {right if agrees else wrong}",
+        "variances": "In a row propagated and measured should be alike, the bound below both; where it is far below, "
+        "`ice measure --estimator arrangement` comes near it.",
+        "units": "Compare sigma, what one picture scatters by, with your tolerance; where it is too large, "
+        "`ice plan SCENE` looks for better places of sensor and light.",
+        "estimators": "A method is as predicted where each p-value is above the limit beside it; use one that is.",
+        "effects": "What is off was left out because it changes little; `ice effects SCENE --check` renders each.",
+        "refused": "Mend the scene by the reason given; `ice validate` with the same options continues a stopped run.",
+        "budget": "Improve the source with the largest share first; `ice budget SCENE --reach U` says by how much.",
+        "facts": "The same scene, seed and versions give the same numbers; `ice compare A B` compares two runs.",
+    }

@@ -1,0 +1,171 @@
+"""The tables of a run's report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from validation.batch.result import Validation
+from validation.batch.rows import Row
+from validation.batch.store import RunFile
+from validation.report import guide
+from validation.report.run_cells import errors, failed, far, names, number, ratio, shift, small, small_sigma
+from validation.statistics import ALLOWANCE, LEVEL, Verdict
+
+_ROWS = 64  # rows of the table of settings without a result
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and cells as text, terms and what to do next; ``words``: of sentences rather than numbers."""
+
+    label: str
+    columns: list[str]
+    rows: list[list[str]]
+    note: str = ""
+    words: bool = False
+    advice: str = ""
+
+
+def _key(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
+    """First columns of a table of settings, and their cells by setting."""
+    headings, cells = names(found, rows)
+    return ["setting", *headings], {index: [str(index + 1), *row] for index, row in cells.items()}
+
+
+def ratios(found: Validation) -> Table:
+    rows, which = far(found)
+    key, cells = _key(found, rows)
+    columns = [
+        *key,
+        f"{rows[0].main.method}: measured / predicted [95 %]",
+        "images",
+        "failed",
+        "bias, px: predicted",
+        "measured",
+        "rmse, px",
+        "status",
+    ]
+    lines = [
+        [
+            *cells[row.index], ratio(row.main), str(row.main.n), failed(row),
+            shift(row.main.predicted_bias), *errors(row.main), row.main.status,
+        ]
+        for row in rows
+    ]  # fmt: skip
+    terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
+    note = " ".join([*terms, *guide.status_terms(row.main.status for row in rows), which])
+    return Table("Measured over predicted variance, by setting", columns, lines, note, advice=_advice(found, "ratios"))
+
+
+def variances(found: Validation) -> Table:
+    rows, which = far(found)
+    key, cells = _key(found, rows)
+    others = list(dict.fromkeys(judged.method for row in found.rows for judged in row.classic))
+    main, printed = rows[0].main.method, any(row.paper_ice or row.paper_real for row in found.rows)
+    paper = ["paper ICE", "ours ICE", "paper real 12.0", "paper real 10.0"] if printed else []
+    columns = [*key, *paper, "calibrated", "propagated", f"measured: {main}", *others, "Cramer-Rao bound"]
+    lines = []
+    for row in rows:
+        classic = {judged.method: judged for judged in row.classic}
+        measured = [small(classic[name].empirical) if name in classic else "-" for name in others]
+        theirs = [number(row.paper_ice), number(row.paper), *map(number, row.paper_real or (None, None))]
+        lines.append([
+            *cells[row.index], *(theirs if printed else []),
+            small(row.calibrated), small(row.main.propagated), small(row.main.empirical), *measured, small(row.bound),
+        ])  # fmt: skip
+    terms = [*guide.paper_terms(found), *guide.variance_terms([main, *others], max(row.main.n for row in rows))]
+    title = f"{'Table 3: variance' if printed else 'Variance'} of the first measurand in the image, by setting"
+    return Table(title, columns, lines, " ".join([*terms, which]), advice=_advice(found, "variances"))
+
+
+def units(found: Validation) -> Table:
+    """Every measurand in the scene's unit."""
+    rows, which = far(found)
+    key, cells = _key(found, rows)
+    columns = [
+        *key, "measurand", "value", "unit", "sigma: calibrated", "propagated", "measured", "ratio of variances [95 %]",
+        "bias", "status",
+    ]  # fmt: skip
+    lines = [
+        [
+            *cells[row.index], each.name, f"{each.value:.6g}", each.unit,
+            *(small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical)), ratio(each),
+            "-" if each.bias is None else f"{each.bias:+.2g}", each.status,
+        ]
+        for row in rows for each in row.measurands
+    ]  # fmt: skip
+    statuses = (each.status for row in rows for each in row.measurands)
+    note = " ".join([*guide.unit_terms(statuses, any(len(row.measurands) > 1 for row in rows)), which])
+    return Table("All measurands in the scene's unit, by setting", columns, lines, note, advice=_advice(found, "units"))
+
+
+def _advice(found: Validation, name: str) -> str:
+    return guide.advice(found.verdict.agrees)[name]
+
+
+def estimators(found: Validation) -> Table:
+    main = found.rows[0].main.method
+    verdicts = {f"{main} (the verdict's)": found.verdict, **found.classic_verdicts}
+    columns = [
+        "estimator", "rows inside 95 %", "smallest p-value", "limit", "pooled ratio [95 %]", "p-value", "limit",
+        "largest bias, sigma", "p-value", "limit", "not measured", "as predicted",
+    ]  # fmt: skip
+    note = (
+        f"A row's variance (chi-square, Sidak over the rows), that of all rows pooled, and the mean error of rows that "
+        f"are ok, of which {ALLOWANCE:g} sigma of one image is allowed; a method whose rows mostly could not be "
+        f"measured is not as predicted. The three tests share a level of {LEVEL:g} (Bonferroni)."
+    )
+    lines = [[name, *_tests(v)] for name, v in verdicts.items()]
+    return Table("Verdict on each estimator", columns, lines, note, advice=_advice(found, "estimators"))
+
+
+def _tests(found: Verdict) -> list[str]:
+    """Cells of a verdict, in the order of its tests."""
+    pooled = bias = ["-"] * 3
+    if found.pooled:
+        low, high = found.pooled.interval
+        pooled = [
+            f"{found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]",
+            *_level(found.pooled.p_value, found.pooled.limit),
+        ]
+    if found.bias:
+        bias = [f"{found.bias.largest:.2f}", *_level(found.bias.smallest_p, found.bias.limit)]
+    rows = f"{found.inside} of {found.rows}", *_level(found.smallest_p, found.limit)
+    return [*rows, *pooled, *bias, str(found.not_measured), "yes" if found.agrees else "no"]
+
+
+def _level(p_value: float, limit: float) -> tuple[str, str]:
+    return f"{p_value:.2g}", f"{limit:.2g}"
+
+
+def effects(found: Validation, store: RunFile) -> Table:
+    lines = [(scene, effect) for scene, effects in store.fact("effects", {}).items() for effect in effects]
+    keys = list(dict.fromkeys(key for _, effect in lines for key in effect))
+    rows = [[scene, *(_word(effect.get(key, "")) for key in keys)] for scene, effect in lines]
+    return Table("Effects, on and off", ["scene", *keys], rows, words=True, advice=_advice(found, "effects"))
+
+
+def _word(value: object) -> str:
+    return ("on" if value else "off") if isinstance(value, bool) else str(value)
+
+
+def refused(found: Validation) -> Table:
+    rows = [[str(index + 1), reason] for index, reason in list(found.refused.items())[:_ROWS]]
+    note = f"{len(found.refused)} in all." if len(found.refused) > _ROWS else ""
+    return Table("Settings without a result", ["setting", "why"], rows, note, True, _advice(found, "refused"))
+
+
+def facts(found: Validation, store: RunFile) -> Table:
+    identity, machine = store.identity(), store.fact("machine", {})
+    facts = {
+        "scenes": ", ".join(scene["name"] for scene in identity["campaign"]["scenes"]),
+        "settings x images": f"{len(found.rows) + len(found.refused)} x {identity['renders']}",
+        "seed": found.seed,
+        "renderer's variant": found.variant,
+        "versions": ", ".join(f"{name} {version}" for name, version in identity["versions"].items()),
+        "digest of the code": identity["code"],
+        "machine": ", ".join(f"{name} {value}" for name, value in machine.items()),
+        "time": f"{found.seconds['wall']:.1f} s with {found.seconds['workers']} workers",
+    }
+    lines = [[name, str(value)] for name, value in facts.items()]
+    return Table("Facts of the run", ["fact", "value"], lines, words=True, advice=_advice(found, "facts"))

@@ -1,0 +1,75 @@
+"""Cells of the tables of a run, for terminal and page."""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+from scenes import shown
+from validation.batch.result import Validation
+from validation.batch.rows import Judged, Row
+
+_ROWS = 64  # of a table; table.csv has all
+_UNIT = 1e-4  # px^2; what the measured variances are printed in
+
+
+def far(found: Validation) -> tuple[list[Row], str]:
+    """Rows to show, and which they are: all of them, or of many those that are farthest from their prediction."""
+    if len(found.rows) <= _ROWS:
+        return list(found.rows), ""
+    rows = heapq.nsmallest(_ROWS, found.rows, key=lambda row: -abs(math.log(row.main.ratio or 1.0)))
+    return rows, f"The {_ROWS} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
+
+
+def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
+    """Headings of the columns that tell a run's settings apart, and the cells of some rows by setting."""
+    first = found.rows[0]
+    swept, many = dict.fromkeys(first.parameters, False), False
+    for row in found.rows:
+        many = many or row.scene != first.scene
+        for key, value in row.parameters.items():
+            swept[key] = swept[key] or str(value) != str(first.parameters[key])
+    keys = [key for key, several in swept.items() if several]
+    cells = {
+        row.index: [
+            *([row.scene] if many else []), *(str(row.parameters[key]) for key in keys),
+            shown(row.sensor), shown(row.light),
+        ]
+        for row in rows
+    }  # fmt: skip
+    return [*(["scene"] if many else []), *keys, "sensor", "light"], cells
+
+
+def small_sigma(variance: float | None) -> str:
+    """Standard deviation of a variance."""
+    return "-" if variance is None or not math.isfinite(variance) else f"{math.sqrt(variance):.3g}"
+
+
+def shift(px: float | None) -> str:
+    """A bias, px."""
+    return "-" if px is None or math.isnan(px) else f"{px:+.4f}"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    return "-" if value is None else "inf" if math.isinf(value) else f"{value:.{digits}f}"
+
+
+def small(value: float | None) -> str:
+    return "-" if value is None or math.isnan(value) else "inf" if math.isinf(value) else f"{value / _UNIT:#.3g}"
+
+
+def ratio(judged: Judged) -> str:
+    if judged.ratio is None:
+        return f"- ({judged.status})"
+    low, high = judged.ratio_interval
+    return f"{judged.ratio:.3f} [{low:.3f}, {high:.3f}]{' ' if low <= 1 <= high else '*'}"
+
+
+def errors(judged: Judged) -> tuple[str, str]:
+    """Bias and root mean square error, px."""
+    bias = "-" if judged.bias is None else f"{judged.bias:+.4f}"
+    return bias, number(judged.rmse, 4)
+
+
+def failed(row: Row) -> str:
+    return " ".join(str(judged.failed) for judged in (row.main, *row.classic))
