@@ -19,6 +19,8 @@ _PIECES = 1024
 
 def curved_shapes(mitsuba: Any, solid: Solid, bsdf: dict, own: np.ndarray) -> list[Any]:
     """Shapes of one material, that of the faces ``own`` (bool, (F,)): those which `stands_for` says no mesh has."""
+    if not solid.curved:
+        return []
     found = [shape(mitsuba, each, bsdf) for each in solid.curved if own[each.faces[0]]]
     return found + [_disc(mitsuba, circle, bsdf) for circle in _ends(solid) if own[circle.face]]
 
