@@ -1,12 +1,20 @@
 """The pictures show what was measured."""
 
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.text import Text
 
 import measure
+import planner
 from planner.imaging.projection import project
 from tests.oracle import polygon_image
+from validation.report.canvas import WIDTH
 from validation.report.figures import edge_pixels
+from validation.report.map_figure import COLOURS, Chart, draw_map
 
 SENSOR = (30, 135)
 RING = ("v4", "v3", "v7", "v6")
@@ -32,3 +40,59 @@ def test_edge_pixels_are_those_that_canny_measures_by(task1, noise, rng):
     assert sorted(np.bincount(apart.argmin(0), minlength=4)) == sorted(found.used)
     assert apart.min(0).max() < 1
     assert np.linalg.norm(drawn[:, None] - corners, axis=-1).min() > 2
+
+
+@pytest.fixture(scope="module")
+def drawn(task1, tmp_path_factory):
+    """The map of a plan's sensor as figure, with its axes, and what it shows."""
+    plan = planner.plan(task1, step_deg=15)
+    space = planner.ViewingSpace(6, (0, 90))
+    found = planner.pose_map(task1, light=plan.light, space=space)
+    figure, (axis, below) = plt.subplots(2, 1, figsize=(WIDTH, 7))
+    chart = Chart(plan, found, True, plan.sensor, "Where the sensor may stand")
+    draw_map(figure, axis, below, chart)
+    yield figure, axis, below, chart
+    plt.close(figure)
+
+
+def texts(drawn):
+    figure = drawn[0]
+    return [each for each in figure.findobj(Text) if each.get_text()]
+
+
+def test_a_map_numbers_rings_and_azimuths_and_names_its_unit(drawn):
+    words = {each.get_text() for each in texts(drawn)}
+    assert {"30", "60", "90", "0 (x)", "90 (y)", "180", "270"} <= words
+    assert "sigma of distance, cm" in words
+    assert min(each.get_fontsize() for each in texts(drawn)) * 390 / (72 * WIDTH) >= 9
+
+
+def test_a_map_explains_each_status_that_occurs_and_no_other(drawn):
+    labels = " ".join(each.get_text() for each in drawn[2].get_legend().get_texts())
+    found = drawn[3].found
+    lost = set(found.status[~np.isfinite(found.variance)])
+    for status in ("not_visible", "short", "low_contrast", "ill_conditioned"):
+        assert (f"({status})" in labels) == (status in lost)
+    assert ("clutter" in labels) == ("clutter" in found.status)
+
+
+def test_a_map_has_azimuth_0_to_the_right_and_90_up(drawn):
+    places = {each.get_text(): each.get_position() for each in drawn[1].texts}
+    assert places["0 (x)"][0] > 90 > abs(places["0 (x)"][1])
+    assert places["90 (y)"][1] > 90
+    best, chart = drawn[1].lines[-1].get_xydata()[0], drawn[3]
+    assert np.hypot(*best) == pytest.approx(chart.best.polar_deg)
+    assert np.degrees(np.arctan2(best[1], best[0])) % 360 == pytest.approx(chart.best.azimuth_deg % 360)
+
+
+def test_the_maps_colours_are_told_apart_in_grey():
+    grey = plt.get_cmap(COLOURS)(np.linspace(0, 1, 256))[:, :3] @ (0.2126, 0.7152, 0.0722)
+    assert (np.diff(grey) < 0).all()
+
+
+@pytest.mark.parametrize(("spread", "scale"), [(5.0, Normalize), (20.0, LogNorm)])
+def test_a_range_of_more_than_a_decade_is_logarithmic(drawn, spread, scale):
+    chart = drawn[3]
+    variance = np.geomspace(1, spread**2, len(chart.found.space)) * 1e-6
+    steep = replace(chart, found=replace(chart.found, variance=variance))
+    assert type(steep.norm()) is scale

@@ -124,6 +124,8 @@ def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
         for line in _further(found, each, drawn, reach):
             terminal.print(f" {line}", highlight=False)
         terminal.print(f" {budget_table.sentence(each, quantity.kind)}\n", style="bold", highlight=False)
+    for line in budget_table.TERMS:
+        terminal.print(f" {line}", highlight=False)
     if shown:
         for line in budgets.said_of_pictures(shown):
             terminal.print(line, highlight=False)

@@ -8,7 +8,11 @@ from rich.table import Table
 
 from planner.uncertainty.budget import Budget
 
-_CAPTION = "contribution = |sensitivity| u; share of u_c^2; A: from observations or the noise model, B: otherwise."
+TERMS = (
+    "u: standard uncertainty of a source; contribution = |sensitivity| u; share of u_c^2; A: from observations or the",
+    "noise model, B: otherwise; dof: degrees of freedom, - : infinite. U = k u_c: the value lies within +- U with the",
+    "probability given. TUR: half the tolerance over U. Cg, Cgk: capability of the gauge, from simulated repeats.",
+)
 
 _LEAST = 5e-4  # of the variance: sources below are one row
 
@@ -16,8 +20,7 @@ _LEAST = 5e-4  # of the variance: sources below are one row
 def table(budget: Budget) -> Table:
     """All contributions to one measurand, the largest first."""
     shown = Table(
-        title=f"{budget.name} [{budget.unit}]", title_justify="left", title_style="bold", box=None, padding=(0, 1),
-        caption=_CAPTION, caption_justify="left",
+        title=f"{budget.name} [{budget.unit}]", title_justify="left", title_style="bold", box=None, padding=(0, 1)
     )  # fmt: skip
     for name in ("source", "u", "sensitivity", "contribution", "share", "type", "dof"):
         shown.add_column(name, justify="left" if name in ("source", "type") else "right", no_wrap=True)

@@ -21,7 +21,7 @@ def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust 
     parts = [Text(_head(found, units, seconds))]
     if found.trace:
         parts.append(_trace(found, units))
-    parts.append(_candidates(found, units))
+    parts += [_candidates(found, units), Text(_reading(found))]
     if checked:
         parts.append(_checked(found, checked))
     if safe:
@@ -142,6 +142,18 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
         values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
         table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
     return table
+
+
+def _reading(found: planner.Plan) -> str:
+    """What the columns of the candidates are, and what to do with them."""
+    several = len(found.prediction.measurands) > 1
+    what = "what is minimised" if several else "its variance in the object and in the image"
+    return (
+        "  Poses are (polar angle, azimuth), degrees. Beside them "
+        f"{what}; over best: over that of the first row.\n"
+        "  Where the best place is taken, another row will do; `--sensor P,A` or `--light P,A` holds one fixed, "
+        "`--map FILE.png` draws."
+    )
 
 
 def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
