@@ -64,7 +64,7 @@ def limb_crossing(profile: Profile, beyond, blur_px: float, scale: float, curvat
     >>> step = Profile(np.array([[100.0]]), np.zeros(1))
     >>> found = limb_crossing(step, 20.0, 0.6, 1.0)
     >>> from planner.features.locator import kappa2
-    >>> bool(found.shift == 0), bool(np.isclose(found.variance(4.0, 1.0), kappa2(1.0, 0.6) * 4.0 / 80**2))
+    >>> bool(abs(found.shift) < 1e-9), bool(np.isclose(found.variance(4.0, 1.0), kappa2(1.0, 0.6) * 4.0 / 80**2))
     (True, True)
     """
     width = float(np.hypot(edge_blur(blur_px), scale))

@@ -65,12 +65,20 @@ class Information(NamedTuple):
         held = np.diag(self.fisher) == 0
         whole = self.fisher + np.where(held[:, None] | held, 0.0, self.known)
         told = np.diag(whole)
-        some = told > _LEAST
+        some = told > self._least(told)
         scale = 1 / np.sqrt(np.where(some, told, 1.0))
         weak = np.where(some, _UNTOLD, 1.0)
         inverse = np.linalg.inv(whole * scale[:, None] * scale + np.diag(weak))
         inverse = inverse * scale[:, None] * scale * (some[:, None] & some)
         return inverse - inverse @ (whole - self.fisher) @ inverse
+
+    def _least(self, told: np.ndarray) -> np.ndarray:
+        """Information of each parameter that is none; of levels in proportion, for their unit is any."""
+        least, first = np.full(told.size, _LEAST), 2 * self.model.free.size
+        for part in self.model.arrangement.level_slices:
+            levels = slice(first + part.start, first + part.stop)
+            least[levels] = _LEAST * told[levels].max(initial=0.0)
+        return least
 
     def vertices(self) -> np.ndarray:
         """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import planner
@@ -151,6 +151,7 @@ def test_relabelling_edges_and_swapping_the_vertices(sensor, light, material, mo
 
 @few
 @given(*settings_of, log(-9, 9))
+@example([3.0, 0.0], [3.0, 0.0], {"refractive_index": 1.0, "extinction": 0.0}, "bound", 1e8)
 def test_scaling_intensity_and_noise_together(sensor, light, material, model, factor):
     scene = task1(material=material, noise={"bits": None})
     expected = conditioned(scene, sensor, light, model)
