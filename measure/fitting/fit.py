@@ -21,6 +21,7 @@ from planner.imaging.whole import check_drawable
 from scenes import InvalidInput, Noise, Picture, Scene, Setting, several
 
 _ROUNDS = 2  # of weights and noise
+_GROSS = 50.0  # noise variances: a mean squared residual of more is no part that the scene knows
 _SINGULAR = 1e-10  # of the information's largest eigenvalue, parameters scaled alike
 
 
@@ -124,11 +125,11 @@ def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, esti
     which, told = np.arange(values.size), None
     while True:
         values, noise, told, final = _solved(parameters, shots, values, noise, which, estimated)
-        lost = _lost(parameters, which, final[1])
-        if lost is None:
+        kept = _told(parameters, which, final[2])
+        if kept.all():
             break
-        values[lost] = parameters.start()[lost]
-        which = which[which != lost]
+        values[which[~kept]] = parameters.start()[which[~kept]]
+        which = which[kept]
     return _result(parameters, shots, values, noise, told, which, final)
 
 
@@ -140,9 +141,12 @@ def _solved(parameters, shots, values, noise, which, estimated):
         problem = Problem(parameters, shots, pixels)
         variance = problem.variance(values, noise)
         values = most_likely(problem, values, noise, which, variance)
+        gross = np.mean((problem.observed() - problem.expected(values, noise)) ** 2 / variance) > _GROSS
         if estimated:
             told = _curve(problem, values, noise)
             noise = told.noise(noise)
+        if gross:  # another round would change nothing of that
+            break
     variance = problem.variance(values, noise)
     white = problem.jacobian(values, noise, which) / np.sqrt(variance)[:, None]
     return values, noise, told, (problem, _covariance(white), white, variance)
@@ -176,11 +180,19 @@ def _covariance(white: np.ndarray) -> np.ndarray:
     return (vectors / values) @ vectors.T * scale[:, None] * scale
 
 
-def _lost(parameters: Parameters, which: np.ndarray, covariance: np.ndarray) -> int | None:
-    """The parameter that is told worst, where one is not told: its standard error beyond what a linear model bears."""
-    ratio = np.sqrt(np.diag(covariance)) / [parameters.free[i].known for i in which]
-    worst = int(np.argmax(ratio))
-    return int(which[worst]) if ratio[worst] > 1 else None
+def _told(parameters: Parameters, which: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """Which of the parameters are told by the photographs, bool (f,).
+
+    The one of the largest standard error is held, where that is beyond what a linear model bears, until there is none.
+    """
+    known, kept = np.array([parameters.free[i].known for i in which]), np.ones(which.size, bool)
+    while kept.any():
+        ratio = np.where(kept, 0.0, -1.0)
+        ratio[kept] = np.sqrt(np.diag(_covariance(white[:, kept]))) / known[kept]
+        if ratio.max() <= 1:
+            break
+        kept[np.argmax(ratio)] = False
+    return kept
 
 
 def _result(parameters, shots, values, noise, told, which, final) -> Fit:

@@ -14,7 +14,7 @@ from planner.imaging.sensor import recorded
 from planner.imaging.whole import signal_at
 from scenes import Noise
 
-_EVALUATIONS = 40
+_EVALUATIONS, _FEW = 30, 12  # of sharp and of coarse images
 _SETTLED, _NEARLY = 1e-6, 1e-3  # relative changes at which the search ends, of sharp and of coarse images
 
 
@@ -100,7 +100,7 @@ def most_likely(
 ) -> np.ndarray:
     """Values (q,) of least weighted squares; only the parameters ``which`` move, within their bounds."""
     observed, sigma = problem.observed(), np.sqrt(variance)
-    settled = _NEARLY if problem.smooth else _SETTLED
+    settled, most = (_NEARLY, _FEW) if problem.smooth else (_SETTLED, _EVALUATIONS)
     free = [problem.parameters.free[i] for i in which]
     low, high = (np.array([getattr(each, side) for each in free]) for side in ("low", "high"))
     inner = 1e-6 * np.where(np.isfinite(high - low), high - low, 1.0)
@@ -114,6 +114,6 @@ def most_likely(
         lambda part: (problem.expected(full(part), noise) - observed) / sigma,
         np.clip(start[which], low + inner, high - inner),
         lambda part: problem.jacobian(full(part), noise, which) / np.reshape(sigma, (-1, 1)),
-        bounds=(low, high), x_scale="jac", max_nfev=_EVALUATIONS, xtol=settled, ftol=settled, gtol=None,
+        bounds=(low, high), x_scale="jac", max_nfev=most, xtol=settled, ftol=settled, gtol=None,
     )  # fmt: skip
     return full(found.x)

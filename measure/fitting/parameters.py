@@ -19,7 +19,8 @@ OPTIONS = {"focal": "camera.focal_px", "k1": "camera.lens.distortion[0]"}
 _SHIFT = 2e-3  # px: by so much a step for a derivative moves the image
 _DEGREES = 0.01  # the same step of a light
 _TURN = 45.0  # degrees that a pose may be away from the start
-_LEAST_BLUR = 0.3  # px, the sharpest image that the model knows
+_LEAST_BLUR, _MOST_BLUR = 0.3, 4.0  # px: the sharpest image that the model knows, and one that is out of focus
+_BLURS = 4.0  # of the scene's blur, as far as which it is sought
 
 
 class Free(NamedTuple):
@@ -161,7 +162,7 @@ def _free(scene: Scene, pictures: tuple[Picture, ...], options: tuple[str, ...])
         Free("camera.exposure", "levels", "number", (), 1e-4 * camera.exposure, camera.exposure / 10,
              camera.exposure * 10, camera.exposure / 2),
         Free("noise.dark_level", "levels", "number", (), 1e-3, -np.inf, np.inf, np.inf),
-        Free("camera.blur_px", "px", "number", (), 1e-4, _LEAST_BLUR, 20.0, 2.0),
+        Free("camera.blur_px", "px", "number", (), 1e-4, _LEAST_BLUR, max(_BLURS * camera.blur_px, _MOST_BLUR), 2.0),
     ]  # fmt: skip
     if "focal" in options:
         f = camera.focal_px

@@ -57,7 +57,10 @@ def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.n
 
 def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Signal above darkness at pixels (P,) of one picture, grey levels."""
-    model = BlurredModel(arrangement_of(pictures), x, y, _NONE)
+    arrangement = arrangement_of(pictures)
+    if not len(arrangement.pieces):  # no light falls on what is seen
+        return np.zeros(x.size)
+    model = BlurredModel(arrangement, x, y, _NONE)
     return model.image(model.start())
 
 
