@@ -46,8 +46,9 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
         corners = [feature for feature in quantity.features if isinstance(feature, Corner)]
         meeting = [normals[..., [known.view.names.index(name) for name in corner.edges], :] for corner in corners]
         flat = np.zeros(rank.shape, bool)
-        for pair in meeting:
-            flat = flat | (np.abs(np.linalg.det(pair)) < _MIN_SINE)
+        with np.errstate(invalid="ignore"):  # an edge whose image has no length has no direction, and is not visible
+            for pair in meeting:
+                flat = flat | (np.abs(np.linalg.det(pair)) < _MIN_SINE)
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
