@@ -31,7 +31,7 @@ def size_parameter(case: Case, variant: str, seed: int) -> Parameter:
         began = time.perf_counter()
         work.measure_chunk(sized, image, seed, 0, _IMAGES)
         seconds = (time.perf_counter() - began) / _IMAGES
-        relative = float(np.sqrt(found.variance_image)) / found.value_image
+        relative = float(np.sqrt(found.variance_px2)) / found.value_px
         rows.append((scene.camera.width, scene.camera.height, rendered, 1e3 * seconds, relative))
     width, height, rendered, image, error = np.array(rows).T
     fits = (
