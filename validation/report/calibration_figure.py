@@ -13,6 +13,8 @@ import numpy as np
 from measure.calibration import Calibration
 from validation.report.canvas import WIDTH, legend_below, save
 
+_MARKS = "os^vDP"  # told apart in grey as well
+
 
 def draw(found: Calibration, path: Path) -> Path:
     """Standard deviation of an edge point against noise / contrast, log-log, as PNG."""
@@ -20,7 +22,7 @@ def draw(found: Calibration, path: Path) -> Path:
     for k, curve in enumerate(found.curves):
         good = np.isfinite(curve.sigma_px)
         label = f"{curve.name}: $\\kappa^2$ {curve.kappa2:.2f}, correlated over {curve.correlation_px:.1f} px"
-        axis.plot(curve.ratios[good], curve.sigma_px[good], f"C{k}o", ms=5, label=label)
+        axis.plot(curve.ratios[good], curve.sigma_px[good], f"C{k}{_MARKS[k % len(_MARKS)]}", ms=5, label=label)
         axis.plot(curve.ratios, np.hypot(curve.floor_px, np.sqrt(curve.kappa2) * curve.ratios), f"C{k}-", lw=0.8)
         if np.isfinite(curve.linear_to) and curve.linear_to < curve.ratios[-1]:
             axis.axvline(curve.linear_to, color=f"C{k}", ls=":", lw=1)
