@@ -29,12 +29,12 @@ def _draw(parameter: Parameter, path: Path) -> Path:
     if parameter.name == "pareto":
         _front(parameter, axes)
     axes.set(xscale="log", yscale="log", ylabel=parameter.y)
-    axes.set_title(textwrap.fill(parameter.title, 60), fontsize=11, parse_math=False)
+    axes.set_title(textwrap.fill(parameter.title, 48), fontsize=11, parse_math=False)
     if parameter.series:
         legend_below(axes, 2)
     axes.grid(which="both", alpha=0.2)
     lines = [f"{f.what}: {f.slope:+.2f}" + (f", theory {f.theory:+.2f}" if f.theory else "") for f in parameter.fits]
-    lines += textwrap.wrap(parameter.note, 64)
+    lines += textwrap.wrap(parameter.note, 54)
     axes.set_xlabel("\n".join([parameter.x, *lines]), fontsize=TEXT)
     return save(figure, path)
 
