@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtr, chdtrc
 
 WORST = 1e-4  # p-value below which an image is not what the model says: one false alarm in 10 000 images
 _NOISELESS = 0.1  # of the noise: an image with less was made without it
@@ -27,7 +27,7 @@ def p_value(squares: np.ndarray, freedom: np.ndarray) -> np.ndarray:
     """
     used = freedom > 0
     each = np.where(used, freedom, 1.0)
-    low, high = chi2.cdf(squares, each), chi2.sf(squares, each)
+    low, high = chdtr(each, squares), chdtrc(each, squares)
     low = np.where(squares < _NOISELESS * each, 1.0, low)
     found = np.where(used, np.minimum(2 * np.minimum(low, high), 1.0), 1.0)
     return -np.expm1(used.sum(-1) * np.log1p(-np.minimum(found.min(-1), 1 - 1e-16)))

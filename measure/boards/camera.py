@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from measure import status
 from measure.boards.adjustment import Adjusted, adjust, begin
@@ -148,7 +148,7 @@ def _check(square_size: Any, square_sd: Any, image_shape: Any) -> None:
 def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
     k = len(free.names)
     freedom = found.rows - found.covariance.shape[0]
-    p_value = float(stats.chi2.sf(found.chi_square, freedom)) if freedom > 0 else float("nan")
+    p_value = float(chdtrc(freedom, found.chi_square)) if freedom > 0 else float("nan")
     dispersion = found.chi_square / freedom if p_value < _FALSE_ALARM else 1.0
     covariance = dispersion * found.covariance[:k, :k]
     poses = found.parameters[k:].reshape(-1, 6)

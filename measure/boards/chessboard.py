@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from measure import status
 from measure.boards.approximate import approximate_corners
@@ -174,7 +174,7 @@ def _board(shape, room: np.ndarray, fitted: Crossings, noise: float, clipped: np
     n = room.size
     corners, covariance, p_value = np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan), np.full(n, np.nan)
     states = np.full(n, status.SHORT, dtype=object)
-    fit = stats.chi2.sf(fitted.square / noise**2, fitted.freedom)
+    fit = chdtrc(fitted.freedom, fitted.square / noise**2)
     limit = 1 - (1 - _FALSE_ALARM) ** (1 / n)
     states[room] = np.select(
         [fitted.contrast < _FAINTEST * noise, ~fitted.converged, fit < limit, clipped],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import f as fisher_snedecor
+from scipy.special import fdtr, fdtrc
 
 from measure.fitting.photograph import Pixels
 
@@ -29,7 +29,7 @@ def p_value(parts: list[Part], noise_freedom: float) -> float:
     for part in parts:
         if part.freedom >= _LEAST:
             ratio, against = part.squares / part.freedom, min(noise_freedom, _EXACT)
-            tails = [tail(ratio, part.freedom, against) for tail in (fisher_snedecor.cdf, fisher_snedecor.sf)]
+            tails = [tail(part.freedom, against, ratio) for tail in (fdtr, fdtrc)]
             each.append(min(2 * min(tails), 1.0))
     if not each:
         return float("nan")

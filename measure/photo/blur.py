@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.strip import LEAST_BLUR, pixels_beside
@@ -62,7 +62,7 @@ class SideBlur:
         """Whether the sides are not equally blurred."""
         told = np.isfinite(self.sigma)
         square = np.sum(((self.sigma[told] - self.common) / self.error[told]) ** 2)
-        return bool(told.sum() > 1 and chi2(told.sum() - 1).sf(square) < _ALIKE)
+        return bool(told.sum() > 1 and chdtrc(told.sum() - 1, square) < _ALIKE)
 
 
 def side_blur(image: np.ndarray, layout: Layout, curve: NoiseCurve) -> SideBlur:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import SIDE, Patches, polynomials, residuals
@@ -79,7 +79,7 @@ def correlation(patches: Patches, curve: NoiseCurve) -> Correlation:
     kernel = np.zeros((_TAPS, _TAPS))
     for value, (dy, dx) in zip(found, _lags(), strict=True):
         kernel[REACH + dy, REACH + dx] = kernel[REACH - dy, REACH - dx] = value
-    return Correlation(kernel, float(chi2(len(found) - 1).sf(square)))
+    return Correlation(kernel, float(chdtrc(len(found) - 1, square)))
 
 
 def _white() -> np.ndarray:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
+from scipy.special import chdtri, fdtri
 
 SIDE = 7  # px
 _ENOUGH = 20_000  # patches: a million pixels
@@ -91,9 +90,9 @@ def _cut(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _kept(bent: np.ndarray, fine: np.ndarray, least: float, *freedom: int) -> np.ndarray:
     """Which patches are smooth, bool (P,): their bends no more than the noise, or a variance of ``least``."""
     ratio = bent / freedom[0] / np.maximum(fine / freedom[1], 1e-12)
-    noisy, law = fine > 1e-9, f_distribution(*freedom)
-    usual = max(np.median(ratio[noisy]) / law.median(), 1.0) if noisy.any() else 1.0
-    return (ratio < usual * law.isf(_TAIL)) | (bent / freedom[0] < least)
+    noisy = fine > 1e-9
+    usual = max(np.median(ratio[noisy]) / fdtri(*freedom, 0.5), 1.0) if noisy.any() else 1.0
+    return (ratio < usual * fdtri(*freedom, 1 - _TAIL)) | (bent / freedom[0] < least)
 
 
 def _loud(variance: np.ndarray, level: np.ndarray, least: float, freedom: int) -> np.ndarray:
@@ -104,7 +103,7 @@ def _loud(variance: np.ndarray, level: np.ndarray, least: float, freedom: int) -
     usual = np.empty(variance.size)
     for part in np.array_split(order, max(min(variance.size // 60, 12), 1)):
         usual[part] = np.median(variance[part])
-    most = chi2(freedom).isf(_TAIL / 10) / chi2(freedom).median()
+    most = chdtri(freedom, _TAIL / 10) / chdtri(freedom, 0.5)
     return variance > np.maximum(usual * most, least)
 
 

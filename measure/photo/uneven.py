@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from measure.features.calipers import distance_to_segment
 from measure.features.layout import Layout
@@ -59,7 +59,7 @@ def _order(places: np.ndarray, level: np.ndarray, error: np.ndarray) -> int:
     noisy = max(left[-1] / max(len(level) - 6, 1), 1.0)  # noise that is not white scatters more
     for order in (MOST, MOST - 1):
         gained = (left[order - 1] - left[order]) / noisy
-        if chi2(len(columns[order])).sf(gained) < _SURE:
+        if chdtrc(len(columns[order]), gained) < _SURE:
             return order
     return 0
 
