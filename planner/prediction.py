@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -268,8 +269,9 @@ def predict(
     )
 
 
+@lru_cache(maxsize=16)
 def glanced(picture: Picture) -> Pictures:
-    """One picture to be glanced at, as the search does with many."""
+    """One picture to be glanced at, as the search does with many; one object for equal pictures."""
     return replace(Pictures.of(picture), closely=False, _known={})
 
 

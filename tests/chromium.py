@@ -16,8 +16,9 @@ import aiohttp
 
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser")
 _OPTIONS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--remote-debugging-port=0",
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+    "--disable-extensions", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--remote-debugging-port=0",
 )  # fmt: skip
 
 
@@ -70,7 +71,9 @@ class Page:
                 await asyncio.sleep(0.05)
             return found
 
-    async def drag(self, start: tuple[float, float], by: tuple[float, float], steps: int = 10, pause: float = 0.03) -> None:
+    async def drag(
+        self, start: tuple[float, float], by: tuple[float, float], steps: int = 10, pause: float = 0.03
+    ) -> None:
         """With the left button, in so many moves."""
         button = {"button": "left", "clickCount": 1}
         x, y = start
@@ -89,13 +92,14 @@ class Page:
         await self.call("Input.dispatchKeyEvent", type="keyDown", **about, **text)
         await self.call("Input.dispatchKeyEvent", type="keyUp", **about)
 
-    async def screenshot(self, path: Path, width: int, height: int, *, whole: bool = False) -> None:
-        """PNG of a window of that size."""
-        await self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
-        )
-        await asyncio.sleep(0.5)
-        told = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    async def resize(self, width: int, height: int) -> None:
+        """The window's inside, px; a narrow one is a telephone's."""
+        about = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        await self.call("Emulation.setDeviceMetricsOverride", **about)
+
+    async def screenshot(self, path: Path) -> None:
+        """What the window shows, PNG."""
+        told = await self.call("Page.captureScreenshot", format="png")
         path.write_bytes(base64.b64decode(told["data"]))
 
 
@@ -115,6 +119,7 @@ async def chromium(width: int = 1280, height: int = 800) -> AsyncIterator[Page]:
                 async with session.ws_connect(target["webSocketDebuggerUrl"], max_msg_size=0) as socket:
                     page = Page(socket)
                     listening = asyncio.create_task(page.listen())
+                    await page.resize(width, height)
                     yield page
                     listening.cancel()
         finally:

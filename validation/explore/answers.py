@@ -67,7 +67,7 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
     >>> task1 = scenes.load("task1")
     >>> told = answer(task1, State.first(task1))
     >>> told.prediction.status, told.limiting
-    ('ok', 'e11')
+    ('ok', 'e9')
     """
     try:
         picture = state.picture(scene)

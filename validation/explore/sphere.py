@@ -41,7 +41,7 @@ def cells(step_deg: float = STEP_DEG) -> Cells:
     Examples
     --------
     >>> len(cells(15.0).poses), cells(15.0).poses[0].tolist()
-    (92, [7.5, 30.0])
+    (95, [7.5, 30.0])
     """
     borders = []
     for low in np.arange(0.0, 90.0, step_deg):

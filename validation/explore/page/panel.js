@@ -34,6 +34,7 @@ export function answer(message, state, choose) {
     status.textContent = "refused";
     status.className = "bad";
     $("why").textContent = message.refused;
+    $("connection").textContent = "refused";
     $("shares").replaceChildren();
     return;
   }
@@ -46,6 +47,7 @@ export function answer(message, state, choose) {
   const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
   const glance = message.closely ? "" : " Rims of holes are glanced at while it moves; the close look follows.";
   $("why").textContent = `${chosen.why}${chosen.status !== "ok" && blamed ? ` (${blamed})` : ""}.${glance}`;
+  $("connection").textContent = `${$("sigma").textContent}, ${chosen.status}`;
   shares(message);
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
     const made = row([each.name, `${number(each.sigma)} ${each.unit}`, number(each.ratio), number(each.bias, 2),

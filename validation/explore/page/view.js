@@ -1,6 +1,6 @@
 // The sphere of places around the object, by parallel projection; angles in degrees, polar from +z, azimuth from +x.
 
-const RADIUS = 1, OBJECT = 0.5, GRAB = 26;
+const OBJECT = 0.5, GRAB = 26;
 // matplotlib's cividis at twelve even places
 const MAP = ["00224e", "013271", "2f426d", "48526c", "5e636f", "727374", "878478", "9d9576", "b6a96f", "cebc63", "e7d150", "fee838"]
   .map((hex) => [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16)));
@@ -102,14 +102,19 @@ export class View {
     this.canvas.style.cursor = "grab";
   }
 
+  // Once a frame, however often it is asked for.
   draw() {
+    if (!this.frame) this.frame = requestAnimationFrame(() => { this.frame = 0; this.paint(); });
+  }
+
+  paint() {
     const wide = this.canvas.parentElement.clientWidth - 26, ratio = window.devicePixelRatio || 1;
     if (!this.state || wide < 50) return;
-    const high = Math.min(wide, Math.max(300, window.innerHeight - 260));
+    const high = Math.min(0.8 * wide, Math.max(280, window.innerHeight - 280));
     this.canvas.style.height = `${high}px`;
     this.canvas.width = wide * ratio;
     this.canvas.height = high * ratio;
-    Object.assign(this, { cx: wide / 2, cy: 0.56 * high, scale: 0.42 * Math.min(wide, 1.05 * high) });
+    Object.assign(this, { cx: wide / 2, cy: 0.6 * high, scale: Math.min(0.43 * wide, 0.54 * high) });
     const pen = this.canvas.getContext("2d"), axes = this.axes();
     pen.scale(ratio, ratio);
     this.patches(pen, axes, false);
@@ -127,7 +132,8 @@ export class View {
       if ((middle[2] > 0) !== front) return;
       const value = values[i];
       if (value === undefined) return;
-      pen.fillStyle = value === null ? "#b9bec6" : colour(1 - Math.log(value / limits.low) / Math.log(limits.high / limits.low));
+      if (value === null && !front) return;
+      if (value !== null) pen.fillStyle = colour(1 - Math.log(value / limits.low) / Math.log(limits.high / limits.low));
       pen.globalAlpha = front ? 1 : 0.4;
       pen.beginPath();
       if (front) {
@@ -137,7 +143,12 @@ export class View {
       } else {
         [[p0, a0], [p0, a1], [p1, a1], [p1, a0]].forEach((corner) => pen.lineTo(...this.place(direction(corner), axes).slice(0, 2)));
       }
-      pen.fill();
+      if (value !== null) pen.fill();
+      else {
+        pen.strokeStyle = "#9aa2ad";
+        pen.lineWidth = 1;
+        pen.stroke();
+      }
     });
     pen.globalAlpha = 1;
   }
