@@ -21,11 +21,6 @@ async def measured(name: str) -> str:
     with tempfile.TemporaryDirectory() as directory:
         async with served(name, Path(directory)) as url, chromium() as page:
             await first_answer(page, url)
-            print(
-                await page.value(
-                    "(()=>{const t=performance.now();for(let i=0;i<10;i++)explore.view.paint();return (performance.now()-t)/10})()"
-                )
-            )
             return told(await drag_lamp(page, (-110.0, 50.0), 40, 0.1))
 
 

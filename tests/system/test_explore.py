@@ -1,16 +1,27 @@
 """The page of `ice explore`, driven in a headless browser as a visitor would."""
 
 import asyncio
+import json
 import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 
 import planner
 import scenes
+from scenes import InvalidInput
 from tests.chromium import PROGRAM, chromium
 from tests.exploring import drag_lamp, first_answer, served, settled, told
+from validation.cli.application import app
+from validation.explore.gate import COOKIE
 
-pytestmark = pytest.mark.skipif(PROGRAM is None, reason="needs Chromium, which is not installed here")
+in_a_browser = pytest.mark.skipif(PROGRAM is None, reason="needs Chromium, which is not installed here")
 
 
 async def state(page):
@@ -25,6 +36,7 @@ def predicted(scene, poses):
     return planner.predict(scene, poses["sensor"], poses["lights"][0]).measurands[0].variance_object ** 0.5
 
 
+@in_a_browser
 def test_a_visit(task1, tmp_path):
     """Drag, keys, proof, save; nothing leaves this machine; another visitor's state stays as it was."""
 
@@ -75,3 +87,39 @@ def test_a_visit(task1, tmp_path):
     assert saved.settings[:-1] == task1.settings
     assert list(saved.settings[-1].sensor) == moved["sensor"]
     assert list(saved.settings[-1].light) == moved["lights"][0]
+
+
+def test_from_the_command_line(tmp_path):
+    """It tells its address, lets in who has the token, and ends by Ctrl-C in a second or so."""
+    command = [sys.executable, "-m", "validation.cli", "explore", "task1", "--host", "0.0.0.0", "--json"]
+    path = f"{Path(__file__).parents[2]}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    with subprocess.Popen(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        try:
+            url = json.loads(process.stdout.readline())["url"].replace("0.0.0.0", "127.0.0.1")
+            token = url.split("token=")[1]
+            with urlopen(Request(url.split("?")[0], headers={"Cookie": f"{COOKIE}={token}"})) as page:
+                assert "Drag camera and lamp" in page.read().decode()
+            with pytest.raises(HTTPError) as refused:
+                urlopen(url.split("?")[0])
+            assert refused.value.code == 403
+            assert refused.value.read().decode().startswith("token must be the one that ice explore printed")
+            refused.value.close()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(30) == 130
+            assert process.stderr.read().decode() == "stopped: interrupted\n"
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--port", "65536"], "--port must be at most 65535, got 65536"),
+        (["--host", "203.0.113.7"], "--host and --port must be free to listen at, got 203.0.113.7:0"),
+    ],
+)
+def test_bad_addresses(options, message):
+    with pytest.raises(InvalidInput, match=message):
+        app(["explore", "task1", *options], standalone_mode=False)

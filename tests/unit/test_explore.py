@@ -295,3 +295,43 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
     assert len(answered) <= 2
     assert sent[0]["type"] == "scene"
     assert any("type must be state, best" in message.get("text", "") for message in sent)
+
+
+def test_work_can_be_stopped(task1):
+    """A second one is refused while the first is under way; it ends as soon as it is told to."""
+
+    class Tools:
+        async def variant(self):
+            return "scalar_rgb"
+
+        async def perform(self, task):
+            await asyncio.sleep(60)
+
+    async def run():
+        sent, told = [], asyncio.Queue()
+
+        async def send(message):
+            sent.append(message)
+            await told.put(message)
+
+        async def until(kind, **about):
+            while (message := await asyncio.wait_for(told.get(), 5))[
+                "type"
+            ] != kind or not about.items() <= message.items():
+                pass
+
+        async def messages():
+            yield {"type": "prove"}
+            await until("job", state="begun")
+            yield {"type": "render"}
+            await until("told")
+            yield {"type": "cancel"}
+            await until("job", state="stopped")
+
+        await session.Session(session.Place(task1, "task1", None), Tools(), send).run(messages())
+        return sent
+
+    sent = asyncio.run(asyncio.wait_for(run(), 20))
+    assert [each["text"] for each in sent if each["type"] == "told"] == [
+        "another work must be finished or stopped before this, got one under way"
+    ]

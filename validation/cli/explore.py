@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import scenes
+from validation.batch.stopped import Interrupted
 from validation.cli.common import Json, SceneName, check_number, commands
 
 commands = commands()
@@ -45,4 +47,21 @@ def explore_command(
             webbrowser.open(address)
 
     place = Place(loaded, str(scene), Path.cwd())
-    asyncio.run(serve(place, host, port, None if is_loopback(host) else new_token(), told))
+    asyncio.run(_until_interrupted(serve, place, host, port, None if is_loopback(host) else new_token(), told))
+
+
+async def _until_interrupted(serve, *how) -> None:
+    """Serve until Ctrl-C or SIGTERM: an event loop swallows what a signal's own handler raises."""
+    import asyncio
+
+    stop, came, loop = asyncio.Event(), [], asyncio.get_running_loop()
+
+    def interrupted(number: int) -> None:
+        came.append(number)
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, interrupted, number)
+    await serve(*how, stop)
+    word = "interrupted" if came[0] == signal.SIGINT else "terminated"
+    raise Interrupted(word, 128 + came[0])

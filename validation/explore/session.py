@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from scenes import InvalidInput, Scene
+from validation.batch import pool
+from validation.batch.work import Found, Task
 from validation.explore import answers, best, effects, preview, prove, save, sphere
 from validation.explore.state import State
 from validation.explore.tools import Tools
@@ -75,9 +77,10 @@ class Session:
                 except InvalidInput as error:
                     await self._tell(str(error))
         finally:
-            for task in (answering, self._after, self._job):
-                if task is not None:
-                    task.cancel()
+            left = [task for task in (answering, self._after, self._job) if task is not None]
+            for task in left:
+                task.cancel()
+            await asyncio.gather(*left, return_exceptions=True)
 
     async def _take(self, message: dict[str, Any]) -> None:
         kind = message.get("type")
@@ -177,14 +180,27 @@ class Session:
         state.picture(self._scene)
         await self._send({"type": "progress", "done": 0, "total": prove.RENDERS})
         clean = await self._rendered(state)
-        tasks, found = prove.measuring(self._scene, state, await self._tools.variant(), clean), []
-        for task in tasks:
-            found.append(await self._tools.perform(task))
-            done = sum(number for each in tasks[: len(found)] for _, number in each.chunks)
-            await self._send({"type": "progress", "done": done, "total": prove.RENDERS})
+        tasks = prove.measuring(self._scene, state, await self._tools.variant(), clean)
+        found = await self._measured(tasks)
         proofs = prove.proofs(self._scene, clean, found)
         rows = [prove.to_message(each) for each in proofs]
         await self._send({"type": "proof", "state": state.to_message(), "rows": rows})
+
+    async def _measured(self, tasks: list[Task]) -> list[Found]:
+        """What the pieces found; a few at a time, so that other visitors' work comes between."""
+        few, done = asyncio.Semaphore(pool.cores()), 0
+
+        async def one(task: Task) -> Found:
+            nonlocal done
+            async with few:
+                found = await self._tools.perform(task)
+            done += sum(number for _, number in task.chunks)
+            await self._send({"type": "progress", "done": done, "total": prove.RENDERS})
+            return found
+
+        async with asyncio.TaskGroup() as group:
+            work = [group.create_task(one(task)) for task in tasks]
+        return [each.result() for each in work]
 
     async def _save(self, replaced: bool) -> None:
         try:
@@ -200,6 +216,8 @@ class Session:
             await work
         except (InvalidInput, BrokenExecutor) as error:
             await self._tell(str(error))
+        except ExceptionGroup as several:  # of pieces that were measured at once
+            await self._tell(str(several.exceptions[0]))
 
     async def _tell(self, text: str) -> None:
         await self._send({"type": "told", "text": text})

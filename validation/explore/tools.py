@@ -53,8 +53,17 @@ class Tools:
         return variants.choose()
 
 
+class _Left(Exception):
+    """The tools are no longer wanted."""
+
+
 @contextmanager
 def open_tools() -> Iterator[Tools]:
-    """The tools; at the end what still works is ended."""
-    with ThreadPoolExecutor(1) as quick, pool.local(max(_WORKERS, pool.cores())) as crew:
-        yield Tools(quick, crew.executor)
+    """The tools; at the end work that is under way is not waited for."""
+    with ThreadPoolExecutor(1) as quick:
+        try:
+            with pool.local(max(_WORKERS, pool.cores())) as crew:
+                yield Tools(quick, crew.executor)
+                raise _Left  # the pool ends its processes at once when an error leaves it
+        except _Left:
+            pass

@@ -118,7 +118,10 @@ const take = {
     $("progress").value = message.done;
     $("working").textContent = `${message.done} of ${message.total} measured`;
   },
-  proof(message) { panel.proof(message.rows, message.state); },
+  proof(message) {
+    const lamps = message.state.lights.map((pose) => `(${pose})`).join(" ");
+    panel.proof(message.rows, message.state, `camera (${message.state.sensor})${lamps && `, lamp ${lamps}`}`);
+  },
   saved(message) { $("said").textContent = `Saved: ${message.path}`; },
   exists(message) {
     const button = panel.element("button", "Replace it");
@@ -176,8 +179,9 @@ function legend(map) {
     `${panel.number(limits.low * (limits.high / limits.low) ** part)}${part === 1 && beyond ? " and more" : part ? "" : " (best)"}`)));
 }
 
-$("measurand").onchange = () => measurand(Number($("measurand").value));
-$("shown").onchange = () => { state.shown = $("shown").value; ask(true); };
+// the keys are the page's again once something is chosen
+$("measurand").onchange = () => { $("measurand").blur(); measurand(Number($("measurand").value)); };
+$("shown").onchange = () => { $("shown").blur(); state.shown = $("shown").value; ask(true); };
 for (const kind of ["best", "prove", "render", "save"]) $(kind).onclick = () => send({ type: kind });
 $("cancel").onclick = () => send({ type: "cancel" });
 window.addEventListener("resize", () => { view.draw(); picture.draw(); if (view.map) legend(view.map); });

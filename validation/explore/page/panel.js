@@ -79,7 +79,7 @@ export function effects(rows) {
   $("effect-count").textContent = `${rows.filter((each) => each.on).length} of ${rows.length}`;
 }
 
-export function proof(rows, state) {
+export function proof(rows, state, where) {
   const each = rows[state.measurand];
   const table = element("table"), head = element("thead");
   head.append(row(["", "predicted σ", "with picture", "measured σ", "variance ratio [95 %]", "lost"]));
@@ -90,7 +90,9 @@ export function proof(rows, state) {
   const said = each.ratio === null ? `It could not be measured (${each.status}).`
     : `${each.name}: 1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${number(each.bias, 2)} ${each.unit}, predicted ${number(each.predicted_bias, 2)}.`;
   const canvas = element("canvas", "", "hist");
-  $("proof").replaceChildren(element("h2", "Measured beside predicted"), element("p", said), canvas, table);
+  const title = element("h2", "Measured beside predicted ");
+  title.append(element("small", `at ${where}`));
+  $("proof").replaceChildren(title, element("p", said), canvas, table);
   $("proof").dataset.ratio = each.ratio ?? "";
   if (each.counts.length) histogram(canvas, each);
 }
