@@ -27,6 +27,10 @@ def calibrated(pictures: Pictures) -> Errors:
     first order alone is taken. Infinite where an edge has too little contrast or length to be measured. Errors are
     found where the lens records the edge; its local magnification takes them to ideal px.
     """
+    return pictures.once("calibrated", lambda: _calibrated(pictures))
+
+
+def _calibrated(pictures: Pictures) -> Errors:
     scene, scale = pictures.scene, pictures.scene.locator.scale_px
     along = Along.of(pictures, trimmed=True)
     nodes, squared = along.nodes, along.squared

@@ -72,6 +72,18 @@ class Errors:
         """Of the first quantity in the object, shape (...)."""
         return self.variances_object[..., 0]
 
+    def parts(self, number: int) -> dict[str, np.ndarray]:
+        """What every edge and circle that a quantity needs adds to its variance in the object, each (...).
+
+        Errors of different edges are independent, so the parts add up to the variance; infinite where one cannot be
+        found. Not of a model that finds all jointly.
+        """
+        needs = self.measurands.depends()[number]
+        edges, circles = _parts(self, self.measurands.gradient_object[..., number, :], needs)
+        names = [*self.measurands.view.names, *self.measurands.circles]
+        each = [*np.moveaxis(edges, -1, 0), *circles]
+        return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed}
+
     def covariance(self, gradient: np.ndarray) -> np.ndarray:
         """Joint covariance (..., M, M) of quantities with a gradient (..., M, q); infinite where not measurable.
 
@@ -125,6 +137,16 @@ def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = N
 
     Without ``needs``, bool (E + C,), it needs whatever its gradient is not 0 for.
     """
+    edges, circles = _parts(errors, gradient, needs)
+    with np.errstate(invalid="ignore", over="ignore"):
+        variance = edges.sum(-1)
+        for each in circles:
+            variance = variance + each
+    return np.where(np.isfinite(variance), variance, np.inf)
+
+
+def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tuple[np.ndarray, list[np.ndarray]]:
+    """What each edge (..., E) and each circle (...) adds to it; infinite where one that it needs cannot be found."""
     known = errors.measurands
     edges = len(known.view.names)
     offset, tilt = gradient[..., 0 : 2 * edges : 2], gradient[..., 1 : 2 * edges : 2]
@@ -132,10 +154,10 @@ def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = N
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         parts = errors.line_variance(offset, tilt)
         variance = np.where(known.view.visible & np.isfinite(parts), parts, np.inf)
-        variance = np.where(needed, variance, 0.0).sum(-1)
+        lines, circles = np.where(needed, variance, 0.0), []
         for c, covariance in enumerate(errors.circles):
             pull = known.of_circle(gradient[..., None, :], c)[..., 0, :]
             moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
             needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
-            variance = variance + np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0)
-    return np.where(np.isfinite(variance), variance, np.inf)
+            circles.append(np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0))
+    return lines, circles

@@ -25,6 +25,7 @@ COMMANDS = {
     "calibrate-camera": ("calibrate_camera", "Calibrate a camera from photographs of a chessboard."),
     "budget": ("budget", "The uncertainty of every measurand: all sources, shares, and U = k u."),
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
+    "explore": ("explore", "A page on which camera and lights are dragged and the prediction answers."),
     "hard": ("hard", "Answers beside references where numbers lose their digits."),
     "report": ("report", "Write report.html, report.md and tables of a run."),
     "compare": ("compare", "Which settings changed beyond chance from one run to another?"),

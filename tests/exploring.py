@@ -1,0 +1,79 @@
+"""The page of `ice explore` in a browser, and how long it takes to answer."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import numpy as np
+
+import scenes
+from tests.chromium import Page
+from validation.explore.server import serve
+from validation.explore.session import Place
+
+# Milliseconds from each state that was sent while something was dragged to its answer on the page, by number; the
+# newest state is always answered, those between may be left out.
+_WATCH = """(() => {
+  window.asked = {}; window.took = [];
+  const send = WebSocket.prototype.send;
+  let moved = 0;
+  addEventListener("pointermove", () => { moved = performance.now(); }, true);
+  addEventListener("keydown", () => { moved = performance.now(); }, true);
+  WebSocket.prototype.send = function (text) {
+    const told = JSON.parse(text);
+    if (told.type === "state" && !told.rest) asked[told.number] = moved;
+    return send.call(this, text);
+  };
+  new MutationObserver(() => {
+    const number = explore.answered;
+    if (asked[number]) { took.push(performance.now() - asked[number]); delete asked[number]; }
+  }).observe(document.getElementById("answer"), { subtree: true, childList: true, characterData: true });
+  return true;
+})()"""
+
+
+@asynccontextmanager
+async def served(name: str, directory: Path) -> AsyncIterator[str]:
+    """The address at which a scene's page is served, with a free port."""
+    stop, address = asyncio.Event(), asyncio.get_running_loop().create_future()
+    place = Place(scenes.load(name), name, directory)
+    serving = asyncio.create_task(serve(place, "127.0.0.1", 0, None, address.set_result, stop))
+    try:
+        await asyncio.wait([serving, address], return_when=asyncio.FIRST_COMPLETED)
+        yield address.result()
+    finally:
+        stop.set()
+        await serving
+
+
+async def first_answer(page: Page, url: str) -> None:
+    """Go there and wait for what the page says first, for the sphere and for the effects."""
+    await page.open(url)
+    await page.until("document.getElementById('sigma')?.dataset.sigma")
+    await page.until("window.explore.view.map !== null", 60)
+    await page.until("document.getElementById('effects').children.length > 0", 60)
+
+
+async def drag_lamp(page: Page, by: tuple[float, float], steps: int, pause: float) -> list[float]:
+    """Drag the lamp with the mouse; the milliseconds from each movement to its answer on the page."""
+    await page.value(_WATCH)
+    x, y = await page.value("window.explore.view.spot(0)")
+    await page.drag((x, y), by, steps, pause)
+    await settled(page)
+    return await page.value("window.took")
+
+
+async def settled(page: Page) -> None:
+    """Wait until the last state that was sent is answered from a close look."""
+    await asyncio.sleep(0.35)  # longer than the page waits before it says that nothing moves
+    await page.until("window.explore.answered === window.explore.number", 30)
+    await page.until("document.getElementById('sigma').dataset.closely !== 'false'", 30)
+
+
+def told(times: list[float]) -> str:
+    """One line about them."""
+    part = np.percentile(times, [50, 90, 100])
+    return f"{len(times)} answers, ms: median {part[0]:.0f}, 90 % {part[1]:.0f}, longest {part[2]:.0f}"

@@ -1,0 +1,125 @@
+"""The page of `ice explore`, driven in a headless browser as a visitor would."""
+
+import asyncio
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+
+import planner
+import scenes
+from scenes import InvalidInput
+from tests.chromium import PROGRAM, chromium
+from tests.exploring import drag_lamp, first_answer, served, settled, told
+from validation.cli.application import app
+from validation.explore.gate import COOKIE
+
+in_a_browser = pytest.mark.skipif(PROGRAM is None, reason="needs Chromium, which is not installed here")
+
+
+async def state(page):
+    return await page.value("window.explore.state")
+
+
+async def sigma(page):
+    return float(await page.value("document.getElementById('sigma').dataset.sigma"))
+
+
+def predicted(scene, poses):
+    return planner.predict(scene, poses["sensor"], poses["lights"][0]).measurands[0].variance_object ** 0.5
+
+
+@in_a_browser
+def test_a_visit(task1, tmp_path):
+    """Drag, keys, proof, save; nothing leaves this machine; another visitor's state stays as it was."""
+
+    async def visit():
+        async with served("task1", tmp_path) as url, chromium() as page:
+            await first_answer(page, url)
+            before = await sigma(page)
+            assert before == pytest.approx(predicted(task1, await state(page)), rel=1e-9)
+
+            times = await drag_lamp(page, (-70.0, 10.0), 12, 0.04)
+            logging.getLogger("tests").info("task1: %s", told(times))
+            there = await state(page)
+            assert there["sensor"] == [30, 90]
+            assert there["lights"] != [[15, 270]]
+            assert await sigma(page) != pytest.approx(before, rel=0.02)
+            assert await sigma(page) == pytest.approx(predicted(task1, there), rel=1e-9)
+
+            await page.press("ArrowDown", shift=True)
+            await page.press("c")
+            await page.press("ArrowDown")
+            await settled(page)
+            moved = await state(page)
+            assert moved["lights"][0][0] == pytest.approx(there["lights"][0][0] + 5)
+            assert moved["sensor"] == [31, 90]
+            assert await sigma(page) == pytest.approx(predicted(task1, moved), rel=1e-9)
+
+            await page.press("p")
+            ratio = float(await page.until("document.getElementById('proof').dataset.ratio", 60))
+            assert 0.8 < ratio < 1.25  # 5 standard errors of 1000 images
+            await page.press("s")
+            await page.until("document.getElementById('said').textContent.startsWith('Saved')")
+            await page.press("s")
+            await page.until("document.getElementById('said').textContent.includes('must be a new file')")
+
+            async with chromium(390, 844) as other:
+                await first_answer(other, url)
+                assert (await state(other))["sensor"] == [30, 90]
+                assert await other.value("document.documentElement.scrollWidth") <= 390
+                assert not other.errors
+            assert await state(page) == moved
+            assert not page.errors
+            outside = [each for each in page.requests if not each.startswith((url, url.replace("http", "ws"), "data:"))]
+            assert outside == []
+            return moved
+
+    moved = asyncio.run(visit())
+    saved = scenes.load(tmp_path / "task1-explored.toml")
+    assert saved.settings[:-1] == task1.settings
+    assert list(saved.settings[-1].sensor) == moved["sensor"]
+    assert list(saved.settings[-1].light) == moved["lights"][0]
+
+
+def test_from_the_command_line(tmp_path):
+    """It tells its address, lets in who has the token, and ends by Ctrl-C in a second or so."""
+    command = [sys.executable, "-m", "validation.cli", "explore", "task1", "--host", "0.0.0.0", "--json"]
+    path = f"{Path(__file__).parents[2]}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    with subprocess.Popen(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        try:
+            url = json.loads(process.stdout.readline())["url"].replace("0.0.0.0", "127.0.0.1")
+            token = url.split("token=")[1]
+            with urlopen(Request(url.split("?")[0], headers={"Cookie": f"{COOKIE}={token}"})) as page:
+                assert "Drag camera and lamp" in page.read().decode()
+            with pytest.raises(HTTPError) as refused:
+                urlopen(url.split("?")[0])
+            assert refused.value.code == 403
+            assert refused.value.read().decode().startswith("token must be the one that ice explore printed")
+            refused.value.close()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(30) == 130
+            assert process.stderr.read().decode() == "stopped: interrupted\n"
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--port", "65536"], "--port must be at most 65535, got 65536"),
+        (["--host", "203.0.113.7"], "--host and --port must be free to listen at, got 203.0.113.7:0"),
+    ],
+)
+def test_bad_addresses(options, message):
+    with pytest.raises(InvalidInput, match=message):
+        app(["explore", "task1", *options], standalone_mode=False)

@@ -1,0 +1,337 @@
+"""What the page of `ice explore` says, without a browser."""
+
+import asyncio
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from aiohttp import ClientSession, CookieJar, web
+from aiohttp.test_utils import TestServer
+
+import planner
+import scenes
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from scenes import InvalidInput, Pose
+from validation.batch.work import Chunk, Clean, Found, Packed
+from validation.explore import answers, best, effects, preview, prove, save, session, sphere
+from validation.explore.gate import COOKIE, gate
+from validation.explore.state import SENSOR, State
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return scenes.load("plate")
+
+
+def moved(state, light):
+    return replace(state, lights=(Pose(*light),))
+
+
+def test_states_of_messages(plate):
+    state = replace(State.first(plate), measurand=2, shown="ratio", moving=0)
+    assert State.of_message(plate, state.to_message()) == state
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("sensor", [200, 0], "polar_deg must be between 0 and 180"),
+        ("sensor", "north", "pose must be a pair|polar_deg must be"),
+        ("lights", [], "lights must be 1 pose"),
+        ("measurand", 5, "measurand must be a whole number from 0 to 4, got 5"),
+        ("measurand", True, "measurand must be a whole number"),
+        ("shown", "colour", "shown must be one of sigma, ratio, got 'colour'"),
+        ("moving", 1, "moving must be a whole number from -1 to 0, got 1"),
+    ],
+)
+def test_messages_that_are_none(plate, key, value, message):
+    with pytest.raises(InvalidInput, match=message):
+        State.of_message(plate, State.first(plate).to_message() | {key: value})
+
+
+def test_no_ratio_without_a_tolerance(task1, plate):
+    assert replace(State.first(task1), shown="ratio").tolerable(task1).shown == "sigma"
+    assert replace(State.first(plate), shown="ratio").tolerable(plate).shown == "ratio"
+
+
+def test_answer_is_the_planners(plate):
+    state = replace(State.first(plate), measurand=1)
+    told = answers.answer(plate, state)
+    expected = planner.predict(plate, state.sensor, state.lights[0])
+    assert told.prediction.measurands == expected.measurands
+    message = answers.to_message(told)
+    assert message["measurands"][1]["sigma"] == math.sqrt(expected.measurands[1].variance_object)
+    assert set(told.shares) == set(plate.quantities[1].edges)
+
+
+def test_shares_are_of_the_variance(plate):
+    """Parts add up to the variance of every measurand, and without an edge's error its part is missing."""
+    picture = State.first(plate).picture(plate)
+    errors = variance_model("calibrated")(Pictures.of(picture))
+    for number, quantity in enumerate(plate.quantities):
+        parts = errors.parts(number)
+        assert set(parts) == set(quantity.edges)
+        assert sum(parts.values()) == pytest.approx(errors.variances_object[number], rel=1e-12)
+    state = State.first(plate)
+    assert sum(answers.answer(plate, state).shares.values()) == pytest.approx(1)
+
+
+def test_refused_and_not_measurable(task1):
+    low = State.first(task1)
+    inside = task1.model_copy(update={"light": task1.light.model_copy(update={"distance": 1.0})})
+    message = answers.to_message(answers.answer(inside, moved(low, (30, 45))))
+    assert message["refused"].startswith("light must be outside the object, got (30, 45) at 1 cm")
+    dark = answers.answer(task1, moved(low, (90, 90)))
+    assert dark.shares == {}
+    assert dark.limiting is None
+    row = answers.to_message(dark)["measurands"][0]
+    assert row["sigma"] is None
+    assert row["why"] == answers.WHY[row["status"]]
+
+
+def test_a_glance_at_a_block_is_a_close_look(task1):
+    for closely in (False, True):
+        told = answers.answer(task1, State.first(task1), closely=closely)
+        assert told.prediction.variance_object == planner.predict(task1, (30, 90), (15, 270)).variance_object
+        assert told.closely is closely
+
+
+@pytest.mark.parametrize("moving", [SENSOR, 0])
+def test_sphere(task1, moving):
+    """Patches cover the hemisphere, and each has the value that the planner gives for the pose of its middle."""
+    known, state = sphere.cells(), replace(State.first(task1), moving=moving)
+    low, high, start, stop = np.radians(known.borders).T
+    assert ((np.cos(low) - np.cos(high)) * (stop - start)).sum() == pytest.approx(2 * np.pi)
+    sigmas = np.concatenate(list(sphere.values(task1, state, known.poses)))
+    assert sigmas.shape == (len(known.poses), 1)
+    for i in range(0, len(known.poses), 37):
+        pose = tuple(known.poses[i])
+        pair = (pose, state.lights[0]) if moving == SENSOR else (state.sensor, pose)
+        assert sigmas[i, 0] ** 2 == pytest.approx(planner.predict(task1, *pair).variance_object, rel=1e-9)
+    message = sphere.to_message(task1, state, sigmas)
+    assert len(message["values"]) == len(message["borders"])
+    assert None in message["values"]
+    assert sphere.key(state) == sphere.key(moved(state, (20, 20)) if moving == 0 else replace(state, sensor=Pose(1, 2)))
+    assert sphere.key(state) != sphere.key(replace(state, moving=-1 - moving))
+
+
+def test_preview_is_the_picture(task1):
+    """Levels of the drawn picture are those of the rendered one but near edges."""
+    from render import image
+
+    state = State.first(task1)
+    picture = state.picture(task1)
+    part = preview.window(task1, picture)
+    drawn = preview.drawn(task1, picture, part).astype(float)
+    clean = preview.rendered(task1, image(picture, variant="scalar_rgb"), part).astype(float)
+    assert drawn.shape == clean.shape
+    apart = np.abs(drawn - clean)
+    assert np.median(apart) < 2
+    assert (apart > 12).mean() < 0.05
+    assert np.abs(255 - drawn - clean).mean() > 50  # a picture of the wrong brightness is another one
+
+
+def test_overlay(plate):
+    state = State.first(plate)
+    drawn = preview.overlay(plate, state.picture(plate), answers.answer(plate, state))
+    names = {line["name"] for line in drawn["lines"]}
+    assert names == {name for quantity in plate.quantities for name in quantity.edges}
+    assert all(np.linalg.eigvalsh(corner["covariance"]).min() > 0 for corner in drawn["corners"])
+
+
+def test_best_from_here(task1):
+    state = State.first(task1)
+    found = best.best_from(task1, state)
+    before, after = (answers.answer(task1, each).prediction.variance_object for each in (state, found))
+    assert after < 0.9 * before
+    with pytest.raises(InvalidInput, match="descent must begin where the measurand can be measured"):
+        best.best_from(task1, moved(state, (90, 90)))
+
+
+def test_effects_are_those_of_the_place(task1):
+    rows = effects.effects(task1, State.first(task1))
+    assert {"fall_off", "lens_blur"} <= {row["name"] for row in rows if row["on"]}
+    assert all(row["reason"] for row in rows)
+
+
+def fake(task1, scale, rng, lost=0):
+    """What 1000 images would have shown of the prediction, if sigma were ``scale`` times what it says."""
+    forecast = planner.predict(task1, (30, 90), (15, 270)).measurands[0]
+    values = forecast.value_object + scale * math.sqrt(forecast.variance_object) * rng.standard_normal(1000)
+    values[:lost] = np.nan
+    about = {
+        "name": "distance", "unit": "cm", "value": forecast.value_object, "calibrated": forecast.variance_object,
+        "predicted_bias": forecast.bias_object,
+    }  # fmt: skip
+    propagated = {"gradient:0": (forecast.variance_object, forecast.value_object, "ok")}
+    clean = Clean(Packed.of(np.zeros((2, 2))), propagated, {"measurands": [about]}, {})
+    pieces = np.split(values, 20)
+    return clean, [Found(None, {k: Chunk({"gradient:0": piece}, {}, {})}) for k, piece in enumerate(pieces)]
+
+
+@pytest.mark.parametrize(("scale", "agrees"), [(1.0, True), (1.14, False), (0.88, False)])
+def test_proof_tells_right_from_wrong(task1, rng, scale, agrees):
+    (proof,) = prove.proofs(task1, *fake(task1, scale, rng))
+    assert proof.agrees is agrees
+    assert proof.ratio == pytest.approx(scale**2, rel=0.2)
+    message = prove.to_message(proof)
+    assert sum(message["counts"]) == 1000
+    assert message["agrees"] is agrees
+
+
+def test_proof_counts_what_is_lost(task1, rng):
+    (proof,) = prove.proofs(task1, *fake(task1, 1.0, rng, lost=30))
+    assert (proof.n, proof.failed) == (1000, 30)
+    (none,) = prove.proofs(task1, *fake(task1, 1.0, rng, lost=1000))
+    assert not prove.to_message(none)["counts"]
+    assert prove.to_message(none)["ratio"] is None
+
+
+def test_pieces_of_a_proof(task1):
+    clean = Clean(Packed.of(np.zeros((2, 2))), {}, {}, {})
+    tasks = prove.measuring(task1, State.first(task1), "scalar_rgb", clean, 120)
+    assert [task.chunks for task in tasks] == [((0, 50),), ((1, 50),), ((2, 20),)]
+
+
+@pytest.mark.parametrize("name", ["task1", "bracket_mm", "two_lights", "ring_light", "printed_label"])
+def test_save(name, tmp_path):
+    """All that the file said is there, and one setting more; files beside the scene are found from elsewhere."""
+    scene = scenes.load(name)
+    state = replace(State.first(scene), sensor=Pose(21.25, 3.5))
+    path = save.save(name, state, tmp_path)
+    again = scenes.load(path)
+    assert path.name == f"{name}-explored.toml"
+    assert again.settings[:-1] == scene.settings
+    assert again.settings[-1].sensor == state.sensor
+    assert again.settings[-1].lights == state.lights
+    assert np.array_equal(again.solid.triangles, scene.solid.triangles)
+    before = path.read_text()
+    with pytest.raises(save.Exists, match="must be a new file"):
+        save.save(name, state, tmp_path)
+    assert path.read_text() == before
+    other = save.save(name, replace(state, sensor=Pose(22, 3)), tmp_path, replace=True)
+    assert scenes.load(other).settings[-1].sensor == Pose(22, 3)
+
+
+def test_save_to_where_nothing_can_be(tmp_path, task1):
+    with pytest.raises(InvalidInput, match="must be a file that can be written"):
+        save.save("task1", State.first(task1), tmp_path / "none")
+
+
+def statuses(token, asked):
+    """Status of each request (path, headers) to a gate with that token."""
+
+    async def run():
+        async def inside(_):
+            return web.Response(text="in")
+
+        application = web.Application(middlewares=[gate(token)])
+        application.add_routes([web.get("/", inside)])
+        found = []
+        async with TestServer(application) as server:
+            for path, headers in asked:
+                async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as client:
+                    host = f"127.0.0.1:{server.port}"
+                    headers = {key: value.replace("HOST", host) for key, value in headers.items()}
+                    async with client.get(server.make_url(path), headers=headers) as answer:
+                        text = await answer.text()
+                        assert text == "in" or text.count("\n") == 1
+                        found.append(answer.status)
+        return found
+
+    return asyncio.run(run())
+
+
+def test_gate_of_this_machine():
+    asked = [
+        ("/", {}), ("/", {"Host": "localhost:80"}), ("/", {"Host": "evil.example"}), ("/", {"Origin": "http://HOST"}),
+        ("/", {"Origin": "http://evil.example"}), ("/", {"Origin": "null"}),
+    ]  # fmt: skip
+    assert statuses(None, asked) == [200, 200, 403, 200, 403, 403]
+
+
+def test_gate_with_a_token():
+    asked = [
+        ("/", {}), ("/?token=wrong", {}), ("/?token=right", {}), ("/", {"Cookie": f"{COOKIE}=right"}),
+        ("/", {"Cookie": f"{COOKIE}=wrong"}), ("/?token=right", {"Origin": "http://evil.example"}),
+    ]  # fmt: skip
+    assert statuses("right", asked) == [403, 403, 200, 200, 403, 403]
+
+
+def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
+    """A visitor's messages in one go: two answers at most, the last of them of the last state."""
+
+    class Tools:
+        async def quickly(self, work, *arguments):
+            return await asyncio.to_thread(work, *arguments)
+
+        async def slowly(self, work, *arguments):
+            return []
+
+    async def run():
+        sent, ready = [], asyncio.Event()
+
+        async def send(message):
+            sent.append(message)
+            if message.get("number") == 30:
+                ready.set()
+
+        async def messages():
+            for number in range(1, 31):
+                state = moved(State.first(task1), (15 + number, 270)).to_message()
+                yield {"type": "state", "state": state, "number": number}
+            yield {"type": "nonsense"}
+            await asyncio.wait_for(ready.wait(), 10)
+
+        place = session.Place(task1, "task1", None)
+        await session.Session(place, Tools(), send).run(messages())
+        return sent
+
+    sent = asyncio.run(run())
+    answered = [message["number"] for message in sent if message["type"] == "answer"]
+    assert answered[-1] == 30
+    assert len(answered) <= 2
+    assert sent[0]["type"] == "scene"
+    assert any("type must be state, best" in message.get("text", "") for message in sent)
+
+
+def test_work_can_be_stopped(task1):
+    """A second one is refused while the first is under way; it ends as soon as it is told to."""
+
+    class Tools:
+        async def variant(self):
+            return "scalar_rgb"
+
+        async def perform(self, task):
+            await asyncio.sleep(60)
+
+    async def run():
+        sent, told = [], asyncio.Queue()
+
+        async def send(message):
+            sent.append(message)
+            await told.put(message)
+
+        async def until(kind, **about):
+            while (message := await asyncio.wait_for(told.get(), 5))[
+                "type"
+            ] != kind or not about.items() <= message.items():
+                pass
+
+        async def messages():
+            yield {"type": "prove"}
+            await until("job", state="begun")
+            yield {"type": "render"}
+            await until("told")
+            yield {"type": "cancel"}
+            await until("job", state="stopped")
+
+        await session.Session(session.Place(task1, "task1", None), Tools(), send).run(messages())
+        return sent
+
+    sent = asyncio.run(asyncio.wait_for(run(), 20))
+    assert [each["text"] for each in sent if each["type"] == "told"] == [
+        "another work must be finished or stopped before this, got one under way"
+    ]

@@ -1,0 +1,132 @@
+"""What a state says: predicted sigmas, which edge limits, statuses, and why a pose is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import planner
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from planner.prediction import feature_covariances, glanced
+from scenes import InvalidInput, Scene
+from validation.explore.state import State
+
+WHY = {
+    "ok": "what is measured is right: its bias is below a quarter of sigma",
+    "clutter": "something near an edge moves it by more than a quarter of sigma, or is too near to tell",
+    "not_visible": "an edge or a rim that it needs is hidden or outside the image",
+    "low_contrast": "an edge that it needs hardly stands out of the noise",
+    "short": "too little of an edge that it needs is left in the image",
+    "ill_conditioned": "two edges that make a corner lie nearly along each other",
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is predicted at a state.
+
+    Attributes
+    ----------
+    refused : str
+        Why the poses cannot be taken; empty where they can, and all else is None or empty where not.
+    prediction : Prediction or None
+    shares : dict
+        Part of the chosen measurand's variance that each edge or circle makes, by name, the largest first; the parts
+        add up to 1. Empty where it cannot be measured.
+    corners : ndarray, shape (2, 2)
+        Where the sensor sees the measurand's two features, px.
+    covariances : ndarray, shape (2, 2, 2)
+        Their covariances, px^2; NaN of an edge.
+    closely : bool
+        Whether rims of circles were looked at closely.
+    """
+
+    refused: str = ""
+    prediction: planner.Prediction | None = None
+    shares: dict[str, float] | None = None
+    corners: np.ndarray | None = None
+    covariances: np.ndarray | None = None
+    closely: bool = True
+
+    @property
+    def limiting(self) -> str | None:
+        """The edge or circle that makes most of the variance."""
+        return next(iter(self.shares), None) if self.shares else None
+
+
+def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
+    """What is predicted there, by the calibrated model.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> task1 = scenes.load("task1")
+    >>> told = answer(task1, State.first(task1))
+    >>> told.prediction.status, told.limiting
+    ('ok', 'e9')
+    """
+    try:
+        picture = state.picture(scene)
+        predicted = planner.predict(picture, closely=closely)
+    except InvalidInput as error:
+        return Answer(refused=str(error))
+    pictures = Pictures.of(picture) if closely else glanced(picture)
+    errors = variance_model("calibrated")(pictures)
+    known = planner.features.measurand.measurand(pictures, state.measurand)
+    return Answer(
+        prediction=predicted,
+        shares=_shares(errors.parts(state.measurand)),
+        corners=known.points,
+        covariances=feature_covariances(pictures, errors, state.measurand),
+        closely=closely,
+    )
+
+
+def _shares(parts: dict[str, np.ndarray]) -> dict[str, float]:
+    total = sum(map(float, parts.values()))
+    if not 0 < total < math.inf:
+        return {}
+    return {name: float(part) / total for name, part in sorted(parts.items(), key=lambda item: -item[1])}
+
+
+def to_message(told: Answer) -> dict[str, Any]:
+    """The answer as the page takes it; numbers that are not finite are null."""
+    if told.prediction is None:
+        return {"refused": told.refused}
+    return {
+        "refused": "",
+        "closely": told.closely,
+        "measurands": [_forecast(each) for each in told.prediction.measurands],
+        "shares": told.shares,
+        "limiting": told.limiting,
+        "edges": [
+            {"name": e.name, "status": e.status, "length": finite(e.length_px), "contrast": finite(e.contrast)}
+            for e in told.prediction.edges
+        ],
+    }
+
+
+def _forecast(each: planner.Forecast) -> dict[str, Any]:
+    return {
+        "name": each.name,
+        "kind": each.kind,
+        "unit": each.unit,
+        "value": finite(each.value_object),
+        "nominal": finite(each.nominal),
+        "sigma": finite(math.sqrt(each.variance_object)),
+        "sigma_px": finite(math.sqrt(each.variance_image)),
+        "ratio": None if each.ratio is None else finite(2 * each.ratio),
+        "tolerance": None if each.tolerance is None else each.tolerance.half,
+        "bias": finite(each.bias_object),
+        "status": each.status,
+        "why": WHY[each.status],
+    }
+
+
+def finite(value: float | None) -> float | None:
+    """The number, or None where it is not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None

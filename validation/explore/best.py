@@ -1,0 +1,46 @@
+"""From a state down to the next place from which its measurand is known best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from planner.search.constraints import Constraints
+from planner.search.poses import by_light
+from planner.search.refinement import refine
+from scenes import InvalidInput, Pose, Scene
+from validation.explore.state import State
+
+_STEP_DEG = 10.0
+
+
+def best_from(scene: Scene, state: State) -> State:
+    """Sensor and all free lights moved to the next local minimum of the measurand's variance in the object.
+
+    Bodies of camera and lamps keep clear of each other, as in `ice plan`; rims of circles are glanced at.
+
+    Raises
+    ------
+    InvalidInput
+        If it cannot be measured from the state, or a pose is refused.
+    """
+    state.picture(scene)
+    sensor = np.array(list(state.sensor))
+    lights = np.array([list(pose) for pose in state.lights]).reshape(-1)
+
+    def variance(sensor: np.ndarray, lights: np.ndarray) -> float:
+        given = by_light(lights[None])
+        pictures = Pictures.of(scene, sensor[None], given if scene.free else None)
+        return float(variance_model("calibrated")(pictures).variances_object.reshape(-1)[state.measurand])
+
+    try:
+        sensor, lights, _ = refine(scene, sensor, lights, "calibrated", "object", _STEP_DEG, Constraints(), variance)
+    except InvalidInput as error:
+        if "refinement must begin" not in str(error):
+            raise
+        raise InvalidInput("the descent must begin where the measurand can be measured and bodies are clear") from None
+    poses = [Pose(*map(float, pose.round(2))) for pose in (sensor, *lights.reshape(-1, 2))]
+    return replace(state, sensor=poses[0], lights=tuple(poses[1:]))

@@ -1,0 +1,206 @@
+// The visitor's state, what is sent of it, and what is done with what comes back.
+
+import { View, colour, range } from "./view.js";
+import { Picture } from "./picture.js";
+import * as panel from "./panel.js";
+
+const $ = (id) => document.getElementById(id);
+const REST_MS = 250; // without a movement before the long work begins
+let scene = null, state = null, latest = null, number = 0, frame = 0, timer = 0, socket = null;
+const view = new View($("sphere"), moved, choose), picture = new Picture($("picture"), $("caption"));
+window.explore = { view, get state() { return state; }, get number() { return number; }, answered: 0 };
+
+connect();
+
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/socket`);
+  socket.onopen = () => { $("connection").textContent = ""; };
+  socket.onmessage = (event) => { const message = JSON.parse(event.data); take[message.type](message); };
+  socket.onclose = () => {
+    $("connection").textContent = "not connected; trying again ...";
+    setTimeout(connect, 2000);
+  };
+}
+
+function send(message) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+// The newest state, once a frame; when nothing has moved for a while, that it rests.
+function ask(rest) {
+  view.draw();
+  poses();
+  clearTimeout(timer);
+  if (rest) {
+    cancelAnimationFrame(frame);
+    frame = 0;
+    push(true);
+    return;
+  }
+  if (!frame) frame = requestAnimationFrame(() => { frame = 0; push(false); });
+  timer = setTimeout(() => push(true), REST_MS);
+}
+
+function push(rest) {
+  number += 1;
+  send({ type: "state", state, rest, number });
+}
+
+function moved(which, to, rest) {
+  if (to) {
+    const rounded = [Math.round(to[0] * 10) / 10, Math.round(to[1] * 10) / 10 % 360];
+    if (which < 0) state.sensor = rounded;
+    else state.lights[which] = rounded;
+  }
+  ask(rest);
+}
+
+function choose(which) {
+  if (which === state.moving) return;
+  state.moving = which;
+  ask(false);
+}
+
+function measurand(index) {
+  state.measurand = index;
+  if (!scene.measurands[index].tolerance) state.shown = "sigma";
+  $("measurand").value = index;
+  $("shown").value = state.shown;
+  $("shown").options[1].disabled = !scene.measurands[index].tolerance;
+  ask(true);
+}
+
+const take = {
+  scene(message) {
+    scene = message;
+    if (state === null) state = message.state;
+    Object.assign(view, { scene, state });
+    $("title").textContent = `${scene.name}: ${scene.title}`;
+    $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${each.name} (${each.kind})`, i)));
+    $("prove").firstChild.textContent = `Prove it with ${scene.renders} images `;
+    inputs();
+    measurand(state.measurand);
+  },
+  answer(message) {
+    if (message.number < window.explore.answered) return;
+    window.explore.answered = message.number;
+    window.explore.ms = message.ms;
+    latest = message;
+    view.limiting = message.limiting;
+    panel.answer(message, state, measurand);
+    if (message.picture) picture.show(message.picture, message.overlay, message.limiting);
+    view.draw();
+  },
+  picture(message) { picture.show(message.picture); },
+  sphere(message) {
+    view.map = message;
+    view.draw();
+    legend(message);
+  },
+  effects(message) { panel.effects(message.rows); },
+  moved(message) {
+    state = message.state;
+    view.state = state;
+    $("said").textContent = "Moved to the next place from which this measurand is known best.";
+    ask(true);
+  },
+  job(message) {
+    const busy = message.state === "begun", words = { best: "descending", prove: "rendering", render: "rendering" };
+    $("work").hidden = !busy;
+    $("working").textContent = words[message.kind];
+    $("progress").removeAttribute("value");
+    for (const id of ["best", "prove", "render"]) $(id).disabled = busy;
+    if (busy) $("said").textContent = "";
+  },
+  progress(message) {
+    if (!message.done) return;
+    $("progress").max = message.total;
+    $("progress").value = message.done;
+    $("working").textContent = `${message.done} of ${message.total} measured`;
+  },
+  proof(message) {
+    const lamps = message.state.lights.map((pose) => `(${pose})`).join(" ");
+    panel.proof(message.rows, message.state, `camera (${message.state.sensor})${lamps && `, lamp ${lamps}`}`);
+  },
+  saved(message) { $("said").textContent = `Saved: ${message.path}`; },
+  exists(message) {
+    const button = panel.element("button", "Replace it");
+    button.onclick = () => send({ type: "save", replace: true });
+    $("said").replaceChildren(`${message.text}. `, button);
+  },
+  told(message) { $("said").textContent = message.text; },
+};
+
+function inputs() {
+  const things = [["camera", -1], ...state.lights.map((_, i) => [state.lights.length > 1 ? `lamp ${i + 1}` : "lamp", i])];
+  $("poses").replaceChildren(...things.map(([name, which]) => {
+    const label = document.createElement("label"), radio = document.createElement("input");
+    Object.assign(radio, { type: "radio", name: "moving", value: which });
+    radio.onchange = () => choose(which);
+    const boxes = [0, 1].map((k) => {
+      const box = document.createElement("input");
+      Object.assign(box, { type: "number", step: 1, min: k ? -360 : 0, max: k ? 720 : 180, id: `pose${which}-${k}` });
+      box.setAttribute("aria-label", `${name}, ${k ? "azimuth" : "polar angle"}, degrees`);
+      box.onchange = () => {
+        if (box.value === "" || !box.checkValidity()) return;
+        const to = [...(which < 0 ? state.sensor : state.lights[which])];
+        to[k] = Number(box.value);
+        moved(which, to, true);
+      };
+      return box;
+    });
+    label.append(radio, name, ...boxes);
+    return label;
+  }));
+}
+
+function poses() {
+  [state.sensor, ...state.lights].forEach((pose, i) => pose.forEach((angle, k) => {
+    const box = $(`pose${i - 1}-${k}`);
+    if (box && box !== document.activeElement) box.value = angle;
+  }));
+  document.querySelectorAll("#poses input[type=radio]").forEach((box) => { box.checked = Number(box.value) === state.moving; });
+}
+
+function legend(map) {
+  const limits = range(map.values), bar = $("legend-bar"), who = map.moving < 0 ? "camera" : state.lights.length > 1 ? `lamp ${map.moving + 1}` : "lamp";
+  const name = scene.measurands[state.measurand].name;
+  $("legend-title").textContent = `${map.what} of "${name}"${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is`;
+  $("legend-numbers").replaceChildren();
+  const pen = bar.getContext("2d");
+  pen.clearRect(0, 0, bar.width, bar.height);
+  if (!limits) {
+    $("legend-title").textContent += ": it can be measured from nowhere";
+    return;
+  }
+  for (let x = 0; x < bar.width; x += 1) { pen.fillStyle = colour(1 - x / bar.width); pen.fillRect(x, 0, 1, bar.height); }
+  const beyond = map.values.some((value) => value !== null && value > limits.high);
+  [0, 0.5, 1].forEach((part) => $("legend-numbers").append(panel.element("span",
+    `${panel.number(limits.low * (limits.high / limits.low) ** part)}${part === 1 && beyond ? " and more" : part ? "" : " (best)"}`)));
+}
+
+// the keys are the page's again once something is chosen
+$("measurand").onchange = () => { $("measurand").blur(); measurand(Number($("measurand").value)); };
+$("shown").onchange = () => { $("shown").blur(); state.shown = $("shown").value; ask(true); };
+for (const kind of ["best", "prove", "render", "save"]) $(kind).onclick = () => send({ type: kind });
+$("cancel").onclick = () => send({ type: "cancel" });
+window.addEventListener("resize", () => { view.draw(); picture.draw(); if (view.map) legend(view.map); });
+
+const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
+const KEYS = {
+  b: () => $("best").click(), p: () => $("prove").click(), r: () => $("render").click(), s: () => $("save").click(),
+  Escape: () => $("cancel").click(), c: () => choose(-1), l: () => { if (state.lights.length) choose((state.moving + 1) % state.lights.length); },
+  m: () => measurand((state.measurand + 1) % scene.measurands.length),
+  "[": () => { view.turn -= 10; view.draw(); }, "]": () => { view.turn += 10; view.draw(); },
+};
+
+document.addEventListener("keydown", (event) => {
+  const typing = event.target instanceof HTMLSelectElement || (event.target instanceof HTMLInputElement && event.target.type === "number");
+  if (!state || event.ctrlKey || event.metaKey || event.altKey || (typing && event.key !== "Escape")) return;
+  if (event.key in ARROWS) {
+    const by = event.shiftKey ? 5 : 1, [polar, azimuth] = ARROWS[event.key];
+    const at = state.moving < 0 ? state.sensor : state.lights[state.moving];
+    moved(state.moving, [Math.min(Math.max(at[0] + by * polar, 0), 180), (at[1] + by * azimuth + 360) % 360], false);
+    event.preventDefault();
+  } else if (event.key in KEYS) KEYS[event.key]();
+});

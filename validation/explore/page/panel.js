@@ -1,0 +1,123 @@
+// Numbers, bars and tables beside the sphere.
+
+const $ = (id) => document.getElementById(id);
+
+export function number(value, digits = 3) {
+  if (value === null || value === undefined) return "-";
+  const size = Math.abs(value);
+  return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 1) : Number(value.toPrecision(digits)).toString();
+}
+
+export function element(name, text = "", kind = "") {
+  const made = document.createElement(name);
+  made.textContent = text;
+  made.className = kind;
+  return made;
+}
+
+const mood = (status) => (status === "ok" || status === "clutter" ? status : "bad");
+
+function row(cells, kind = "") {
+  const made = element("tr", "", kind);
+  cells.forEach((cell) => {
+    const place = element("td");
+    place.append(cell);
+    made.append(place);
+  });
+  return made;
+}
+
+export function answer(message, state, choose) {
+  const status = $("status");
+  if (message.refused) {
+    $("sigma").textContent = "-";
+    status.textContent = "refused";
+    status.className = "bad";
+    $("why").textContent = message.refused;
+    $("connection").textContent = "refused";
+    $("shares").replaceChildren();
+    return;
+  }
+  const chosen = message.measurands[state.measurand], rough = message.closely ? "" : "about ";
+  $("sigma").textContent = chosen.sigma === null ? "cannot be measured" : `${rough}σ ${number(chosen.sigma)} ${chosen.unit}`;
+  $("sigma").dataset.sigma = chosen.sigma ?? "";
+  $("sigma").dataset.closely = message.closely;
+  status.textContent = chosen.status;
+  status.className = mood(chosen.status);
+  const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
+  const glance = message.closely ? "" : " Rims of holes are glanced at while it moves; the close look follows.";
+  $("why").textContent = `${chosen.why}${chosen.status !== "ok" && blamed ? ` (${blamed})` : ""}.${glance}`;
+  $("connection").textContent = `${$("sigma").textContent}, ${chosen.status}`;
+  shares(message);
+  $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
+    const made = row([each.name, `${number(each.sigma)} ${each.unit}`, number(each.ratio), number(each.bias, 2),
+      element("span", each.status, `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
+    made.title = each.why;
+    made.onclick = () => choose(i);
+    return made;
+  }));
+  $("edges").tBodies[0].replaceChildren(...message.edges.map((edge) => row([edge.name, number(edge.length), number(edge.contrast),
+    element("span", edge.status, `status ${mood(edge.status)}`)])));
+  const bad = message.edges.filter((edge) => edge.status !== "ok");
+  $("worst-edge").textContent = bad.length ? `${bad.length} of ${message.edges.length} not ok` : "all ok";
+}
+
+function shares(message) {
+  const rows = Object.entries(message.shares || {}).map(([name, part], i) => {
+    const made = element("div", "", i ? "bar" : "bar limits"), bar = element("span"), fill = element("b");
+    fill.style.width = `${100 * part}%`;
+    bar.append(fill);
+    made.append(element("div", name), bar, element("output", `${(100 * part).toFixed(1)} %`));
+    return made;
+  });
+  if (!rows.length) rows.push(element("p", "nothing: it cannot be measured"));
+  $("shares").replaceChildren(...rows);
+}
+
+export function effects(rows) {
+  $("effects").replaceChildren(...rows.map((each) => element("li", `${each.name}${each.on ? "" : " (left out)"}: ${each.reason}`, each.on ? "" : "off")));
+  $("effect-count").textContent = `${rows.filter((each) => each.on).length} of ${rows.length}`;
+}
+
+export function proof(rows, state, where) {
+  const each = rows[state.measurand];
+  const table = element("table"), head = element("thead");
+  head.append(row(["", "predicted σ", "with picture", "measured σ", "variance ratio [95 %]", "lost"]));
+  const body = element("tbody");
+  rows.forEach((r, i) => body.append(row([r.name, number(r.calibrated), number(r.propagated), number(r.measured),
+    `${number(r.ratio)} [${number(r.interval[0])}, ${number(r.interval[1])}]`, `${r.failed}/${r.n}`], i === state.measurand ? "chosen" : "")));
+  table.append(head, body);
+  const said = each.ratio === null ? `It could not be measured (${each.status}).`
+    : `${each.name}: 1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${number(each.bias, 2)} ${each.unit}, predicted ${number(each.predicted_bias, 2)}.`;
+  const canvas = element("canvas", "", "hist");
+  const title = element("h2", "Measured beside predicted ");
+  title.append(element("small", `at ${where}`));
+  $("proof").replaceChildren(title, element("p", said), canvas, table);
+  $("proof").dataset.ratio = each.ratio ?? "";
+  if (each.counts.length) histogram(canvas, each);
+}
+
+function histogram(canvas, each) {
+  const ratio = window.devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight, base = high - 16;
+  canvas.width = wide * ratio;
+  canvas.height = high * ratio;
+  const pen = canvas.getContext("2d"), { counts, edges, mean, propagated: sigma } = each;
+  pen.scale(ratio, ratio);
+  const low = Math.min(edges[0], mean - 3.5 * sigma), span = Math.max(edges.at(-1), mean + 3.5 * sigma) - low;
+  const x = (value) => (value - low) / span * wide, step = edges[1] - edges[0];
+  const bell = (value) => (each.n - each.failed) * step / sigma / 2.50663 * Math.exp(-(((value - mean) / sigma) ** 2) / 2);
+  const most = Math.max(...counts, bell(mean)) * 1.05;
+  pen.fillStyle = "#b9cfe6";
+  counts.forEach((n, i) => pen.fillRect(x(edges[i]), base - n / most * base, x(edges[i + 1]) - x(edges[i]) - 0.5, n / most * base));
+  pen.strokeStyle = "#d1342b";
+  pen.lineWidth = 2;
+  pen.beginPath();
+  for (let i = 0; i <= 100; i += 1) pen.lineTo(i / 100 * wide, base - bell(low + i / 100 * span) / most * base);
+  pen.stroke();
+  pen.fillStyle = "#5b6575";
+  pen.font = "11px system-ui";
+  pen.fillText(`${number(low, 6)}`, 0, high - 3);
+  const text = `${number(low + span, 6)} ${each.unit}`;
+  pen.fillText(text, wide - pen.measureText(text).width, high - 3);
+  pen.fillText("bars: measured; line: predicted with the picture", 4, 11);
+}

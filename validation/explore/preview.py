@@ -1,0 +1,140 @@
+"""The part of the picture that shows the object: drawn at once from the model, and what is drawn over it."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+
+from planner.features.projected_edges import projected_edges
+from planner.imaging.appearance import face_signal, seen_by_rays
+from planner.imaging.pictures import Pictures
+from planner.imaging.projection import depth, facing, frame, project
+from planner.imaging.sensor import full_scale
+from planner.prediction import glanced
+from scenes import Picture, Scene
+from validation.explore.answers import Answer, finite
+
+WIDE = 420  # px, at most, of what is sent
+_MARGIN = 0.12  # of the object's image, around it
+_FINE = 2  # drawn this many times finer, then averaged
+_CHORDS = 48
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of the image that is shown: its least x and y, width and height, px, pixels' borders at half numbers."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+    @property
+    def scale(self) -> float:
+        """Pixels of what is sent over pixels of the image."""
+        return min(1.0 if self.width > WIDE else _FINE, WIDE / self.width)
+
+
+def window(scene: Scene, picture: Picture) -> Window:
+    """What holds the object's image, of at least a few pixels, within the camera's image."""
+    points = project(scene.solid.vertices, np.array(list(picture.sensor)), scene.camera)
+    size = np.array([scene.camera.width, scene.camera.height])
+    points = points[np.isfinite(points).all(-1)]
+    if not len(points):
+        return Window(0, 0, *map(int, size))
+    low, high = points.min(0), points.max(0)
+    margin = _MARGIN * max(high - low) + 4
+    low = np.clip(np.floor(low - margin), 0, size - 8).astype(int)
+    high = np.clip(np.ceil(high + margin), low + 8, size).astype(int)
+    return Window(*map(int, low), *map(int, high - low))
+
+
+def drawn(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
+    """Grey levels, uint8: faces of one level each triangle, blurred; no shadows, no light between surfaces."""
+    pictures, bodies = glanced(picture), scene.bodies
+    pose, scale = np.array(list(picture.sensor)), part.scale * _FINE
+    shape = (round(part.height * scale), round(part.width * scale))
+    corners = bodies.triangles.reshape(-1, 3)
+    image = (project(corners, pose, scene.camera) - [part.left - 0.5, part.top - 0.5]) * scale - 0.5
+    away = depth(corners, pose, scene.camera).reshape(-1, 3).mean(1)
+    seen = facing(bodies, pictures.sensor_at)[bodies.triangle_faces] & np.isfinite(image.reshape(-1, 6)).all(1)
+    order = [t for t in np.argsort(-away) if seen[t]]
+    levels = np.full(len(away), 0.0)
+    levels[order] = face_signal(pictures, bodies.triangles[order].mean(1), bodies.triangle_faces[order], 1)
+    canvas = np.full(shape, _beside(pictures, scene), np.float32)
+    places = np.rint(np.clip(image.reshape(-1, 3, 2), -8191, 8191) * 4).astype(np.int32)
+    for t in order:
+        cv2.fillConvexPoly(canvas, places[t], float(levels[t]), shift=2)
+    if scene.camera.blur_px * scale > 0.3:
+        canvas = cv2.GaussianBlur(canvas, (0, 0), scene.camera.blur_px * scale)
+    small = cv2.resize(canvas, (shape[1] // _FINE, shape[0] // _FINE), interpolation=cv2.INTER_AREA)
+    return shades(scene, small + scene.noise.dark_level)
+
+
+def _beside(pictures: Pictures, scene: Scene) -> float:
+    """Signal of what lies beside the object: that of the image's first corner."""
+    camera, axes = scene.camera, frame(pictures.sensors)
+    ray = axes.forward - (camera.width * axes.right + camera.height * axes.down) / 2 / camera.focal_px
+    return float(seen_by_rays(pictures, ray[None] * camera.distance)[0])
+
+
+def rendered(scene: Scene, image: np.ndarray, part: Window) -> np.ndarray:
+    """The same part of a rendered image (grey levels, float), uint8."""
+    cut = image[part.top : part.top + part.height, part.left : part.left + part.width].astype(np.float32)
+    size = max(1, round(part.width * part.scale)), max(1, round(part.height * part.scale))
+    how = cv2.INTER_AREA if part.scale < 1 else cv2.INTER_NEAREST
+    return shades(scene, cv2.resize(cut, size, interpolation=how))
+
+
+def shades(scene: Scene, levels: np.ndarray) -> np.ndarray:
+    """Grey levels as 8 bits: from 0 to the end of the sensor's scale, or to twice a white surface's level."""
+    full = full_scale(scene.noise)
+    full = full if np.isfinite(full) else scene.noise.dark_level + 2 * scene.camera.exposure
+    return np.clip(levels * (255.0 / full), 0, 255).astype(np.uint8)
+
+
+def to_message(kind: str, grey: np.ndarray, part: Window) -> dict[str, Any]:
+    """A picture as the page takes it, PNG."""
+    _, data = cv2.imencode(".png", grey, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    where = [part.left, part.top, part.width, part.height]
+    return {"kind": kind, "window": where, "png": base64.b64encode(data).decode()}
+
+
+def overlay(scene: Scene, picture: Picture, told: Answer) -> dict[str, Any]:
+    """Required edges and rims as lines, px, and the corners' covariances, px^2; only the chosen measurand's ones."""
+    pose, view = np.array(list(picture.sensor)), projected_edges(glanced(picture))
+    states = {edge.name: edge.status for edge in told.prediction.edges}
+    lines = [
+        {"name": name, "status": states[name], "points": view.recorded[e].round(2).tolist()}
+        for e, name in enumerate(view.names)
+        if np.isfinite(view.recorded[e]).all()
+    ]
+    for name in told.prediction.measurands and _circles(scene):
+        points = project(_rim(scene, name), pose, scene.camera)
+        if np.isfinite(points).all():
+            lines.append({"name": name, "status": "ok", "points": points.round(2).tolist()})
+    corners = [
+        {"at": at.tolist(), "covariance": covariance.tolist()}
+        for at, covariance in zip(told.corners, told.covariances, strict=True)
+        if finite(float(np.sum(covariance))) is not None and np.isfinite(at).all()
+    ]
+    return {"lines": lines, "corners": corners}
+
+
+def _circles(scene: Scene) -> list[str]:
+    needed = {name for quantity in scene.quantities for name in quantity.edges}
+    return [circle.name for circle in scene.solid.circles if circle.name in needed]
+
+
+def _rim(scene: Scene, name: str) -> np.ndarray:
+    """Points around a circle, shape (n, 3)."""
+    circle = scene.solid.circle(name)
+    helper = np.eye(3)[np.argmin(np.abs(circle.axis))]
+    one = np.cross(circle.axis, helper)
+    one /= np.linalg.norm(one)
+    turn = np.linspace(0, 2 * np.pi, _CHORDS + 1)[:, None]
+    return circle.centre + circle.radius * (np.cos(turn) * one + np.sin(turn) * np.cross(circle.axis, one))

@@ -1,0 +1,116 @@
+"""Is the prediction true? One noise-free picture is rendered, exposed a thousand times, and every image measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenes import Scene
+from validation.batch.campaign import Case
+from validation.batch.measurands import column
+from validation.batch.work import Clean, Found, Task, methods
+from validation.defaults import DEFAULT_SEED
+from validation.explore.answers import finite
+from validation.explore.state import State
+from validation.statistics import ratio_interval
+
+RENDERS = 1000
+CHUNK = 50  # images between two reports, and after which it can be stopped
+
+
+def rendering(scene: Scene, state: State, variant: str) -> Task:
+    """The work of rendering the picture, and of propagating its noise."""
+    return Task(_case(scene, state), (), DEFAULT_SEED, variant)
+
+
+def measuring(scene: Scene, state: State, variant: str, clean: Clean, renders: int = RENDERS) -> list[Task]:
+    """The work of measuring so many images of it, in pieces."""
+    sizes = [min(CHUNK, renders - at) for at in range(0, renders, CHUNK)]
+    case = _case(scene, state)
+    return [Task(case, ((k, n),), DEFAULT_SEED, variant, clean.image) for k, n in enumerate(sizes)]
+
+
+def _case(scene: Scene, state: State) -> Case:
+    return Case(0, scene.model_copy(update={"settings": ()}), state.setting)
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A measurand as measured, beside its prediction; in the scene's unit or degrees.
+
+    Attributes
+    ----------
+    name, unit : str
+    calibrated, propagated, measured : float
+        Standard deviations (not variances): predicted without and with the noise-free picture, and of the values.
+    ratio : float
+        Variance measured over propagated.
+    interval : pair of float
+        Its two-sided 95 % interval.
+    n, failed : int
+        Images, and those of them that gave no value.
+    bias, predicted_bias : float
+        Mean less the object's value.
+    status : str
+        That of the noise-free picture.
+    values : tuple of float
+        What was measured, to be drawn.
+    """
+
+    name: str
+    unit: str
+    calibrated: float
+    propagated: float
+    measured: float
+    ratio: float
+    interval: tuple[float, float]
+    n: int
+    failed: int
+    bias: float
+    predicted_bias: float
+    status: str
+    values: tuple[float, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether 1 lies inside the interval."""
+        return self.interval[0] <= 1 <= self.interval[1]
+
+
+def proofs(scene: Scene, clean: Clean, found: list[Found]) -> list[Proof]:
+    """One for each measurand, from the measured pieces."""
+    chunks = [chunk for each in found for chunk in each.chunks.values()]
+    main = methods(scene)[0].name
+    made = []
+    for k, about in enumerate(clean.predicted["measurands"]):
+        values = np.concatenate([chunk.distances[column(main, k)] for chunk in chunks])
+        good = values[np.isfinite(values)]
+        propagated, _, status = clean.propagated[column(main, k)]
+        variance = float(good.var(ddof=1)) if len(good) > 1 else math.nan
+        ratio = variance / propagated if 0 < propagated < math.inf else math.nan
+        made.append(
+            Proof(
+                name=about["name"], unit=about["unit"], calibrated=math.sqrt(about["calibrated"]),
+                propagated=math.sqrt(propagated), measured=math.sqrt(variance), ratio=ratio,
+                interval=ratio_interval(ratio, len(good)), n=len(values), failed=len(values) - len(good),
+                bias=float(good.mean()) - about["value"] if len(good) else math.nan,
+                predicted_bias=about["predicted_bias"], status=status, values=tuple(good.tolist()),
+            )
+        )  # fmt: skip
+    return made
+
+
+def to_message(proof: Proof) -> dict[str, Any]:
+    """A proof as the page takes it: a histogram instead of the values; numbers that are not finite are null."""
+    names = ("calibrated", "propagated", "measured", "ratio", "bias", "predicted_bias")
+    numbers = {name: finite(getattr(proof, name)) for name in names}
+    counts, edges = np.histogram(proof.values, bins=31) if len(proof.values) > 1 else (np.zeros(0, int), np.zeros(0))
+    return {
+        "name": proof.name, "unit": proof.unit, "n": proof.n, "failed": proof.failed, "status": proof.status,
+        "interval": [finite(end) for end in proof.interval], "agrees": proof.agrees, **numbers,
+        "mean": finite(float(np.mean(proof.values))) if proof.values else None,
+        "counts": counts.tolist(), "edges": edges.tolist(),
+    }  # fmt: skip

@@ -1,0 +1,105 @@
+"""The sphere of poses, coloured by what one measurand would be known to, all else staying where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from planner.imaging.pictures import Pictures
+from planner.models import variance_model
+from scenes import InvalidInput, Pose, Scene
+from validation.explore.state import SENSOR, State
+
+STEP_DEG = 7.5
+_AT_ONCE = 32  # poses between looks at whether the sphere is still wanted
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Patches of the upper hemisphere: the pose of each one's middle, and its four borders, degrees.
+
+    Attributes
+    ----------
+    poses : ndarray, shape (N, 2)
+        Polar angle and azimuth.
+    borders : ndarray, shape (N, 4)
+        Least and greatest polar angle, least and greatest azimuth.
+    """
+
+    poses: np.ndarray
+    borders: np.ndarray
+
+
+@lru_cache
+def cells(step_deg: float = STEP_DEG) -> Cells:
+    """Rings of patches of nearly equal size.
+
+    Examples
+    --------
+    >>> len(cells(15.0).poses), cells(15.0).poses[0].tolist()
+    (95, [7.5, 30.0])
+    """
+    borders = []
+    for low in np.arange(0.0, 90.0, step_deg):
+        count = max(6, round(360 * np.sin(np.radians(low + step_deg / 2)) / step_deg))
+        starts = 360.0 / count * np.arange(count)
+        borders += [(low, low + step_deg, start, start + 360.0 / count) for start in starts]
+    found = np.array(borders)
+    return Cells(np.column_stack([found[:, :2].mean(1), found[:, 2:].mean(1)]), found)
+
+
+def key(state: State) -> tuple:
+    """What the values depend on: all poses but that of what is moved."""
+    sensor = None if state.moving == SENSOR else state.sensor
+    return state.moving, sensor, tuple(pose for i, pose in enumerate(state.lights) if i != state.moving)
+
+
+def values(scene: Scene, state: State, poses: np.ndarray) -> Iterator[np.ndarray]:
+    """Sigmas (n, M) of all measurands in the object with the moved thing at poses (N, 2), some poses at a time.
+
+    Infinite where a measurand cannot be measured; NaN where the moved thing cannot stand.
+    """
+    role = "sensor" if state.moving == SENSOR else "light"
+    which = 0 if state.moving == SENSOR else scene.free[state.moving]
+    for at in range(0, len(poses), _AT_ONCE):
+        some = poses[at : at + _AT_ONCE]
+        errors = variance_model("calibrated")(_pictures(scene, state, some))
+        found = np.sqrt(np.broadcast_to(errors.variances_object, (len(some), len(scene.quantities))))
+        stands = np.array([_stands(scene, role, pose, which) for pose in some])
+        yield np.where(stands[:, None], found, np.nan)
+
+
+def _pictures(scene: Scene, state: State, poses: np.ndarray) -> Pictures:
+    lights = [np.array(list(pose)) for pose in state.lights]
+    if state.moving == SENSOR:
+        sensors = poses
+    else:
+        sensors, lights[state.moving] = np.broadcast_to(np.array(list(state.sensor)), poses.shape), poses
+    given = lights[0] if len(lights) == 1 else tuple(np.broadcast_to(each, poses.shape) for each in lights)
+    return Pictures.of(scene, sensors, given if lights else None)
+
+
+def _stands(scene: Scene, role: str, pose: np.ndarray, which: int) -> bool:
+    try:
+        scene.check_pose(role, Pose(*map(float, pose)), which=which)
+    except InvalidInput:
+        return False
+    return True
+
+
+def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]:
+    """Patches and values (N, M) as the page takes them: what `State.shown` says of the chosen measurand."""
+    quantity, chosen = scene.quantities[state.measurand], sigmas[:, state.measurand]
+    if state.shown == "ratio":
+        chosen = 2 * chosen / quantity.tolerance.half
+    return {
+        "borders": cells().borders.tolist(),
+        "values": [float(f"{value:.4g}") if np.isfinite(value) else None for value in chosen],
+        "what": "2 sigma / tolerance" if state.shown == "ratio" else "sigma",
+        "unit": "" if state.shown == "ratio" else "degrees" if quantity.is_angle else scene.units,
+        "moving": state.moving,
+    }

@@ -1,0 +1,103 @@
+"""What one visitor looks at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from scenes import InvalidInput, Picture, Pose, Scene, Setting
+
+SENSOR = -1  # number of the thing that is moved; free lights count from 0
+SHOWN = ("sigma", "ratio")
+_FIRST = Pose(35.0, 300.0), Pose(30.0, 225.0)  # where a scene has no settings
+
+
+@dataclass(frozen=True)
+class State:
+    """Poses, and what is asked of them.
+
+    Attributes
+    ----------
+    sensor : Pose
+    lights : tuple of Pose
+        Of the lights that are free.
+    measurand : int
+        Number of the quantity that is looked at.
+    shown : {"sigma", "ratio"}
+        What colours the sphere: sigma in the object, or 2 sigma over half of the tolerance zone.
+    moving : int
+        What is moved, and for which the sphere is coloured: `SENSOR`, or the number of a free light.
+    """
+
+    sensor: Pose
+    lights: tuple[Pose, ...]
+    measurand: int = 0
+    shown: str = "sigma"
+    moving: int = SENSOR
+
+    @classmethod
+    def first(cls, scene: Scene) -> State:
+        """That of the scene's first setting."""
+        moving = 0 if scene.free else SENSOR
+        if scene.settings:
+            return cls(scene.settings[0].sensor, scene.settings[0].lights, moving=moving)
+        lights = tuple(replace(_FIRST[1], azimuth_deg=_FIRST[1].azimuth_deg + 40.0 * i) for i in range(len(scene.free)))
+        return cls(_FIRST[0], lights, moving=moving)
+
+    @classmethod
+    def of_message(cls, scene: Scene, told: Any) -> State:
+        """That which a page tells of.
+
+        Raises
+        ------
+        InvalidInput
+            If it is no state of this scene. A pose that lies in the object is one; `picture` refuses it.
+        """
+        if not isinstance(told, dict):
+            raise InvalidInput(f"state must be an object, got {told!r}")
+        lights = told.get("lights")
+        if not isinstance(lights, list) or len(lights) != len(scene.free):
+            raise InvalidInput(f"lights must be {len(scene.free)} pose(s), got {lights!r}")
+        return cls(
+            Pose.of(told.get("sensor")),
+            tuple(map(Pose.of, lights)),
+            _number("measurand", told.get("measurand"), 0, len(scene.quantities) - 1),
+            _choice("shown", told.get("shown"), SHOWN),
+            _number("moving", told.get("moving"), SENSOR, len(scene.free) - 1),
+        )
+
+    def to_message(self) -> dict[str, Any]:
+        """What `of_message` understands."""
+        return {
+            "sensor": list(self.sensor),
+            "lights": [list(pose) for pose in self.lights],
+            "measurand": self.measurand,
+            "shown": self.shown,
+            "moving": self.moving,
+        }
+
+    @property
+    def setting(self) -> Setting:
+        """Its poses as a scene has them."""
+        return Setting(sensor=self.sensor, light=self.lights[0] if len(self.lights) == 1 else self.lights)
+
+    def picture(self, scene: Scene) -> Picture:
+        """What the sensor takes there; raises InvalidInput where a pose is refused."""
+        return Picture.of(scene, self.sensor, self.lights)
+
+    def tolerable(self, scene: Scene) -> State:
+        """Without a ratio where the measurand has no tolerance."""
+        known = scene.quantities[self.measurand].tolerance is not None
+        return self if known else replace(self, shown="sigma")
+
+
+def _number(name: str, value: Any, least: int, most: int) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise InvalidInput(f"{name} must be a whole number from {least} to {most}, got {value!r}")
+    return value
+
+
+def _choice(name: str, value: Any, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise InvalidInput(f"{name} must be one of {', '.join(known)}, got {value!r}")
+    return value
