@@ -16,6 +16,7 @@ OPTIONAL = {
     "pyarrow": "pyarrow",
     "OCP": "cadquery-ocp-novtk",
     "pandas": "frames",
+    "aiohttp": "aiohttp",
 }  # extras, imported only where they are asked for
 
 

@@ -9,13 +9,14 @@ from scenes import InvalidInput
 from validation import run
 from validation.batch import work
 from validation.batch.work import Rendering
-from validation.report import page as report
+from validation.report import page_tables as report
 
 
 def test_effects_are_recorded_and_shown(task1):
     recorded = work.effects(task1)
     assert {line["effect"]: line["on"] for line in recorded}["floor"] is False
-    table = report._effects(SimpleNamespace(fact=lambda _key, _default: {"task1": recorded[:2]}))
+    found = SimpleNamespace(verdict=SimpleNamespace(agrees=True))
+    table = report.effects(found, SimpleNamespace(fact=lambda _key, _default: {"task1": recorded[:2]}))
     assert table.columns == ["scene", "effect", "on", "reason"]
     assert [row[:3] for row in table.rows] == [["task1", "attached_shadow", "on"], ["task1", "cast_shadow", "off"]]
 

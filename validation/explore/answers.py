@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import planner
+from planner.features.measurand import measurand
 from planner.imaging.pictures import Pictures
 from planner.models import variance_model
 from planner.prediction import feature_covariances, glanced
@@ -76,7 +77,7 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
         return Answer(refused=str(error))
     pictures = Pictures.of(picture) if closely else glanced(picture)
     errors = variance_model("calibrated")(pictures)
-    known = planner.features.measurand.measurand(pictures, state.measurand)
+    known = measurand(pictures, state.measurand)
     return Answer(
         prediction=predicted,
         shares=_shares(errors.parts(state.measurand)),
