@@ -22,7 +22,7 @@ _SURFACE = polynomials()[:, :3]
 
 @dataclass(frozen=True)
 class NoiseCurve:
-    """Variance of a grey level: ``dark`` + ``gain`` (level - ``dark_level``) + ``step``^2 / 12, grey levels^2.
+    """Variance of a grey level: ``dark`` + ``gain`` (level - ``dark_level``) + ``step`` squared over 12, grey levels^2.
 
     Attributes
     ----------
