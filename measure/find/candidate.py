@@ -29,8 +29,8 @@ class Candidate:
         Difference of the grey levels inside and outside the weakest side over the noise's standard deviation;
         negative where the inside is darker.
     score : float
-        Signal to noise ratio of the whole outline, size of contrast * support * root of its length in px; the rank is by
-        it.
+        Signal to noise ratio of the whole outline: size of contrast * support * root of its length in px. Candidates
+        are ranked by it.
     parameters : ndarray, shape (5,), optional
         Centre x, y, semi-axes a >= b, px, and angle of a, degrees, of an ellipse.
     identifier : int, optional
