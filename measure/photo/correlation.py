@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from scipy.special import chdtrc
 
+from measure.goodness import WORST
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import SIDE, Patches, polynomials, residuals
 
 REACH = 3  # px: the farthest lag
-_SURE = 1e-6  # probability of as much correlation in white noise
 _TAPS = 2 * REACH + 1
 _SURFACE = polynomials()[:, :3]
 
@@ -36,7 +36,7 @@ class Correlation:
     @property
     def white(self) -> bool:
         """Whether the noise may be white."""
-        return self.p_value > _SURE
+        return self.p_value > WORST
 
     def covariance(self, rows: np.ndarray, pixels: np.ndarray, sigma: np.ndarray, width: int) -> np.ndarray:
         """Covariance of linear functions of pixels, (k, k).
