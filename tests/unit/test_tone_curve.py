@@ -47,8 +47,8 @@ def test_a_curve_that_was_not_undone_is_a_misfit(rng):
 
 
 def test_what_neither_file_nor_picture_tells(rng):
-    """At contrast over noise 12 it matters and is not seen; where the contrast is small beside the level it is no matter;
-    at 80 the picture shows it."""
+    """At contrast over noise 12 it matters and is not seen; where the contrast is small beside the level it does not
+    matter; at 80 the picture shows it."""
     assert {told(shot(13.0, rng), False).status for _ in range(4)} == {status.TONE_UNKNOWN}
     assert {told(shot(13.0, rng)).status for _ in range(4)} == {status.OK}
     assert {told(shot(2.0, rng, contrast=10.0, background=180.0), False).status for _ in range(4)} == {status.OK}
