@@ -140,9 +140,10 @@ def _found(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Fou
     image, apart = levels[None], there.blur.differs
     if not judged or apart:
         return _beside(levels, there, name, judged)
-    whole, there = likeliest(levels, there, there.layout)
+    whole, shown = likeliest(levels, there.bent if name == "arrangement" else there)
     if whole.status[0] not in status.MEASURED:
         return _beside(levels, there, name, judged)
+    there = shown
     corners, state = whole.corners[0], str(whole.status[0])
     near = there.at(corners)
     if name == "arrangement":
