@@ -11,11 +11,12 @@ AMBIGUOUS = "ambiguous"  # another solution explains the image as well
 MISFIT = "misfit"  # the image is not what the model says within its noise: neither value nor variance can be trusted
 CORRELATED = "correlated"  # the noise of neighbouring pixels is not independent: the variance says so, not exactly
 COMPRESSED = "compressed"  # by JPEG or its like: what is lost is no noise, and the variance is too small
+TONE_UNKNOWN = "tone_unknown"  # neither file nor picture says whether levels are linear in the light, and it matters
 
-MEASURED = (OK, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
 _WORST_FIRST = (
     NOT_VISIBLE, SHORT, SIGN_CHANGE, LOW_CONTRAST, ILL_CONDITIONED, AMBIGUOUS, COMPRESSED, CORRELATED, MISFIT, CLUTTER,
-    OK,
+    TONE_UNKNOWN, OK,
 )  # fmt: skip
 ALL = frozenset(_WORST_FIRST)
 

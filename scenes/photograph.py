@@ -30,6 +30,9 @@ class Photograph:
         Whether the file is one that was compressed with a loss.
     tone, channel : str
         What was done with its tone curve, and which channel it is, in words.
+    tone_known : bool
+        Whether the levels are said to be linear in the light. False where a file of whole numbers says nothing of its
+        tone curve, and neither does its user.
     """
 
     levels: np.ndarray
@@ -37,6 +40,7 @@ class Photograph:
     compressed: bool = False
     tone: str = "tone curve: none"
     channel: str = "grey"
+    tone_known: bool = True
 
 
 def read(path: Path, gamma: str | None = None, channel: str | None = None, bayer: str | None = None) -> Photograph:
@@ -46,7 +50,8 @@ def read(path: Path, gamma: str | None = None, channel: str | None = None, bayer
     ----------
     gamma : str, optional
         "none", "srgb", or the exponent that turns the file's numbers into light. As the file says where not given:
-        its colour profile, EXIF data, PNG's sRGB and gAMA marks; sRGB for any JPEG; else nothing is undone.
+        its colour profile, EXIF data, PNG's sRGB and gAMA marks; sRGB for any JPEG; else nothing is undone,
+        and ``tone_known`` is False.
     channel : {"r", "g", "b", "luminance"}, optional
         That with the largest contrast over noise where not given.
     bayer : {"RGGB", "BGGR", "GRBG", "GBRG"}, optional
@@ -72,7 +77,8 @@ def read(path: Path, gamma: str | None = None, channel: str | None = None, bayer
         levels, which = mosaic.balanced(light.reshape(light.shape[:2]), bayer)
     else:
         levels, which = _one_channel(path, light, channel)
-    return Photograph(levels.astype(float), full, told.compressed, said, which)
+    known = bool(by) or full is None or bayer is not None
+    return Photograph(levels.astype(float), full, told.compressed, said, which, known)
 
 
 def _full_scale(image: np.ndarray, curve: tone.Tone) -> float | None:

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 from scipy.special import chdtrc
 
 from measure import status
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
-from measure.boards.fitting import Crossings, fit_crossings
+from measure.boards.fitting import Crossings, crossing_rows, fit_crossings
 from measure.boards.windows import steps, windows
 from measure.photo.noise import noise_sigma
 from scenes.arrays import BRIGHTEST, picture
@@ -128,10 +129,8 @@ def _least_noise(image: np.ndarray) -> float:
 def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
     """The corners about ``grid``, shape (rows, columns, 2), px, under white noise of a standard deviation."""
     columns, rows = grid.shape[1::-1]
-    toward = steps(grid).reshape(-1, 2, 2)
-    shape = np.column_stack([grid.reshape(-1, 2), np.arctan2(toward[..., 1], toward[..., 0]), np.zeros(len(toward))])
-    shape[:, 4] = np.log(_ORDINARY)
-    near = _NEAR * np.linalg.norm(toward, axis=-1).min(1)
+    shape = _start(grid)
+    near = _NEAR * np.linalg.norm(steps(grid).reshape(-1, 2, 2), axis=-1).min(1)
     for turn in range(_ROUNDS):
         found = windows(image, grid)
         room = found.room
@@ -146,6 +145,32 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
         if turn and np.abs(grid - before).max() < _SETTLED:  # windows and bends are those of the corners as they are
             break
     return _board((columns, rows), room, fitted, noise, _clipped(image, some))
+
+
+def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_array:
+    """Derivatives of all coordinates x, y, x, ... of a board's corners by the image's pixels, (2 n, height * width).
+
+    ``grid``, shape (rows, columns, 2), px, says about where corners are that are not measured; their rows are empty.
+    """
+    n = len(board.corners)
+    grid = np.where(np.isfinite(board.corners), board.corners, grid.reshape(n, 2)).reshape(grid.shape)
+    found = windows(image, grid)
+    which = np.flatnonzero(found.room & board.measured)
+    if not which.size:
+        return sparse.csr_array((2 * n, image.size))
+    some, bend = found.some(which), bends(grid).reshape(-1, 2)[which]
+    rows = crossing_rows(some, fit_crossings(some, _start(grid)[which], bend, _FINE).shape, bend)
+    x, y = np.where(some.there[..., None], some.places, 0).astype(int).transpose(2, 0, 1)
+    column = np.broadcast_to((y * image.shape[1] + x)[:, None], rows.shape)
+    row = np.broadcast_to((2 * which[:, None] + [0, 1])[..., None], rows.shape)
+    return sparse.csr_array((rows.ravel(), (row.ravel(), column.ravel())), (2 * n, image.size))
+
+
+def _start(grid: np.ndarray) -> np.ndarray:
+    """Crossings (n, 5) to begin with: edges towards the next corners, an ordinary blur."""
+    toward = steps(grid).reshape(-1, 2, 2)
+    angles = np.arctan2(toward[..., 1], toward[..., 0])
+    return np.column_stack([grid.reshape(-1, 2), angles, np.full(len(toward), np.log(_ORDINARY))])
 
 
 def _nothing(shape: tuple[int, int], noise: float) -> Board:

@@ -62,6 +62,19 @@ def fit_crossings(found: Windows, start: np.ndarray, bend: np.ndarray, enough: f
     return Crossings(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
+def crossing_rows(found: Windows, shape: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    """Derivatives of x and y of n fitted crossings by their windows' pixels, (n, 2, pixels)."""
+    rows = []
+    for first in range(0, len(shape), _TOGETHER):
+        s = np.s_[first : first + _TOGETHER]
+        places, levels, there = found.places[s], found.levels[s], found.there[s]
+        field = np.where(there[..., None], _field(places, shape[s]), 0.0)
+        matrix, residual, *_ = _linear(places, levels, there, shape[s], bend[s], field)
+        matrix[np.isin(shape[s][:, 4], _BLURS), :, 4] = 0.0
+        rows.append(np.einsum("nij,npj->nip", _solved(matrix, residual)[1][:, :2], matrix))
+    return np.concatenate(rows)
+
+
 def _fit(places, levels, there, shape, bend, enough) -> tuple[np.ndarray, ...]:
     first, shape = shape, shape.copy()
     size = there.sum(1)

@@ -23,13 +23,30 @@ _RARE = 1e-6  # chance that noise alone leaves a residual as large as one that i
 
 @dataclass(frozen=True)
 class EllipseFit:
-    """Parameters (x, y, a, b, angle in rad) (5,), their covariance (5, 5), the contrast, grey levels, and whether noise
-    explains what the picture has beside the model."""
+    """One blurred ellipse.
+
+    Attributes
+    ----------
+    parameters, covariance : ndarray, shapes (5,) and (5, 5)
+        x, y, a, b, angle in rad.
+    contrast : float
+        Grey levels.
+    fits : bool
+        Whether noise explains what the picture has beside the model.
+    rows, pixels : ndarray, shapes (5, P) and (P,)
+        Derivatives of the parameters by the pixels, and their flat indices.
+    design, left : ndarray, shapes (P, k) and (P,)
+        Derivatives of the pixels by what was fitted, the shape first, and what the fit leaves of them, grey levels.
+    """
 
     parameters: np.ndarray
     covariance: np.ndarray
     contrast: float
     fits: bool
+    rows: np.ndarray
+    pixels: np.ndarray
+    design: np.ndarray
+    left: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -78,7 +95,11 @@ def likeliest_ellipse(
             return None
         if max(np.abs(change).max(), abs(wider)) < _SETTLED:
             found = _with_axes(shape, free @ model.covariance(optics, image) @ free.T, circle)
-            return EllipseFit(*found, abs(float(model.change[-2])), model.fits(optics, image))
+            rows = _known(_axes(shape, circle)[1]) @ free @ model.inverse[: free.shape[1]] @ model.design.T
+            return EllipseFit(
+                *found, abs(float(model.change[-2])), model.fits(optics, image), rows, model.pixels, model.design,
+                model.residual,
+            )  # fmt: skip
     return None
 
 
@@ -97,17 +118,26 @@ def is_ellipse(shapes: np.ndarray) -> np.ndarray:
 
 def _with_axes(shape: np.ndarray, covariance: np.ndarray, circle: bool) -> tuple[np.ndarray, np.ndarray]:
     """Axes and angle with their covariance; of a circle both axes are the radius."""
-    if circle:
-        x, y, radius = shape[:3]
-        same = np.zeros((5, 5))
-        same[[0, 1, 2, 3], [0, 1, 2, 2]] = 1
-        return np.array([x, y, radius, radius, 0.0]), same @ covariance @ same.T
-    parameters, derivative = from_symmetric(shape)
-    whole = np.nan_to_num(derivative, posinf=0.0, neginf=0.0)
-    whole = whole @ covariance @ whole.T
+    parameters, derivative = _axes(shape, circle)
+    whole = _known(derivative) @ covariance @ _known(derivative).T
     if not np.isfinite(derivative).all():
         whole[4, 4] = np.inf
     return parameters, whole
+
+
+def _axes(shape: np.ndarray, circle: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Axes and angle, and their derivative by the shape (5, 5)."""
+    if not circle:
+        return from_symmetric(shape)
+    x, y, radius = shape[:3]
+    same = np.zeros((5, 5))
+    same[[0, 1, 2, 3], [0, 1, 2, 2]] = 1
+    return np.array([x, y, radius, radius, 0.0]), same
+
+
+def _known(derivative: np.ndarray) -> np.ndarray:
+    """0 for the angle of a circle, which has no meaning."""
+    return np.nan_to_num(derivative, posinf=0.0, neginf=0.0)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from measure import status
-from measure.estimators.ellipse import Seen, free_parameters, is_ellipse, likeliest_ellipse
+from measure.estimators.ellipse import EllipseFit, Seen, free_parameters, is_ellipse, likeliest_ellipse
 from measure.estimators.gradient import gradient_along
 from measure.features.blurred_ellipse import curvature, outline, relative, to_symmetric
 from measure.features.calipers import MIN_POSITIONS
@@ -57,41 +57,63 @@ def find_ellipse(
         equal the angle has no meaning, and its variance is infinite. The status is ``clutter`` where the picture has
         more beside the ellipse than the noise explains: the parameters may be biased.
     """
-    images, expected = grey_levels(images, "images"), finite(expected, "expected")
-    if images.shape[-2:] != optics.shape:
-        raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {images.shape}")
+    images = grey_levels(images, "images")
+    stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
+    found = _found(stack, expected, optics, circle, spacing)
+    if found is None:
+        return no_ellipse(lead, status.NOT_VISIBLE)
+    fits, state = found
+    parameters, covariance = np.full((len(stack), 5), np.nan), np.full((len(stack), 5, 5), np.nan)
+    for k, fit in enumerate(fits):
+        if fit is not None:
+            parameters[k], covariance[k] = fit.parameters, fit.covariance
+    return Ellipse(
+        parameters.reshape(*lead, 5) * UNITS,
+        covariance.reshape(*lead, 5, 5) * np.outer(UNITS, UNITS),
+        state.reshape(lead),
+    )
+
+
+def fitted_ellipse(
+    image: np.ndarray, expected: np.ndarray, optics: Optics, circle: bool
+) -> tuple[EllipseFit | None, str]:
+    """As `find_ellipse` of one image (height, width): the fit itself, None where there is none, and the status."""
+    found = _found(image[None], expected, optics, circle, _SPACING)
+    return (None, status.NOT_VISIBLE) if found is None else (found[0][0], str(found[1][0]))
+
+
+def _found(
+    stack: np.ndarray, expected: np.ndarray, optics: Optics, circle: bool, spacing: float
+) -> tuple[list[EllipseFit | None], np.ndarray] | None:
+    """Fits and statuses (n,) of a stack; None where the outline has no room."""
+    expected = finite(expected, "expected")
+    if stack.shape[-2:] != optics.shape:
+        raise InvalidInput(f"images must be of the optics' shape {optics.shape}, got {stack.shape}")
     if expected.shape != (5,) or not (expected[2:4] > 0).all() or np.abs(expected).max() > _LARGEST:
         raise InvalidInput(f"expected must be x, y, a, b and angle of an ellipse, got {expected}")
     if circle:
         radius = expected[2:4].mean()
         expected = np.array([*expected[:2], radius, radius, 0.0])
-    stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     start = to_symmetric(expected / UNITS)
     angles, places, normals = _positions(start, optics, spacing)
     if len(angles) < max(MIN_POSITIONS, 5):
-        return no_ellipse(lead, status.NOT_VISIBLE)
+        return None
     found = gradient_along(optics, angles, places, normals).locate(stack)
     seen = found.valid.mean(1) >= _MIN_FOUND
     # on a curve the zero crossing lies inside the edge by half the curvature times the variance of the smoothed profile
     inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature(start, angles)
     offset = found.offset + np.minimum(inward, _MOST_INWARD)
     starts, good = _start(places + offset[..., None] * normals, found.valid, start, circle)
-    clean = np.ones(len(stack), bool)
-    parameters, covariance = np.full((len(stack), 5), np.nan), np.full((len(stack), 5, 5), np.nan)
-    noise = np.sqrt(optics.noise_variance)
+    fits: list[EllipseFit | None] = [None] * len(stack)
+    clean, noise = np.ones(len(stack), bool), np.sqrt(optics.noise_variance)
     for k in np.flatnonzero(seen & good):
         fit = likeliest_ellipse(stack[k], starts[k], optics, circle, Seen(angles, found.valid[k]))
         good[k] = fit is not None
         seen[k] = found.contrast[k] > MIN_CONTRAST * noise if fit is None else fit.contrast > _LEAST_CONTRAST * noise
         if good[k] and seen[k]:
-            parameters[k], covariance[k], clean[k] = fit.parameters, fit.covariance, fit.fits
+            fits[k], clean[k] = fit, fit.fits
     measured = np.where(clean, status.OK, status.CLUTTER)
-    state = np.where(seen, np.where(good, measured, status.ILL_CONDITIONED), status.LOW_CONTRAST)
-    return Ellipse(
-        parameters.reshape(*lead, 5) * UNITS,
-        covariance.reshape(*lead, 5, 5) * np.outer(UNITS, UNITS),
-        state.reshape(lead),
-    )
+    return fits, np.where(seen, np.where(good, measured, status.ILL_CONDITIONED), status.LOW_CONTRAST)
 
 
 def _positions(shape: np.ndarray, optics: Optics, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,13 +13,14 @@ from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
 from measure.goodness import p_value
 from measure.photo.noise_curve import NoiseCurve
+from measure.photo.tone_curve import UNTOLD, ToneCurve, together, tone_curve
 
 _MOST = 8_000  # pixels of a side
 _NEAR, _BLURS = 4.0, 4.0  # px, and blurs, to each side of an edge that are looked at
 _STEPS, _SETTLED = 12, 1e-4
 _WIDEST = 8.0  # px
 _FEWEST = 60  # pixels
-_UNTOLD = (np.nan,) * 5
+_UNTOLD = (*(np.nan,) * 5, UNTOLD)
 _ALIKE = 1e-3  # probability of sides so different if they are alike
 
 
@@ -35,6 +36,8 @@ class SideBlur:
         Chi-square of what the likeliest edge leaves, and its degrees of freedom.
     bow : ndarray, shape (E,)
         The likeliest bow of the side over its standard error.
+    tone : ToneCurve
+        That all sides tell together.
     """
 
     sigma: np.ndarray
@@ -42,6 +45,7 @@ class SideBlur:
     squares: np.ndarray
     freedom: np.ndarray
     bow: np.ndarray
+    tone: ToneCurve
 
     @property
     def p_value(self) -> float:
@@ -73,10 +77,12 @@ def side_blur(image: np.ndarray, layout: Layout, curve: NoiseCurve) -> SideBlur:
     """
     optics = layout.optics
     calipers = edge_calipers(layout, _NEAR + _BLURS * optics.blur_px, 0.0)
-    return SideBlur(*np.array([_side(image, caliper, curve) for caliper in calipers]).T)
+    *told, tones = zip(*(_side(image, caliper, curve) for caliper in calipers), strict=True)
+    return SideBlur(*(np.array(each) for each in told), together(tones))
 
 
-def _side(image: np.ndarray, caliper: Caliper, curve: NoiseCurve) -> tuple[float, ...]:
+def _side(image: np.ndarray, caliper: Caliper, curve: NoiseCurve) -> tuple:
+    """The fields of `SideBlur` of one side."""
     if not caliper.positions.size:
         return _UNTOLD
     sigma = max(caliper.optics.blur_px, LEAST_BLUR)
@@ -103,8 +109,10 @@ def _side(image: np.ndarray, caliper: Caliper, curve: NoiseCurve) -> tuple[float
             break
     weighted = design * root[:, None]
     spread = np.linalg.pinv(weighted.T @ weighted)
-    squares = float(np.sum((levels * root - weighted @ fit) ** 2))
-    return sigma, max(np.sqrt(spread[2, 2]), 1e-6), squares, flat.size - fit.size, bow / np.sqrt(spread[3, 3])
+    left = levels - design @ fit
+    tone = tone_curve(design, design @ fit, left, root, 1)
+    squares, freedom = float(np.sum((left * root) ** 2)), flat.size - fit.size
+    return sigma, max(np.sqrt(spread[2, 2]), 1e-6), squares, freedom, bow / np.sqrt(spread[3, 3]), tone
 
 
 def _bowed(lever: np.ndarray) -> np.ndarray:

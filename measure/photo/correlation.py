@@ -7,13 +7,14 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+from scipy import sparse
 from scipy.special import chdtrc
 
+from measure.goodness import WORST
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import SIDE, Patches, polynomials, residuals
 
 REACH = 3  # px: the farthest lag
-_SURE = 1e-6  # probability of as much correlation in white noise
 _TAPS = 2 * REACH + 1
 _SURFACE = polynomials()[:, :3]
 
@@ -36,7 +37,7 @@ class Correlation:
     @property
     def white(self) -> bool:
         """Whether the noise may be white."""
-        return self.p_value > _SURE
+        return self.p_value > WORST
 
     def covariance(self, rows: np.ndarray, pixels: np.ndarray, sigma: np.ndarray, width: int) -> np.ndarray:
         """Covariance of linear functions of pixels, (k, k).
@@ -59,6 +60,27 @@ class Correlation:
             image.flat[place] = row
             to[:] = cv2.filter2D(image, cv2.CV_64F, self.kernel, borderType=cv2.BORDER_CONSTANT).flat[place]
         return scaled @ spread.T
+
+    def covariance_of_many(self, rows: sparse.csr_array, sigma: np.ndarray) -> np.ndarray:
+        """The same of many functions, each of a few pixels, (k, k).
+
+        Parameters
+        ----------
+        rows : csr_array, shape (k, height * width)
+        sigma : ndarray, shape (height, width)
+        """
+        scaled = sparse.coo_array(rows)
+        y, x = np.divmod(scaled.col, sigma.shape[1])
+        data, whole = scaled.data * sigma.flat[scaled.col], np.zeros((rows.shape[0],) * 2)
+        one = sparse.csr_array((data, (scaled.row, scaled.col)), rows.shape)
+        for (dy, dx), value in np.ndenumerate(self.kernel):
+            to_y, to_x = y + dy - REACH, x + dx - REACH
+            seen = (to_y >= 0) & (to_y < sigma.shape[0]) & (to_x >= 0) & (to_x < sigma.shape[1]) & (value != 0)
+            to = to_y * sigma.shape[1] + to_x
+            whole += (
+                value * (sparse.csr_array((data[seen], (scaled.row[seen], to[seen])), rows.shape) @ one.T).toarray()
+            )
+        return whole
 
 
 def correlation(patches: Patches, curve: NoiseCurve) -> Correlation:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 from scipy.special import chdtri
 
 from measure import status
+from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_along
 from measure.features.conic import Ellipse, fit_ellipse, no_ellipse
 from measure.features.optics import Optics
+from measure.photo.recording import Recording
 from measure.photo.residuals import around
 from planner.features.locator import MIN_CONTRAST, edge_blur
 
@@ -20,10 +23,12 @@ _RARE = 1e-6  # chance that noise alone leaves as much
 _ALLOWED = 1.1  # times the noise's variance, which is an estimate itself
 
 
-def ellipse_by_points(image: np.ndarray, near: np.ndarray, optics: Optics, circle: bool) -> Ellipse:
+def ellipse_by_points(
+    image: np.ndarray, near: np.ndarray, optics: Optics, circle: bool, seen: Recording | None = None
+) -> Ellipse:
     """Fit an ellipse to points where the second derivative across it is zero.
 
-    Points farther off than four times the median are left out. The covariance is that of the points by white noise;
+    Points farther off than four times the median are left out. The covariance is that of the points by the noise;
     where that does not explain their distances, it is enlarged by their chi-square over its degrees of freedom.
 
     Parameters
@@ -34,6 +39,8 @@ def ellipse_by_points(image: np.ndarray, near: np.ndarray, optics: Optics, circl
     optics : Optics
     circle : bool
         Fit a circle.
+    seen : Recording, optional
+        Whose noise counts; white noise of the optics where not given.
 
     Returns
     -------
@@ -55,9 +62,18 @@ def ellipse_by_points(image: np.ndarray, near: np.ndarray, optics: Optics, circl
     # on a curve the zero crossing lies inside the edge by half the curvature times the smoothed profile's variance
     inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * _curvature(near, normals)
     points = places + (found.offset[0] + inward)[:, None] * normals
-    response = locator.unit_noise().response / contrast
-    covariance = optics.noise_variance * (response @ response.T).toarray()
+    covariance = _covariance(locator, image, optics, seen) / contrast**2
     return _fitted(points[valid], covariance[np.ix_(valid, valid)], circle)
+
+
+def _covariance(locator: CrossingLocator, image: np.ndarray, optics: Optics, seen: Recording | None) -> np.ndarray:
+    """Of the points at unit contrast, (m, m)."""
+    if seen is None or seen.correlation.white:
+        response = locator.unit_noise().response
+        return optics.noise_variance * (response @ response.T).toarray()
+    part = sparse.coo_array(locator.unit_response())
+    rows = sparse.csr_array((part.data, (part.row, locator.pixels[part.col])), (part.shape[0], image.size))
+    return seen.correlation.covariance_of_many(rows, np.sqrt(seen.curve.variance(image)))
 
 
 def _fitted(points: np.ndarray, covariance: np.ndarray, circle: bool) -> Ellipse:

@@ -42,6 +42,11 @@ class Expected:
         return shaded(replace(plain, defocus=self.layout.defocus), *self.orders)
 
     @property
+    def bent(self) -> Expected:
+        """The same with levels that may bend on both sides: what patches do not tell moves sides by their sigma."""
+        return replace(self, layout=shaded(self.layout, MOST, MOST), orders=(MOST, MOST))
+
+    @property
     def uneven(self) -> bool:
         """Whether levels beside the sides bend: what moves all but the likeliest arrangement."""
         return max(self.orders) == MOST
@@ -74,11 +79,10 @@ def optics_of(image: np.ndarray, corners: np.ndarray, blur: float, curve: NoiseC
     )  # fmt: skip
 
 
-def likeliest(image: np.ndarray, near: Expected, layout: Layout) -> tuple[Shape, Expected]:
+def likeliest(image: np.ndarray, near: Expected) -> tuple[Shape, Expected]:
     """The likeliest arrangement, with levels that bend on both sides where without them it does not fit."""
-    shape = find_shape(image[None], layout, "arrangement")
+    shape = find_shape(image[None], near.layout, "arrangement")
     if status.MISFIT not in shape.status or near.uneven:
         return shape, near
-    bent = replace(near, orders=(MOST, MOST))
-    other = find_shape(image[None], shaded(layout, MOST, MOST), "arrangement")
-    return (other, bent) if other.p_value[0] >= WORST else (shape, near)
+    other = find_shape(image[None], near.bent.layout, "arrangement")
+    return (other, near.bent) if other.p_value[0] >= WORST else (shape, near)

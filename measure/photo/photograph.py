@@ -12,6 +12,7 @@ from measure.boards.chessboard import measured
 from measure.find.candidate import CHESSBOARD, CIRCLE, ELLIPSE, QUADRILATERAL, TAG, Candidate
 from measure.find.choose import find_in, nearest
 from measure.find.search import check_kinds, find
+from measure.photo.board_noise import board_covariance
 from measure.photo.ellipses import measure_ellipse
 from measure.photo.lens import Lens
 from measure.photo.noise import noise_sigma
@@ -196,12 +197,10 @@ def _board(photo: Photograph, one: Candidate) -> Found:
     good = told.measured
     if not good.any():
         return Found(CHESSBOARD, told.status[0], None, None, None, (), (), noise, told.blur_px, float("nan"), one)
-    n = len(told.corners)
-    covariance = np.zeros((n, 2, n, 2))
-    covariance[np.arange(n), :, np.arange(n)] = told.covariance
-    said = status.OK if seen.correlation.white else status.CORRELATED
+    covariance, alike = board_covariance(photo.levels, told, one.grid, seen)
+    said = status.OK if alike else status.CORRELATED
     state = status.worst(*(each for each in told.status if each in status.MEASURED), seen.status, said)
     return Found(
-        CHESSBOARD, state, told.corners, None, covariance.reshape(2 * n, 2 * n), (), (), noise, told.blur_px,
+        CHESSBOARD, state, told.corners, None, covariance, (), (), noise, told.blur_px,
         float(np.nanmin(told.p_value)), one,
     )  # fmt: skip

@@ -53,7 +53,8 @@ class Quadrilateral:
         Standard deviation of a grey level, at the mean level around it, and of the lens blur, px (of the sharpest side
         where they differ), as estimated from the image.
     status : str
-        ``compressed``, ``correlated`` and ``misfit`` come with values whose standard deviation is not to be relied on.
+        ``compressed``, ``correlated`` and ``misfit`` come with values whose standard deviation is not to be relied on,
+        ``tone_unknown`` with such as are right only if levels are linear in the light.
     p_value : float
         Goodness of fit of straight sides, smooth faces, Gaussian blur and white noise, whichever estimator measured:
         where it is below 1e-4 the status is ``misfit``. NaN where a lens bends the sides.
@@ -115,7 +116,8 @@ def measure_quadrilateral(
         found = _grown(levels, found, seen)
     if found.state in status.MEASURED:
         said = status.OK if seen.correlation.white or found.alike else status.CORRELATED
-        found = replace(found, state=status.worst(found.state, said, seen.status))
+        tone = there.blur.tone.status(photo.tone_known)
+        found = replace(found, state=status.worst(found.state, said, seen.status, tone))
     return _reported(found, there, seen)
 
 
@@ -138,9 +140,10 @@ def _found(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Fou
     image, apart = levels[None], there.blur.differs
     if not judged or apart:
         return _beside(levels, there, name, judged)
-    whole, there = likeliest(levels, there, there.layout)
+    whole, shown = likeliest(levels, there.bent if name == "arrangement" else there)
     if whole.status[0] not in status.MEASURED:
         return _beside(levels, there, name, judged)
+    there = shown
     corners, state = whole.corners[0], str(whole.status[0])
     near = there.at(corners)
     if name == "arrangement":

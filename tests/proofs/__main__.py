@@ -12,8 +12,10 @@ from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
+from tests.proofs.mixed import mixed
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
+from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
@@ -27,8 +29,10 @@ app.command()(kill)
 app.command()(large)
 app.command()(lights)
 app.command()(limbs)
+app.command()(mixed)
 app.command()(parts)
 app.command()(photographs)
+app.command()(processed)
 app.command()(rate)
 app.command()(uneven)
 app.command()(stations)

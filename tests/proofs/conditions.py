@@ -22,6 +22,7 @@ from tests.oracle import polygon_image
 SHAPE = (200, 260)
 CORNERS = np.array([[61.3, 52.2], [201.6, 63.9], [190.4, 150.7], [50.8, 139.1]])
 CONTRAST, NOISE, BLUR, BACKGROUND = 135.0, 1.5, 0.8, 50.0
+_ENOUGH = 40
 
 
 @lru_cache(maxsize=1)
@@ -51,10 +52,27 @@ def _jpeg(quality: int, rng):
     return cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE).astype(float)
 
 
+def _written(light: np.ndarray) -> np.ndarray:
+    """sRGB's curve (IEC 61966-2-1), 0 to 1."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light.clip(1e-9) ** (1 / 2.4) - 0.055)
+
+
+def _coded(noise: float, rng) -> np.ndarray:
+    return np.clip(np.rint(255 * _written(_clean() / 255) + noise * rng.standard_normal(SHAPE)), 0, 255)
+
+
+def _gamma_weak(rng):
+    return _coded(2.0, rng)
+
+
+def _unmarked(rng):
+    """In a file that does not say what it is."""
+    return Photograph(_coded(6.0, rng), 255.0, tone_known=False)
+
+
 def _gamma_undone(rng):
     light = (_clean() + NOISE * rng.standard_normal(SHAPE)).clip(0, 255) / 255
-    written = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return Photograph(255 * tone.SRGB.light(np.rint(255 * written) / 255), 255.0)
+    return Photograph(255 * tone.SRGB.light(np.rint(255 * _written(light)) / 255), 255.0)
 
 
 def _mosaic(rng) -> np.ndarray:
@@ -94,10 +112,22 @@ def _weak(rng):
     return np.clip(np.rint(BACKGROUND + (_clean() - BACKGROUND) / 18 + NOISE * rng.standard_normal(SHAPE)), 0, 255)
 
 
+@lru_cache(maxsize=1)
+def _dimmed() -> np.ndarray:
+    """Less light from what is far from the middle, blurred afterwards: of x f the blur of variance s^2 makes
+    x F + s^2 dF/dx, if of f it makes F."""
+    y, x = (axis - size / 2 for axis, size in zip(np.mgrid[: SHAPE[0], : SHAPE[1]], SHAPE, strict=True))
+    variance, image = BLUR**2 + 1 / 12, _clean()
+
+    def moment(of: np.ndarray, place: np.ndarray, axis: int) -> np.ndarray:
+        return place * of + variance * np.gradient(of, axis=axis)
+
+    squares = sum(moment(moment(image, place, axis), place, axis) for axis, place in enumerate((y, x)))
+    return image - 0.3 * squares / (SHAPE[0] ** 2 + SHAPE[1] ** 2) * 4
+
+
 def _vignette(rng):
-    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
-    away = np.hypot(x - SHAPE[1] / 2, y - SHAPE[0] / 2) / np.hypot(*SHAPE) * 2
-    return _noisy(_clean() * (1 - 0.3 * away**2), rng)
+    return _noisy(_dimmed(), rng)
 
 
 def _texture(rng):
@@ -135,7 +165,7 @@ def _smoothed(rng):
 
 CONDITIONS = {
     "as the model says": _plain, "motion blur 6 px": _motion, "astigmatic blur": _astigmatic,
-    "gamma 0.45": _gamma, "gamma undone": _gamma_undone,
+    "gamma 0.45": _gamma, "sRGB at c/n 42": _gamma_weak, "unmarked at c/n 14": _unmarked, "gamma undone": _gamma_undone,
     **{f"JPEG {quality}": partial(_jpeg, quality) for quality in (50, 75, 90, 95)},
     "vignette 30 %": _vignette, "light from a side": _one_sided, "texture of sd 10": _texture,
     "distortion 1 %": _distorted, "Poisson noise": _poisson, "noise of 0.4": _quiet, "contrast/noise 5": _weak,
@@ -161,16 +191,17 @@ class Outcome:
         if self.ok <= max(0.05 * self.count, 1):
             return True
         error = 1 / np.sqrt(2 * max(self.ok - 1, 1))
-        return (
-            self.bias < (0.3 + 4 / np.sqrt(self.ok)) * self.told and abs(self.scatter_over_told - 1) < 0.1 + 4 * error
-        )
+        scatters = abs(self.scatter_over_told - 1) < max(0.15, 4 * error)
+        return self.bias < (0.3 + 4 / np.sqrt(self.ok)) * self.told and scatters
 
 
 def outcome(name: str, estimator: str, count: int, rng: np.random.Generator) -> Outcome:
-    """Measure ``count`` images of one condition."""
-    true = [np.linalg.norm(CORNERS[i] - CORNERS[i + 2]) for i in (0, 1)]
-    found = [measure.measure_quadrilateral(CONDITIONS[name](rng), estimator) for _ in range(count)]
-    states = [one.status for one in found]
+    """Measure ``count`` images of one condition, or 40 of which none is ok."""
+    true, found = [np.linalg.norm(CORNERS[i] - CORNERS[i + 2]) for i in (0, 1)], []
+    while len(found) < count and not (len(found) == _ENOUGH and all(one.status != "ok" for one in found)):
+        near = CORNERS + rng.uniform(-1.5, 1.5, CORNERS.shape)
+        found.append(measure.measure_quadrilateral(CONDITIONS[name](rng), estimator, corners=near))
+    states, count = [one.status for one in found], len(found)
     ok = sum(state == "ok" for state in states)
     used = [one for one in found if one.measurands and (one.status == "ok" or not ok)]
     diagonals = np.array([[m.value for m in one.measurands if m.name.startswith("diagonal")] for one in used])
@@ -184,10 +215,10 @@ def outcome(name: str, estimator: str, count: int, rng: np.random.Generator) -> 
 
 
 def conditions(
-    count: Annotated[int, typer.Option(help="Images a condition.")] = 40,
+    count: Annotated[int, typer.Option(help="Images a condition; 40 where none is ok.")] = 400,
     seed: Annotated[int, typer.Option()] = 1,
     only: Annotated[str, typer.Option(help="Comma-separated conditions; all when empty.")] = "",
-    estimators: Annotated[str, typer.Option(help="Comma-separated.")] = "arrangement,strip,gradient",
+    estimators: Annotated[str, typer.Option(help="Comma-separated.")] = "arrangement",
 ) -> None:
     """Measure photographs with one thing wrong at a time; exit status 1 if one is called ok that is not."""
     rng, honest = np.random.default_rng(seed), True

@@ -201,7 +201,8 @@ def test_wrong_noise_is_a_misfit(task1, factor):
 
 
 TOLD = {  # what is said of photographs that are not as the model says; all others are ok
-    "motion blur 6 px": status.MISFIT, "gamma 0.45": status.MISFIT, "distortion 1 %": status.MISFIT,
+    **dict.fromkeys(("motion blur 6 px", "gamma 0.45", "sRGB at c/n 42", "distortion 1 %"), status.MISFIT),
+    "unmarked at c/n 14": status.TONE_UNKNOWN,
     **{name: status.COMPRESSED for name in CONDITIONS if name.startswith("JPEG")},
     **dict.fromkeys(("texture of sd 10", "sharpened", "smoothed", "demosaicked"), status.CORRELATED),
 }  # fmt: skip

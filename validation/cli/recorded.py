@@ -33,7 +33,8 @@ def facts(photo: Photograph) -> dict[str, Any]:
 
 def text(photo: Photograph) -> str:
     """The same in words."""
-    return f"{photo.tone}; channel: {photo.channel}"
+    asked = "" if photo.tone_known else " (the file does not say; --gamma does)"
+    return f"{photo.tone}{asked}; channel: {photo.channel}"
 
 
 def of_sides(found: measure.Quadrilateral) -> dict[str, Any]:
