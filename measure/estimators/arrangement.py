@@ -279,12 +279,17 @@ class ArrangementEstimator:
             if size < _SETTLED**2 and damping == 0:
                 return point, True, 0.0
             there = self._point(used, self.model.moved(point.state, self._held_back(step)), point.before)
-            if there.cost <= point.cost + _ROUNDING:
+            if self._cost(used, there, point.weight) <= point.cost + _ROUNDING:
                 return there, size < _SETTLED**2, damping / 10 if damping > 1e-3 else 0.0
             if size < _SETTLED**2:
                 return point, True, 0.0
             damping = max(10 * damping, 1e-3)
         return point, True, damping
+
+    def _cost(self, used: np.ndarray, point: Point, weight: np.ndarray) -> float:
+        """The cost at a point with weights (P,) of another: a score is the slope of this one, weights held."""
+        away, before = used - point.expected, point.before - self.parameters(point.state)
+        return float(away @ (weight * away) + before @ self.prior @ before)
 
     def _held_back(self, step: np.ndarray) -> np.ndarray:
         """A step (q,) no longer than what is known of vertices and blur is good for."""
@@ -325,6 +330,11 @@ class ArrangementEstimator:
         rest = known(self.model, self.still, follows=np.inf).precision
         inverse = _inverse(_inverse(centre.expansion.inverse) - self.known.precision + rest)
         return inverse - inverse @ rest @ inverse
+
+    def response(self, used: np.ndarray) -> np.ndarray:
+        """Derivative of the parameters by the pixels, (q, P), at the expected place with an image's own levels (P,)."""
+        point = self._point(used, self.start(used), self.before(used))
+        return _inverse(point.fisher) @ (point.jacobian * (point.gain * point.weight)[:, None]).T
 
     def derivative(self, centre: Centre) -> np.ndarray:
         """Derivative of the parameters by the pixels at a state, (q, P)."""

@@ -37,6 +37,11 @@ def reach_of(arrangement: Arrangement, shape: tuple[int, int], noise: Noise) -> 
     return most if (near > _MORE * far).any() else NEAR
 
 
+def is_long(length: float, blur: float) -> bool:
+    """Whether edges of so many px in all, and of such a blur, px, need more pixels than are used of long ones."""
+    return 2 * length * max(_NEAREST, _BLURS * blur) > _MANY
+
+
 def asked_of(corners: np.ndarray) -> np.ndarray:
     """What is asked of C corners (C, 2): their distance if there are two, else all coordinates; (k, 2 C)."""
     if len(corners) != 2:

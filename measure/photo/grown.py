@@ -9,7 +9,6 @@ import numpy as np
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features.corners import corner_response
 from measure.features.layout import Layout, polygon_layout
-from measure.features.locating import locate
 from measure.features.shape import prepared
 from measure.photo.recording import Recording
 from measure.photo.uneven import shaded
@@ -21,8 +20,7 @@ def corner_rows(image: np.ndarray, layout: Layout, estimator: str, threshold: fl
     """Derivative of the corners' coordinates by the pixels of an image, (2 C, P), and which pixels, flat, (P,)."""
     tool = prepared(layout, estimator, threshold)
     if isinstance(tool, ArrangementEstimator):
-        centre = locate(tool, layout, tool.taken(image[None])[0], image)
-        return tool.derivative(centre)[tool.index(tool.arrangement.corners)], tool.pixels
+        return tool.response(tool.taken(image[None])[0])[tool.index(tool.arrangement.corners)], tool.pixels
     response = np.concatenate([corner_response(tool.calipers, pair) for pair in layout.corners])
     return response @ tool.respond_within(image), tool.pixels
 

@@ -14,6 +14,7 @@ from measure.features.layout import Layout
 from measure.features.shape import find_shape
 from measure.find.search import find_quadrilateral
 from measure.goodness import WORST
+from measure.photo.binned import back, bin_size, binned, into
 from measure.photo.expected import Expected, expected, likeliest
 from measure.photo.grown import grown_covariance
 from measure.photo.lens import Lens, straight_corners
@@ -107,6 +108,10 @@ def measure_quadrilateral(
     near = find_quadrilateral(levels) if corners is None else _expected(corners, levels.shape)
     near = refined(levels, near)
     seen = recording(photo, near)
+    size = 1 if lens is not None else bin_size(levels, near)
+    if size > 1:
+        coarse = measure_quadrilateral(binned(photo, size, seen.compressed), name, corners=into(near, size))
+        return _finer(coarse, size, seen, levels)
     there = expected(levels, near, seen)
     found = _found(levels, there, "gradient" if lens is not None else name, lens is None)
     if found.state in status.MEASURED and lens is not None:
@@ -133,6 +138,17 @@ class _Found:
     threshold: float
     layout: Layout
     alike: bool = False
+
+
+def _finer(found: Quadrilateral, size: int, seen: Recording, levels: np.ndarray) -> Quadrilateral:
+    """What was measured in larger pixels, told in those of the photograph, whose noise is ``seen``."""
+    corners, covariance = back(found.corners, size), size**2 * found.covariance
+    noise = float(np.sqrt(seen.curve.variance(levels.mean())))
+    values = _values(corners, covariance) if np.isfinite(corners).all() else ()
+    return replace(
+        found, corners=corners, covariance=covariance, measurands=values, noise=noise, curve=seen.curve,
+        blur_px=size * found.blur_px, side_blur_px=size * found.side_blur_px,
+    )  # fmt: skip
 
 
 def _found(levels: np.ndarray, there: Expected, name: str, judged: bool) -> _Found:
