@@ -18,6 +18,7 @@ import render
 import scenes
 from planner.features.limbs import step_model_error
 from scenes import InvalidInput, Light, Scene
+from tests.proofs.silhouettes import cone_of, proved
 from validation.statistics import Verdict, verdict
 
 _MOST_LIGHT, _MOST_TILT = 50.0, 12.0  # degrees: of the light from the sensor, of the sensor from the backlight's axis
@@ -101,11 +102,16 @@ def judged(rows: list[Row], images: int) -> Verdict:
 def limbs(
     count: Annotated[int, typer.Option(help="Poses a scene.")] = 20,
     images: Annotated[int, typer.Option(help="Noisy images a pose.")] = 200,
-    only: Annotated[str, typer.Option(help="ball, shaft-front, shaft-back, or all.")] = "all",
+    only: Annotated[str, typer.Option(help="ball, shaft-front, shaft-back, render, or all.")] = "all",
     seed: int = 1995,
 ) -> None:
-    """Variance and bias of diameters from limbs at random poses."""
+    """Variance and bias of diameters from limbs at random poses; and where limbs are rendered, by a million rays."""
     failed = False
+    if only in ("render", "all"):
+        shaft = scenes.load("shaft")
+        failed = not proved({"ball": scenes.load("ball"), "shaft": shaft, "cone": cone_of(shaft)}, count, seed)
+        if only == "render":
+            raise typer.Exit(int(failed))
     for kind in ("ball", "shaft-front", "shaft-back") if only == "all" else (only,):
         scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
         while len({row.sensor for row in rows}) < count:

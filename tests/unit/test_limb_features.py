@@ -11,6 +11,7 @@ from planner.imaging.projection import sensor_position
 from render import Quality
 from scenes import Ball, InvalidInput, Turned
 from tests.proofs.limbs import rows_at, scene_of
+from tests.proofs.silhouettes import LIMIT_PX, cone_of, silhouettes
 
 QUICK = Quality(edge_samples=16)
 CONE = Turned(kind="turned", profile=[(-5.0, 3.0), (5.0, 2.0), (5.0, 4.0), (9.0, 4.0)]).solid
@@ -90,3 +91,18 @@ def test_diameters_are_measured_as_predicted(kind, sensor, light):
             assert abs(row.as_step) > 5 * sigma  # what is corrected
     with pytest.raises(InvalidInput, match="sensor"):
         rows_at(scene_of(kind, small=True), (0, 0, 0), light, 2, 7)
+
+
+@pytest.mark.parametrize(
+    ("name", "sensor"), [("ball", (40.0, 110.0)), ("shaft", (14.0, 262.0)), ("cone", (18.0, 94.0))]
+)
+def test_limbs_are_rendered_where_their_closed_forms_are(name, sensor):
+    """Reduced form of ``python -m tests.proofs limbs --only render``; what is 2e-3 px too large is told from it."""
+    scene, rng = scenes.load("ball" if name == "ball" else "shaft"), np.random.default_rng(5)
+    scene = cone_of(scene) if name == "cone" else scene
+    found = list(silhouettes(scene, sensor, 32, 1024, rng))
+    assert len(found) == len(scene.solid.curved)
+    assert all(each.agrees for each in found), found
+    wrong = next(silhouettes(scene, sensor, 32, 1024, rng, grown=2 * LIMIT_PX))
+    assert not wrong.agrees
+    assert wrong.mean == pytest.approx(2 * LIMIT_PX, abs=3e-4)
