@@ -1,7 +1,7 @@
-"""Diameters by their limbs at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
+"""What limbs tell, at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
 
-A ball under a point of light; a shaft under two, one on each side, for a point lights but one of its limbs; the shaft
-against a backlight.
+A ball under a point of light, its diameter and centre; a shaft under two, one on each side, for a point lights but one
+of its limbs; the shaft and two cones, their tapers too, against a backlight.
 """
 
 from __future__ import annotations
@@ -17,16 +17,18 @@ import planner
 import render
 import scenes
 from planner.features.limbs import step_model_error
+from planner.features.measurand import measurands
 from scenes import InvalidInput, Light, Scene
 from tests.proofs.silhouettes import cone_of, proved
 from validation.statistics import Verdict, verdict
 
+KINDS = "ball", "shaft-front", "shaft-back", "cone-back"
 _MOST_LIGHT, _MOST_TILT = 50.0, 12.0  # degrees: of the light from the sensor, of the sensor from the backlight's axis
 
 
 @dataclass(frozen=True)
 class Row:
-    """One diameter from one pose: in the scene's unit, variances not sigmas."""
+    """One quantity from one pose: in the scene's unit or degrees, variances not sigmas."""
 
     name: str
     sensor: tuple[float, float]
@@ -40,8 +42,8 @@ class Row:
 
 
 def scene_of(kind: str, small: bool = False) -> Scene:
-    """``ball``, ``shaft-front`` or ``shaft-back``; ``small`` with a quarter of the pixels."""
-    found = scenes.load(kind.split("-")[0])
+    """``ball``, ``shaft-front``, ``shaft-back`` or ``cone-back``; ``small`` with a quarter of the pixels."""
+    found = cone_of(scenes.load("shaft")) if kind == "cone-back" else scenes.load(kind.split("-")[0])
     if kind == "shaft-front":
         found = found.lit_by(Light(distance=500.0), Light(distance=500.0))
     camera = found.camera
@@ -54,7 +56,7 @@ def scene_of(kind: str, small: bool = False) -> Scene:
 def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tuple | None]:
     """A sensor and its lights; a shaft lies along x, and along the image."""
     across = float(rng.choice([90.0, 270.0]))
-    if kind == "shaft-back":
+    if kind in ("shaft-back", "cone-back"):
         return (float(rng.uniform(1, _MOST_TILT)), across + float(rng.uniform(-20, 20))), None
     if kind == "shaft-front":
         sides = [(float(rng.uniform(45, 75)), turn + float(rng.uniform(-20, 20))) for turn in (90.0, 270.0)]
@@ -65,23 +67,25 @@ def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tup
 
 
 def rows_at(scene: Scene, sensor, light, images: int, seed: int, quality: render.Quality = render.Quality()):
-    """Every diameter of a scene from one pose."""
+    """Every quantity of a scene from one pose."""
     picture = scenes.Picture.of(scene, sensor, light)
     told, clean = planner.predict(picture), render.image(picture, quality=quality)
     known = measure.propagate(clean, picture, estimator="gradient").measurands
     noisy = render.expose(clean, scene.noise, np.random.default_rng(seed), images)
     found = measure.measure(noisy, picture, estimator="gradient")
-    rows = []
+    pictures, rows = planner.Pictures.of(picture), []
+    expected = measurands(pictures)
     for m, forecast in enumerate(told.measurands):
         values = found.value[np.isfinite(found.value[:, m]), m]
         status = forecast.status if forecast.status != "ok" else known.status[m]
-        wall = scene.solid.round(scene.quantities[m].features[0].surface)
-        as_step = 2 * float(step_model_error(planner.Pictures.of(picture), wall)[2])
+        name = scene.quantities[m].features[0].surface
+        pull = expected.of_circle(expected.gradient_object, expected.circles.index(name))[m]
+        as_step = float(pull @ step_model_error(pictures, scene.solid.round(name)))
         rows.append(
             Row(
                 forecast.name, sensor, status, forecast.variance_object, float(known.covariance[m, m]),
                 float(values.var(ddof=1)) if len(values) > 1 else np.nan, len(values),
-                float(values.mean() - 2 * wall.radius) if len(values) else np.nan, as_step,
+                float(values.mean() - forecast.nominal) if len(values) else np.nan, as_step,
             )
         )  # fmt: skip
     return rows
@@ -102,17 +106,17 @@ def judged(rows: list[Row], images: int) -> Verdict:
 def limbs(
     count: Annotated[int, typer.Option(help="Poses a scene.")] = 20,
     images: Annotated[int, typer.Option(help="Noisy images a pose.")] = 200,
-    only: Annotated[str, typer.Option(help="ball, shaft-front, shaft-back, render, or all.")] = "all",
+    only: Annotated[str, typer.Option(help="One of the kinds, render, or all.")] = "all",
     seed: int = 1995,
 ) -> None:
-    """Variance and bias of diameters from limbs at random poses; and where limbs are rendered, by a million rays."""
+    """Variance and bias of what limbs tell at random poses; and where limbs are rendered, by a million rays."""
     failed = False
     if only in ("render", "all"):
         shaft = scenes.load("shaft")
         failed = not proved({"ball": scenes.load("ball"), "shaft": shaft, "cone": cone_of(shaft)}, count, seed)
         if only == "render":
             raise typer.Exit(int(failed))
-    for kind in ("ball", "shaft-front", "shaft-back") if only == "all" else (only,):
+    for kind in KINDS if only == "all" else (only,):
         scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
         while len({row.sensor for row in rows}) < count:
             try:

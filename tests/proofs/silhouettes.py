@@ -42,9 +42,14 @@ class Silhouette:
 
 
 def cone_of(scene: Scene) -> Scene:
-    """A shaft's scene with two cones in its place, one steep and one slight."""
+    """A shaft's scene with two cones in its place, one steep and one slight; their tapers are measured, too."""
     data = scene.model_dump(mode="json", exclude_defaults=True)
-    return Scene.model_validate(data | {"object": _CONE, "measurands": data["measurands"][:2]})
+    asked = [
+        {"name": f"{kind} of {name}", "kind": kind, "features": [{"surface": name}]}
+        for kind in ("diameter", "taper")
+        for name in ("d1", "d2")
+    ]
+    return Scene.model_validate(data | {"object": _CONE, "measurands": asked})
 
 
 def silhouettes(
