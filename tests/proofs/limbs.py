@@ -19,7 +19,7 @@ import scenes
 from planner.features.limbs import step_model_error
 from planner.features.measurand import measurands
 from scenes import InvalidInput, Light, Scene
-from tests.proofs.silhouettes import cone_of, proved
+from tests.proofs import centres, silhouettes
 from validation.statistics import Verdict, verdict
 
 KINDS = "ball", "shaft-front", "shaft-back", "cone-back"
@@ -43,7 +43,7 @@ class Row:
 
 def scene_of(kind: str, small: bool = False) -> Scene:
     """``ball``, ``shaft-front``, ``shaft-back`` or ``cone-back``; ``small`` with a quarter of the pixels."""
-    found = cone_of(scenes.load("shaft")) if kind == "cone-back" else scenes.load(kind.split("-")[0])
+    found = silhouettes.cone_of(scenes.load("shaft")) if kind == "cone-back" else scenes.load(kind.split("-")[0])
     if kind == "shaft-front":
         found = found.lit_by(Light(distance=500.0), Light(distance=500.0))
     camera = found.camera
@@ -106,16 +106,20 @@ def judged(rows: list[Row], images: int) -> Verdict:
 def limbs(
     count: Annotated[int, typer.Option(help="Poses a scene.")] = 20,
     images: Annotated[int, typer.Option(help="Noisy images a pose.")] = 200,
-    only: Annotated[str, typer.Option(help="One of the kinds, render, or all.")] = "all",
+    only: Annotated[str, typer.Option(help="One of the kinds, render, centre, or all.")] = "all",
     seed: int = 1995,
 ) -> None:
     """Variance and bias of what limbs tell at random poses; and where limbs are rendered, by a million rays."""
     failed = False
     if only in ("render", "all"):
         shaft = scenes.load("shaft")
-        failed = not proved({"ball": scenes.load("ball"), "shaft": shaft, "cone": cone_of(shaft)}, count, seed)
-        if only == "render":
-            raise typer.Exit(int(failed))
+        failed = not silhouettes.proved(
+            {"ball": scenes.load("ball"), "shaft": shaft, "cone": silhouettes.cone_of(shaft)}, count, seed
+        )
+    if only in ("centre", "all"):
+        failed |= not centres.proved(count, seed)
+    if only in ("render", "centre"):
+        raise typer.Exit(int(failed))
     for kind in KINDS if only == "all" else (only,):
         scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
         while len({row.sensor for row in rows}) < count:

@@ -10,6 +10,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.projection import sensor_position
 from render import Quality
 from scenes import Ball, InvalidInput, Turned
+from tests.proofs.centres import centre_at, scene_beside
 from tests.proofs.limbs import rows_at, scene_of
 from tests.proofs.silhouettes import LIMIT_PX, cone_of, silhouettes
 
@@ -126,3 +127,13 @@ def test_limbs_are_rendered_where_their_closed_forms_are(name, sensor):
     wrong = next(silhouettes(scene, sensor, 32, 1024, rng, grown=2 * LIMIT_PX))
     assert not wrong.agrees
     assert wrong.mean == pytest.approx(2 * LIMIT_PX, abs=3e-4)
+
+
+def test_the_ellipse_s_centre_is_not_taken_for_the_ball_s():
+    """Reduced form of ``python -m tests.proofs limbs --only centre``: the ball is too dark for light upon it to tell."""
+    scene = scene_beside((9.0, -7.0), small=True)
+    scene = scene.model_copy(update={"material": scene.material.model_copy(update={"diffuse_reflectance": 1e-4})})
+    found = centre_at(scene, (3.0, 40.0), QUICK, "backlight,lens_blur,attached_shadow")
+    assert found.agrees, found
+    assert found.as_ellipse > 50
+    assert found.fitted < 0.01
