@@ -19,6 +19,7 @@ from planner.imaging.limbs.shading import Profile, fitted
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import camera_frame, from_axis
 from planner.imaging.rays import first_face
+from planner.imaging.revolved import light_around
 from scenes import Curved
 
 _NODES = 12  # places inside the limb at which the level is found
@@ -146,7 +147,7 @@ def _profile(
     where = np.where(hit[..., None], eye + np.where(hit, first, 0.0)[..., None] * way, points[..., None, :])
     material = scene.surfaces.of(curved.faces[0])
     found = signal(pictures, where, curved.surface.normals(where), 2, _lit(pictures, curved, points), material=material)
-    found = np.where(hit, found, 0.0)
+    found = np.where(hit, found + light_around(pictures, curved, where), 0.0)
     return found, fitted(places, found.reshape(-1, _NODES), far)
 
 

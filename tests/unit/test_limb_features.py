@@ -130,7 +130,7 @@ def test_limbs_are_rendered_where_their_closed_forms_are(name, sensor):
 
 
 def test_the_ellipse_s_centre_is_not_taken_for_the_ball_s():
-    """Reduced form of ``python -m tests.proofs limbs --only centre``: the ball is too dark for light upon it to tell."""
+    """Reduced form of ``python -m tests.proofs limbs --only centre``: the ball is too dark for light upon it."""
     scene = scene_beside((9.0, -7.0), small=True)
     scene = scene.model_copy(update={"material": scene.material.model_copy(update={"diffuse_reflectance": 1e-4})})
     found = centre_at(scene, (3.0, 40.0), QUICK, "backlight,lens_blur,attached_shadow")

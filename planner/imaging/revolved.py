@@ -1,0 +1,202 @@
+"""Light that the walls and shoulders of a turned part send to each other, by radiosity.
+
+Form factors between two rings about the axis depend on the difference of the angles alone, and so does what stands
+between them; sums around the axis are convolutions. Light of the second and later bounces is added until it is small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+
+from planner.imaging.emitters import GLANCE, Emitter, emitters
+from planner.imaging.irradiance import beam
+from planner.imaging.pictures import Pictures
+from planner.imaging.rays import first_face
+from planner.imaging.reflectance import diffuse
+from scenes import Curved, Scene, Solid
+from scenes.parts.surfaces import Cone, Cylinder, axes_beside
+
+_ON_WALL, _ON_SHOULDER, _AROUND = 20, 10, 64  # rings, and places on a ring
+_BETWEEN = np.linspace(0, 1, 12)[1:-1]  # of the way between two places, where it is asked whether the part is there
+_SAME = 1e-6  # of the part's size
+_BOUNCES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """R rings of a turned part, in heights z along its axis from the first wall's point and distances r from it.
+
+    Attributes
+    ----------
+    z, r, upward, outward, area : ndarray, shape (R,)
+        Middles of the rings, their normals' parts along and away from the axis, and areas.
+    of_wall : dict of str to slice
+        The rings of each wall.
+    own : tuple of tuple of int
+        The facets that stand for each ring's surface.
+    profile : tuple of ndarray
+        Rising heights and the part's radius there.
+    axes : ndarray, shape (3, 3)
+        Rows: two across the axis, and the axis.
+    origin : ndarray, shape (3,)
+    """
+
+    z: np.ndarray
+    r: np.ndarray
+    upward: np.ndarray
+    outward: np.ndarray
+    area: np.ndarray
+    of_wall: dict[str, slice]
+    own: tuple[tuple[int, ...], ...]
+    profile: tuple[np.ndarray, np.ndarray]
+    axes: np.ndarray
+    origin: np.ndarray
+
+    @property
+    def places(self) -> np.ndarray:
+        """In space, shape (R, angles, 3)."""
+        return self.origin + self.r[:, None, None] * self.spokes + self.z[:, None, None] * self.axes[2]
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Shape (R, angles, 3)."""
+        return self.outward[:, None, None] * self.spokes + self.upward[:, None, None] * self.axes[2]
+
+    @property
+    def spokes(self) -> np.ndarray:
+        """Unit vectors away from the axis, shape (angles, 3)."""
+        return np.cos(_ANGLES)[:, None] * self.axes[0] + np.sin(_ANGLES)[:, None] * self.axes[1]
+
+
+_ANGLES = 2 * np.pi * np.arange(_AROUND) / _AROUND
+
+
+def light_around(pictures: Pictures, curved: Curved, points: np.ndarray) -> np.ndarray | float:
+    """Signal that points (..., 3) of a wall have from the other walls and the shoulders; diffuse light alone.
+
+    0 in pictures that are not looked at closely, and where the part is not one of outer walls about one axis.
+    """
+    scene = pictures.scene
+    if not pictures.closely or scene.solid.is_convex:
+        return 0.0
+    rings = rings_of(scene.solid)
+    if rings is None:
+        return 0.0
+    told = pictures.once(("around", curved.name), lambda: _told(pictures, rings, curved.name))
+    away = points - rings.origin
+    angle = np.arctan2(away @ rings.axes[1], away @ rings.axes[0]) % (2 * np.pi)
+    white = diffuse(scene.surfaces.of(curved.faces[0]), scene.camera.analyser_deg is not None)
+    return scene.camera.exposure * white * np.maximum(told.ev(away @ rings.axes[2], angle), 0.0)
+
+
+@lru_cache(maxsize=16)
+def rings_of(solid: Solid) -> Rings | None:
+    """The rings of a part of outer walls that follow each other along one axis; None of any other."""
+    walls = [each.surface for each in solid.curved]
+    if not walls or not all(isinstance(wall, Cylinder | Cone) and not wall.hollow for wall in walls):
+        return None
+    origin, axis, near = walls[0].point, walls[0].axis, _SAME * solid.extent
+    heights = [float((wall.point - origin) @ axis) for wall in walls]
+    beside = [np.linalg.norm(wall.point - origin - z * axis) for wall, z in zip(walls, heights, strict=True)]
+    ends = [(z + wall.ends[0], z + wall.ends[1]) for wall, z in zip(walls, heights, strict=True)]
+    radii = [tuple(wall.radius + getattr(wall, "slope", 0.0) * end for end in wall.ends) for wall in walls]
+    aligned = max(beside) <= near and all(wall.axis @ axis > 1 - _SAME for wall in walls)
+    if not aligned or any(abs(a[1] - b[0]) > near for a, b in pairwise(ends)):
+        return None
+    rows, of_wall, own, count = [], {}, [], 0
+    for k, wall in enumerate(solid.curved):
+        rows.append(_cells((ends[k][0], radii[k][0]), (ends[k][1], radii[k][1]), _ON_WALL))
+        of_wall[wall.name] = slice(count, count + _ON_WALL)
+        own += [wall.faces] * _ON_WALL
+        count += _ON_WALL
+        step = radii[k + 1][0] - radii[k][1] if k + 1 < len(walls) else 0.0
+        if abs(step) > near:
+            rows.append(_cells((ends[k][1], radii[k][1]), (ends[k][1], radii[k + 1][0]), _ON_SHOULDER))
+            own += [_shoulder(solid, origin + ends[k][1] * axis, axis, near)] * _ON_SHOULDER
+            count += _ON_SHOULDER
+    lines = [np.array(line).ravel() for line in (ends, radii)]
+    return Rings(
+        *np.concatenate(rows, 1), of_wall, tuple(own), tuple(lines), np.stack([*axes_beside(axis), axis]), origin
+    )
+
+
+def _cells(low: tuple[float, float], high: tuple[float, float], count: int) -> np.ndarray:
+    """Rings between two places (z, r) of the profile, narrow towards both: middles z and r, normals, areas, (5, n)."""
+    share = (1 - np.cos(np.pi * np.linspace(0, 1, count + 1))) / 2
+    (z0, r0), (z1, r1) = low, high
+    length = np.hypot(z1 - z0, r1 - r0)
+    middle = (share[1:] + share[:-1]) / 2
+    radius = r0 + middle * (r1 - r0)
+    ones = np.ones(count)
+    area = 2 * np.pi * radius * np.diff(share) * length
+    return np.stack([z0 + middle * (z1 - z0), radius, -(r1 - r0) / length * ones, (z1 - z0) / length * ones, area])
+
+
+def _shoulder(solid: Solid, centre: np.ndarray, axis: np.ndarray, near: float) -> tuple[int, ...]:
+    """Plane faces across the axis at a place of it."""
+    flat = np.abs(solid.normals @ axis) > 1 - _SAME
+    level = np.array([np.abs((solid.vertices[list(face)] - centre) @ axis).max() <= near for face in solid.faces])
+    return tuple(np.flatnonzero(flat & level).tolist())
+
+
+@lru_cache(maxsize=16)
+def _factors(rings: Rings) -> np.ndarray:
+    """Fourier transform around the axis of the form factors from each ring's place to places of each, (R, R, k)."""
+    turn = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], -1)
+    start = np.stack([rings.r, np.zeros_like(rings.r), rings.z], -1)[:, None, None]
+    stop = np.concatenate(
+        [rings.r[:, None, None] * turn, np.broadcast_to(rings.z[:, None, None], (len(rings.r), _AROUND, 1))], -1
+    )
+    way = stop - start
+    square = (way**2).sum(-1)
+    square[square == 0] = np.inf  # a place itself
+    here = np.stack([rings.outward, np.zeros_like(rings.r), rings.upward], -1)[:, None, None]
+    there = np.concatenate(
+        [rings.outward[:, None, None] * turn, np.broadcast_to(rings.upward[:, None, None], (len(rings.r), _AROUND, 1))],
+        -1,
+    )
+    leaving, arriving = np.maximum((way * here).sum(-1), 0.0), np.maximum(-(way * there).sum(-1), 0.0)
+    found = leaving * arriving / (np.pi * square**2) * (rings.area / _AROUND)[None, :, None]
+    free, size = np.ones(found.shape, bool), _SAME * max(rings.r.max(), np.ptp(rings.z))
+    for share in _BETWEEN:
+        at = start + share * way
+        free &= np.hypot(at[..., 0], at[..., 1]) >= np.interp(at[..., 2], *rings.profile) - size
+    found = np.where(free, found, 0.0)
+    whole = found.sum((1, 2))
+    found /= np.maximum(whole, 1.0)[:, None, None]  # in an inner edge cells are no points
+    return np.fft.rfft(found, axis=-1)
+
+
+def _told(pictures: Pictures, rings: Rings, name: str) -> RectBivariateSpline:
+    """Light that arrives at a wall from elsewhere on the part, by height and angle."""
+    scene = pictures.scene
+    analysed = scene.camera.analyser_deg is not None
+    white = np.array([diffuse(scene.surfaces.of(faces[0]), analysed) if faces else 0.0 for faces in rings.own])
+    direct = sum(_direct(scene, rings, each) for each in emitters(scene, pictures.lights, GLANCE))
+    factors, arriving = _factors(rings), np.zeros_like(direct)
+    for _ in range(_BOUNCES):
+        sent = np.fft.rfft(white[:, None] * (direct + arriving), axis=-1)
+        arriving = np.fft.irfft(np.einsum("ijk,jk->ik", factors.conj(), sent), _AROUND, axis=-1)
+    part = rings.of_wall[name]
+    angles = np.concatenate([_ANGLES[-3:] - 2 * np.pi, _ANGLES, _ANGLES[:4] + 2 * np.pi])
+    values = np.concatenate([arriving[part, -3:], arriving[part], arriving[part, :4]], 1)
+    return RectBivariateSpline(rings.z[part], angles, values)
+
+
+def _direct(scene: Scene, rings: Rings, emitter: Emitter) -> np.ndarray:
+    """Irradiance of the rings by one emitter, where nothing stands before it, shape (R, angles)."""
+    places, normals = rings.places, rings.normals
+    arriving = beam(emitter, places)
+    found = arriving.strength * np.maximum((normals * arriving.to_light).sum(-1), 0.0)
+    at = np.asarray(emitter.at, float).reshape(3)
+    for own in dict.fromkeys(rings.own):
+        here = np.array([each == own for each in rings.own])[:, None] & (found > 0)
+        start = np.broadcast_to(at, places[here].shape)
+        _, t = first_face(scene.bodies, start, places[here] - start, own)
+        found[here] = np.where(t > 1 - _SAME, found[here], 0.0)
+    return found
