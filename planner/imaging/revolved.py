@@ -1,4 +1,4 @@
-"""Light that the walls and shoulders of a turned part send to each other, by radiosity.
+"""Light that the walls and shoulders of a turned part send to each other, by radiosity, and what they keep from it.
 
 Form factors between two rings about the axis depend on the difference of the angles alone, and so does what stands
 between them; sums around the axis are convolutions. Light of the second and later bounces is added until it is small.
@@ -22,7 +22,7 @@ from scenes import Curved, Scene, Solid
 from scenes.parts.surfaces import Cone, Cylinder, axes_beside
 
 _ON_WALL, _ON_SHOULDER, _AROUND = 20, 10, 64  # rings, and places on a ring
-_BETWEEN = np.linspace(0, 1, 12)[1:-1]  # of the way between two places, where it is asked whether the part is there
+_PIECES = 8  # of a cone, at whose ends it is asked whether a line passes beside it
 _SAME = 1e-6  # of the part's size
 _BOUNCES = 6
 
@@ -39,8 +39,8 @@ class Rings:
         The rings of each wall.
     own : tuple of tuple of int
         The facets that stand for each ring's surface.
-    profile : tuple of ndarray
-        Rising heights and the part's radius there.
+    profile : ndarray, shape (m, 2)
+        Heights and radii of the ends of all walls, and of places between those of cones.
     axes : ndarray, shape (3, 3)
         Rows: two across the axis, and the axis.
     origin : ndarray, shape (3,)
@@ -53,7 +53,7 @@ class Rings:
     area: np.ndarray
     of_wall: dict[str, slice]
     own: tuple[tuple[int, ...], ...]
-    profile: tuple[np.ndarray, np.ndarray]
+    profile: np.ndarray
     axes: np.ndarray
     origin: np.ndarray
 
@@ -94,6 +94,25 @@ def light_around(pictures: Pictures, curved: Curved, points: np.ndarray) -> np.n
     return scene.camera.exposure * white * np.maximum(told.ev(away @ rings.axes[2], angle), 0.0)
 
 
+def passes(rings: Rings, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """Whether the part leaves the way free from places (..., 3) on it, away from the surface there, to others."""
+    return _passes(rings, (start - rings.origin) @ rings.axes.T, (stop - rings.origin) @ rings.axes.T)
+
+
+def _passes(rings: Rings, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """The same in the part's own axes: a line away from a wall gets ever farther from the axis, so walls' ends tell."""
+    start, stop = np.broadcast_arrays(start, stop)
+    way, near = stop - start, _SAME * float(np.abs(rings.profile).max())
+    free = np.ones(start.shape[:-1], bool)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for height, radius in rings.profile:
+            share = (height - start[..., 2]) / way[..., 2]
+            x, y = start[..., 0] + share * way[..., 0], start[..., 1] + share * way[..., 1]
+            inside = x * x + y * y < (radius - near) ** 2
+            free &= ~(inside & (share > 0) & (share < 1))
+    return free
+
+
 @lru_cache(maxsize=16)
 def rings_of(solid: Solid) -> Rings | None:
     """The rings of a part of outer walls that follow each other along one axis; None of any other."""
@@ -119,10 +138,15 @@ def rings_of(solid: Solid) -> Rings | None:
             rows.append(_cells((ends[k][1], radii[k][1]), (ends[k][1], radii[k + 1][0]), _ON_SHOULDER))
             own += [_shoulder(solid, origin + ends[k][1] * axis, axis, near)] * _ON_SHOULDER
             count += _ON_SHOULDER
-    lines = [np.array(line).ravel() for line in (ends, radii)]
-    return Rings(
-        *np.concatenate(rows, 1), of_wall, tuple(own), tuple(lines), np.stack([*axes_beside(axis), axis]), origin
-    )
+    profile = [_ends(*pair) for pair in zip(ends, radii, strict=True)]
+    axes = np.stack([*axes_beside(axis), axis])
+    return Rings(*np.concatenate(rows, 1), of_wall, tuple(own), np.concatenate(profile), axes, origin)
+
+
+def _ends(heights: tuple[float, float], radii: tuple[float, float]) -> np.ndarray:
+    share = np.linspace(0, 1, 2 if radii[0] == radii[1] else _PIECES + 1)[:, None]
+    low, high = np.array([heights, radii]).T
+    return low + share * (high - low)
 
 
 def _cells(low: tuple[float, float], high: tuple[float, float], count: int) -> np.ndarray:
@@ -162,11 +186,7 @@ def _factors(rings: Rings) -> np.ndarray:
     )
     leaving, arriving = np.maximum((way * here).sum(-1), 0.0), np.maximum(-(way * there).sum(-1), 0.0)
     found = leaving * arriving / (np.pi * square**2) * (rings.area / _AROUND)[None, :, None]
-    free, size = np.ones(found.shape, bool), _SAME * max(rings.r.max(), np.ptp(rings.z))
-    for share in _BETWEEN:
-        at = start + share * way
-        free &= np.hypot(at[..., 0], at[..., 1]) >= np.interp(at[..., 2], *rings.profile) - size
-    found = np.where(free, found, 0.0)
+    found = np.where(_passes(rings, start, stop), found, 0.0)
     whole = found.sum((1, 2))
     found /= np.maximum(whole, 1.0)[:, None, None]  # in an inner edge cells are no points
     return np.fft.rfft(found, axis=-1)

@@ -1,7 +1,7 @@
 """What limbs tell, at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
 
 A ball under a point of light, its diameter and centre; a shaft under two, one on each side, for a point lights but one
-of its limbs; the shaft and two cones, their tapers too, against a backlight.
+of its limbs, and within a ring; the shaft and two cones, their tapers too, against a backlight.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scenes import InvalidInput, Light, Scene
 from tests.proofs import centres, silhouettes
 from validation.statistics import Verdict, verdict
 
-KINDS = "ball", "shaft-front", "shaft-back", "cone-back"
+KINDS = "ball", "shaft-front", "shaft-back", "shaft-ring", "cone-back"
 _MOST_LIGHT, _MOST_TILT = 50.0, 12.0  # degrees: of the light from the sensor, of the sensor from the backlight's axis
 
 
@@ -42,8 +42,10 @@ class Row:
 
 
 def scene_of(kind: str, small: bool = False) -> Scene:
-    """``ball``, ``shaft-front``, ``shaft-back`` or ``cone-back``; ``small`` with a quarter of the pixels."""
-    found = silhouettes.cone_of(scenes.load("shaft")) if kind == "cone-back" else scenes.load(kind.split("-")[0])
+    """One of `KINDS`; ``small`` with a quarter of the pixels."""
+    found = scenes.load({"shaft-ring": "shaft_ring"}.get(kind, kind.split("-")[0].replace("cone", "shaft")))
+    if kind == "cone-back":
+        found = silhouettes.cone_of(found)
     if kind == "shaft-front":
         found = found.lit_by(Light(distance=500.0), Light(distance=500.0))
     camera = found.camera
@@ -56,7 +58,7 @@ def scene_of(kind: str, small: bool = False) -> Scene:
 def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tuple | None]:
     """A sensor and its lights; a shaft lies along x, and along the image."""
     across = float(rng.choice([90.0, 270.0]))
-    if kind in ("shaft-back", "cone-back"):
+    if kind in ("shaft-back", "shaft-ring", "cone-back"):
         return (float(rng.uniform(1, _MOST_TILT)), across + float(rng.uniform(-20, 20))), None
     if kind == "shaft-front":
         sides = [(float(rng.uniform(45, 75)), turn + float(rng.uniform(-20, 20))) for turn in (90.0, 270.0)]
