@@ -32,7 +32,7 @@ def in_image(seen: Seen, quantity: Quantity) -> Evaluated:
     if quantity.kind == "taper":
         return _taper(seen, quantity)
     if _is_own(quantity):
-        return _coordinate(seen.point(quantity.features[0], None), quantity)
+        return _coordinate(seen, quantity, _along_axis(seen, quantity))
     return _KINDS[quantity.kind](seen, quantity, None, _side(seen, quantity, in_space=False))
 
 
@@ -47,7 +47,7 @@ def on_plane(seen: Seen, quantity: Quantity) -> Evaluated:
     if quantity.kind == "taper":
         return _taper(seen, quantity)
     if _is_own(quantity):
-        return _coordinate(_level(seen, quantity), quantity)
+        return _coordinate(seen, quantity, 1.0)
     plane = _plane(seen, quantity)
     return _KINDS[quantity.kind](seen, quantity, plane, _side(seen, quantity, in_space=True))
 
@@ -167,10 +167,21 @@ def _level(seen: Seen, quantity: Quantity) -> Point:
     return Point(seen.eye + reach[..., None] * sight, moves)
 
 
-def _coordinate(point: Point, quantity: Quantity) -> Evaluated:
-    """x or y of a point, in the image from its middle."""
-    k = quantity.axis
-    return Evaluated(point.at[..., k], {number: move[..., k] for number, move in point.moves.items()})
+def _coordinate(seen: Seen, quantity: Quantity, scale: np.ndarray | float) -> Evaluated:
+    """x or y of a ball's centre, times a scale."""
+    point, k = _level(seen, quantity), quantity.axis
+    return Evaluated(scale * point.at[..., k], {number: scale * move[..., k] for number, move in point.moves.items()})
+
+
+def _along_axis(seen: Seen, quantity: Quantity) -> np.ndarray:
+    """Image of a unit length along the scene's x or y at a ball's centre, px: coordinates in the image are along it."""
+    centre, axes = seen.solid.round(quantity.features[0].surface).centre, seen.axes
+    z, step = seen.depth(centre), np.eye(3)[quantity.axis]
+    screen, away = np.stack([axes.right, axes.down], -2), centre - seen.eye
+    slid = seen.camera.focal_px * (
+        screen @ step - (screen @ away[..., None])[..., 0] * (axes.forward @ step)[..., None] / z[..., None]
+    )
+    return np.linalg.norm(slid, axis=-1) / z
 
 
 def side_of(unit: np.ndarray, plane: np.ndarray | None) -> np.ndarray:

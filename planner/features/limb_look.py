@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from planner.features.limb_lent import unlent
 from planner.features.limb_locator import box_cumulant, limb_crossing
 from planner.features.limb_outline import LimbOutline, clear_of_ends, framed
 from planner.features.locator import edge_blur, reach
@@ -102,8 +103,11 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
 
 
 def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
-    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n)."""
-    scene, found = pictures.scene, clear_of_ends(outline, pictures.scene)
+    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n).
+
+    Nor light that a floor or an obstacle sends there.
+    """
+    scene, found = pictures.scene, clear_of_ends(outline, pictures.scene) & unlent(pictures, outline)
     if scene.bodies.is_convex:
         return found
     far, at = reach(scene.locator.scale_px, scene.camera.blur_px), np.nan_to_num(outline.at, nan=1e9)

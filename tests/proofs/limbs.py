@@ -1,7 +1,7 @@
 """What limbs tell, at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
 
 A ball under a point of light, its diameter and centre; a shaft under two, one on each side, for a point lights but one
-of its limbs, and within a ring; the shaft and two cones, their tapers too, against a backlight.
+of its limbs, also with shoulders' shadows upon it, and within a ring; the shaft and two cones, their tapers too, against a backlight.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from scenes import InvalidInput, Light, Scene
 from tests.proofs import centres, silhouettes
 from validation.statistics import Verdict, verdict
 
-KINDS = "ball", "shaft-front", "shaft-back", "shaft-ring", "cone-back"
+KINDS = "ball", "shaft-front", "shaft-shadow", "shaft-back", "shaft-ring", "cone-back"
 _MOST_LIGHT, _MOST_TILT = 50.0, 12.0  # degrees: of the light from the sensor, of the sensor from the backlight's axis
+_MOST_TURN = 65.0  # degrees: so far along the shaft lights stand whose shoulders throw shadows on walls
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def scene_of(kind: str, small: bool = False) -> Scene:
     found = scenes.load({"shaft-ring": "shaft_ring"}.get(kind, kind.split("-")[0].replace("cone", "shaft")))
     if kind == "cone-back":
         found = silhouettes.cone_of(found)
-    if kind == "shaft-front":
+    if kind in ("shaft-front", "shaft-shadow"):
         found = found.lit_by(Light(distance=500.0), Light(distance=500.0))
     camera = found.camera
     if small:
@@ -60,8 +61,9 @@ def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tup
     across = float(rng.choice([90.0, 270.0]))
     if kind in ("shaft-back", "shaft-ring", "cone-back"):
         return (float(rng.uniform(1, _MOST_TILT)), across + float(rng.uniform(-20, 20))), None
-    if kind == "shaft-front":
-        sides = [(float(rng.uniform(45, 75)), turn + float(rng.uniform(-20, 20))) for turn in (90.0, 270.0)]
+    if kind in ("shaft-front", "shaft-shadow"):
+        most = 20 if kind == "shaft-front" else _MOST_TURN
+        sides = [(float(rng.uniform(45, 75)), turn + float(rng.uniform(-most, most))) for turn in (90.0, 270.0)]
         return (float(rng.uniform(1, 25)), across + float(rng.uniform(-20, 20))), tuple(sides)
     polar, azimuth = float(rng.uniform(10, 80)), float(rng.uniform(0, 360))
     turn = rng.uniform(-_MOST_LIGHT, _MOST_LIGHT, 2)
@@ -109,10 +111,11 @@ def limbs(
     count: Annotated[int, typer.Option(help="Poses a scene.")] = 20,
     images: Annotated[int, typer.Option(help="Noisy images a pose.")] = 200,
     only: Annotated[str, typer.Option(help="One of the kinds, render, centre, or all.")] = "all",
+    rays: Annotated[int, typer.Option(help="Of a fine pixel at an edge.")] = 64,
     seed: int = 1995,
 ) -> None:
     """Variance and bias of what limbs tell at random poses; and where limbs are rendered, by a million rays."""
-    failed = False
+    failed, quality = False, render.Quality(edge_samples=rays)
     if only in ("render", "all"):
         shaft = scenes.load("shaft")
         failed = not silhouettes.proved(
@@ -126,7 +129,7 @@ def limbs(
         scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
         while len({row.sensor for row in rows}) < count:
             try:
-                rows += rows_at(scene, *poses(kind, rng), images, int(rng.integers(1 << 31)))
+                rows += rows_at(scene, *poses(kind, rng), images, int(rng.integers(1 << 31)), quality)
             except InvalidInput:  # a sensor within the shaft
                 continue
         for row in rows:
