@@ -1,7 +1,8 @@
 """What limbs tell, at random poses: variance as propagated, bias below 0.3 sigma, and what a step would err by.
 
 A ball under a point of light, its diameter and centre; a shaft under two, one on each side, for a point lights but one
-of its limbs, also with shoulders' shadows upon it, and within a ring; the shaft and two cones, their tapers too, against a backlight.
+of its limbs, also with shoulders' shadows upon it, and within a ring; the shaft and two cones, their tapers too,
+against a backlight.
 """
 
 from __future__ import annotations
@@ -40,6 +41,17 @@ class Row:
     count: int
     bias: float
     as_step: float
+
+    @property
+    def text(self) -> str:
+        """In a line."""
+        sigma = self.propagated**0.5
+        return (
+            f"{self.name} ({self.sensor[0]:.0f}, {self.sensor[1]:.0f}) {self.status}: sigma {sigma:.5f}, "
+            f"measured / propagated {self.measured / self.propagated:.3f}, calibrated / propagated "
+            f"{self.calibrated / self.propagated:.3f}, bias {self.bias / sigma:+.2f} sigma, "
+            f"as a step {self.as_step / sigma:+.1f}"
+        )
 
 
 def scene_of(kind: str, small: bool = False) -> Scene:
@@ -129,17 +141,11 @@ def limbs(
         scene, rng, rows = scene_of(kind), np.random.default_rng(seed), []
         while len({row.sensor for row in rows}) < count:
             try:
-                rows += rows_at(scene, *poses(kind, rng), images, int(rng.integers(1 << 31)), quality)
+                new = rows_at(scene, *poses(kind, rng), images, int(rng.integers(1 << 31)), quality)
             except InvalidInput:  # a sensor within the shaft
                 continue
-        for row in rows:
-            sigma = row.propagated**0.5
-            print(
-                f"{kind} {row.name} ({row.sensor[0]:.0f}, {row.sensor[1]:.0f}) {row.status}: sigma {sigma:.5f}, "
-                f"measured / propagated {row.measured / row.propagated:.3f}, calibrated / propagated "
-                f"{row.calibrated / row.propagated:.3f}, bias {row.bias / sigma:+.2f} sigma, "
-                f"as a step {row.as_step / sigma:+.1f}"
-            )
+            rows += new
+            print("\n".join(f"{kind} {row.text}" for row in new), flush=True)
         found = judged(rows, images)
         good = sum(row.status == "ok" for row in rows)
         print(f"{kind}: {good} of {len(rows)} ok; {found.text}")
