@@ -22,6 +22,7 @@ from scenes import Curved, Scene, Solid
 from scenes.parts.surfaces import Cone, Cylinder, axes_beside
 
 _ON_WALL, _ON_SHOULDER, _AROUND = 20, 10, 64  # rings, and places on a ring
+_FINE = 5  # places in one of them, around, over which a form factor is summed
 _PIECES = 8  # of a cone, at whose ends it is asked whether a line passes beside it
 _SAME = 1e-6  # of the part's size
 _BOUNCES = 6
@@ -171,24 +172,24 @@ def _shoulder(solid: Solid, centre: np.ndarray, axis: np.ndarray, near: float) -
 @lru_cache(maxsize=16)
 def _factors(rings: Rings) -> np.ndarray:
     """Fourier transform around the axis of the form factors from each ring's place to places of each, (R, R, k)."""
-    turn = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], -1)
-    start = np.stack([rings.r, np.zeros_like(rings.r), rings.z], -1)[:, None, None]
-    stop = np.concatenate(
-        [rings.r[:, None, None] * turn, np.broadcast_to(rings.z[:, None, None], (len(rings.r), _AROUND, 1))], -1
+    fine = _AROUND * _FINE
+    angle = 2 * np.pi * (np.arange(fine) - _FINE // 2) / fine
+    turn, level = np.stack([np.cos(angle), np.sin(angle)], -1), np.ones((fine, 1))
+    stop, there = (
+        np.concatenate([flat[:, None, None] * turn, upright[:, None, None] * level], -1)
+        for flat, upright in ((rings.r, rings.z), (rings.outward, rings.upward))
     )
-    way = stop - start
-    square = (way**2).sum(-1)
-    square[square == 0] = np.inf  # a place itself
-    here = np.stack([rings.outward, np.zeros_like(rings.r), rings.upward], -1)[:, None, None]
-    there = np.concatenate(
-        [rings.outward[:, None, None] * turn, np.broadcast_to(rings.upward[:, None, None], (len(rings.r), _AROUND, 1))],
-        -1,
-    )
-    leaving, arriving = np.maximum((way * here).sum(-1), 0.0), np.maximum(-(way * there).sum(-1), 0.0)
-    found = leaving * arriving / (np.pi * square**2) * (rings.area / _AROUND)[None, :, None]
-    found = np.where(_passes(rings, start, stop), found, 0.0)
-    whole = found.sum((1, 2))
-    found /= np.maximum(whole, 1.0)[:, None, None]  # in an inner edge cells are no points
+    found = np.zeros((len(rings.r), len(rings.r), _AROUND))
+    for i, (r, z) in enumerate(zip(rings.r, rings.z, strict=True)):
+        way = stop - np.array([r, 0.0, z])
+        square = (way**2).sum(-1)
+        square[square == 0] = np.inf  # a place itself
+        leaving = np.maximum(way @ np.array([rings.outward[i], 0.0, rings.upward[i]]), 0.0)
+        arriving = np.maximum(-(way * there).sum(-1), 0.0)
+        each = leaving * arriving / (np.pi * square**2) * (rings.area / fine)[:, None]
+        each = np.where(each > 0, each * _passes(rings, np.array([r, 0.0, z]), stop), 0.0)
+        found[i] = each.reshape(len(rings.r), _AROUND, _FINE).sum(-1)
+    found /= np.maximum(found.sum((1, 2)), 1.0)[:, None, None]  # in an inner edge cells are no points
     return np.fft.rfft(found, axis=-1)
 
 

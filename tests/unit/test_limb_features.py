@@ -97,7 +97,14 @@ def test_a_light_on_one_side_shows_one_limb_of_a_shaft():
     assert not (lit[: len(lit) // 2].any() and lit[len(lit) // 2 :].any())
 
 
-@pytest.mark.parametrize(("kind", "sensor", "light"), [("ball", (40, 90), (40, 60)), ("cone-back", (3, 85), None)])
+@pytest.mark.parametrize(
+    ("kind", "sensor", "light"),
+    [
+        ("ball", (40, 90), (40, 60)),
+        ("cone-back", (3, 85), None),
+        ("shaft-shadow", (10, 258), ((60, 50), (55, 300))),  # shoulders lie in each other's way, and send light
+    ],
+)
 def test_diameters_tapers_and_centres_are_measured_as_predicted(kind, sensor, light):
     """Reduced form of ``python -m tests.proofs limbs``: 100 images, variance within 3.5 standard errors."""
     images = 100
