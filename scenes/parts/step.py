@@ -209,7 +209,8 @@ def _cone(point: np.ndarray, axis: np.ndarray, radius: float, angle: float, ends
     """With its radius in the middle of the face, where it is not 0 as it may be at the file's own point."""
     middle = sum(ends) / 2
     wide = radius + math.tan(angle) * middle
-    return Cone(point + middle * axis, axis, wide, math.degrees(angle), (ends[0] - middle, ends[1] - middle), hollow)
+    ends = ends[0] - middle, ends[1] - middle
+    return Cone(point + middle * axis, axis, wide, ends, hollow, half_angle_deg=math.degrees(angle))
 
 
 def _edge(edge: dict[str, Any], scale: float) -> StepEdge:

@@ -87,7 +87,7 @@ def _wall(solid: Solid, axis: np.ndarray, name: str, low: tuple[float, float], h
     if low[1] == high[1]:
         surface = Cylinder(middle * axis, axis, radius, (-half, half))
     else:
-        surface = Cone(middle * axis, axis, radius, math.degrees(math.atan(slope)), (-half, half))
+        surface = Cone(middle * axis, axis, radius, (-half, half), half_angle_deg=math.degrees(math.atan(slope)))
     return Curved(name, surface, _facets(solid, axis, low, high))
 
 

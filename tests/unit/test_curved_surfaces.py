@@ -107,7 +107,7 @@ def test_as_an_equation_of_second_degree(name):
 
 def test_one_sheet_of_a_cone_alone():
     """A line that meets the sheet beyond the apex has no root there."""
-    cone = Cone((0, 0, 0), (0, 0, 1), 1.0, 45.0)
+    cone = Cone((0, 0, 0), (0, 0, 1), 1.0, half_angle_deg=45.0)
     assert cone.ends == (pytest.approx(-1), math.inf)
     t = cone.intersections(np.array([-10.0, 0.1, -3.0]), np.array([1.0, 0, 0]))
     assert np.isinf(t).all()
@@ -202,8 +202,11 @@ def test_roots_of_quadratics_keep_their_digits(b):
         (lambda: Sphere((0, 0, math.nan), 1.0), "sphere.centre must be three numbers"),
         (lambda: Cylinder((0, 0, 0), (0, 0, 0), 1.0), "cylinder.axis must be a direction"),
         (lambda: Cylinder((0, 0, 0), (0, 0, 1), 1.0, (2, 1)), "cylinder.ends must be two rising numbers"),
-        (lambda: Cone((0, 0, 0), (0, 0, 1), 1.0, 45.0, (-2, 1)), "cone.ends must be on one side of the apex at -1"),
-        (lambda: Cone((0, 0, 0), (0, 0, 1), 1.0, 90.0), "cone.half_angle_deg must be from"),
+        (
+            lambda: Cone((0, 0, 0), (0, 0, 1), 1.0, (-2, 1), half_angle_deg=45.0),
+            "cone.ends must be on one side of the apex at -1",
+        ),
+        (lambda: Cone((0, 0, 0), (0, 0, 1), 1.0, half_angle_deg=90.0), "cone.half_angle_deg must be from"),
         (lambda: Torus((0, 0, 0), (0, 0, 1), 1.0, 2.0), "torus.radius - torus.tube must be more than 0"),
         (lambda: Plane((0, 0), (0, 0, 1)), "plane.point must be three numbers"),
         (lambda: Quadric(np.eye(3), (0, 0, math.inf), 1.0), "quadric must have finite coefficients"),

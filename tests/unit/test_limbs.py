@@ -227,7 +227,7 @@ def test_statuses(surface, status):
 
 def test_a_slight_taper_is_a_cylinder_in_the_limit():
     straight = limb(Cylinder((0, 0, 0), (0, 0, 1), 2.0, (-1, 1)), (80, 30), CAMERA, 5).strands
-    tapered = limb(Cone((0, 0, 0), (0, 0, 1), 2.0, 1e-9, (-1, 1)), (80, 30), CAMERA, 5).strands
+    tapered = limb(Cone((0, 0, 0), (0, 0, 1), 2.0, (-1, 1), half_angle_deg=1e-9), (80, 30), CAMERA, 5).strands
     for one, other in zip(straight, tapered, strict=True):
         np.testing.assert_allclose(one.at, other.at, atol=1e-6)
         assert (np.abs(one.at - other.at) > 0).any()

@@ -75,7 +75,7 @@ MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture"
 def _record(methods: int) -> np.dtype:
     judged = [
         ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
-        ("failed", "i4"), ("failures", "i4", (len(STATUSES),)), ("clean", "u1"),
+        ("failed", "i4"), ("stray", "i4"), ("failures", "i4"), ("clean", "u1"),
     ]  # fmt: skip
     return np.dtype([
         ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", judged, (methods,)),
@@ -96,6 +96,8 @@ class Rows(Sequence[Row]):
         self._records = np.zeros(len(campaign), _record(1))  # memory is taken where it is written to
         self._kinds: list[tuple[str, tuple[str, ...]]] = []  # scene and methods, which few settings differ in
         self._places: dict[tuple[str, tuple[str, ...]], int] = {}
+        self._failures: list[dict[str, int]] = []  # images by status; most settings are alike
+        self._numbered: dict[tuple[tuple[str, int], ...], int] = {}
         self.measured = Measured(len(campaign))
 
     def add(self, index: int, scene: str, model: dict[str, Any], found: dict[str, Found], each: list[Found]) -> None:
@@ -119,7 +121,7 @@ class Rows(Sequence[Row]):
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
             for name, number in one.scatter(model["value_px"]).items():
                 place[name] = number
-            place["failures"] = [one.failures.get(status, 0) for status in STATUSES]
+            place["stray"], place["failures"] = sum(one.failures.values()), self._failure(one.failures)
         self.measured.add(model["measurands"], each)
         self._size += 1
 
@@ -137,6 +139,14 @@ class Rows(Sequence[Row]):
             self._places[key] = len(self._kinds)
             self._kinds.append(key)
         return self._places[key]
+
+    def _failure(self, failures: dict[str, int]) -> int:
+        """Number of what failed how often."""
+        key = tuple(sorted(failures.items()))
+        if key not in self._numbered:
+            self._numbered[key] = len(self._failures)
+            self._failures.append(dict(key))
+        return self._numbered[key]
 
     def finish(self, scale: float | None) -> None:
         """Once all are there: the paper model's free scale, and all intervals at a time."""
@@ -178,7 +188,7 @@ class Rows(Sequence[Row]):
             return self._records["judged"][name][chosen, place]
 
         found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
-        stray = numbers("failures").sum(-1) <= statistics.STRAY * found["n"]
+        stray = numbers("stray") <= statistics.STRAY * found["n"]
         return {
             **found, "ratio": ratios(found["empirical"], found["propagated"]),
             "predicted_bias": self._records["predicted_bias"][chosen],
@@ -197,7 +207,10 @@ class Rows(Sequence[Row]):
         scene, names = self._kinds[int(record["kind"])]
         numbers = {name: float(record[name]) for name in MODEL} | {"texture": _known(record["texture"])}
         bias = numbers.pop("predicted_bias")
-        judged = [_judged(name, place, bias) for name, place in zip(names, record["judged"], strict=False)]
+        judged = [
+            _judged(name, place, self._failures[place["failures"]], bias)
+            for name, place in zip(names, record["judged"], strict=False)
+        ]
         return Row(
             index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=pairs(setting.light),
             paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=judged[0], classic=tuple(judged[1:]),
@@ -205,10 +218,9 @@ class Rows(Sequence[Row]):
         )  # fmt: skip
 
 
-def _judged(method: str, place: np.void, predicted_bias: float) -> Judged:
+def _judged(method: str, place: np.void, failures: dict[str, int], predicted_bias: float) -> Judged:
     n, propagated = int(place["n"]), float(place["propagated"])
     empirical, bias = _known(place["empirical"]), _known(place["bias"])
-    failures = {name: int(count) for name, count in zip(STATUSES, place["failures"], strict=True) if count}
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
     return Judged(
         method=method,

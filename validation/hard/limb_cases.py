@@ -30,7 +30,11 @@ def cases() -> list[Case]:
         pipe = Quadric(np.diag([0.0, 1, 1]), (0, 0, 0), -4.0)
         found.append(_half_width(f"cylinder as an equation, {name}", pipe, distance))
     for angle in (1e-12, 1e-6):
-        found.append(_half_width(f"cone of {angle:g} deg", Cone((0, 0, 0), _AXIS, 2.0, angle, (-1e-9, 1e-9)), 30.0))
+        found.append(
+            _half_width(
+                f"cone of {angle:g} deg", Cone((0, 0, 0), _AXIS, 2.0, (-1e-9, 1e-9), half_angle_deg=angle), 30.0
+            )
+        )
     found.append(_half_width("torus with a thin tube", Torus((0, 0, 0), (0, 0, 1), 1.0, 1e-9), 30.0, radius=1.0 + 1e-9))
     for name, surface in (
         ("eye on a sphere", Sphere((0, 0, 0), 30.0)),

@@ -15,7 +15,7 @@ import numpy as np
 from planner.imaging.limbs.quadrics import quadric_branches
 from planner.imaging.limbs.statuses import DEGENERATE, INSIDE, OK, TANGENT
 from planner.imaging.limbs.tori import torus_branches
-from scenes.parts.surfaces import Cone, Cylinder, Quadric, Sphere, Surface, Torus, axes_beside
+from scenes.parts.surfaces import Quadric, Sphere, Surface, Torus, axes_beside
 from scenes.parts.surfaces.ruled import Ruled
 
 _NEAR = 1e-12  # of the radius: an eye no farther from a surface stands on it
@@ -90,26 +90,7 @@ def _(surface: Sphere, eye: np.ndarray) -> Contour:
 
 
 @contour.register
-def _(surface: Cylinder, eye: np.ndarray) -> Contour:
-    return _of_ruled(surface.ruled, eye)
-
-
-@contour.register
-def _(surface: Cone, eye: np.ndarray) -> Contour:
-    return _of_ruled(surface.ruled, eye)
-
-
-@contour.register
-def _(surface: Torus, eye: np.ndarray) -> Contour:
-    return Contour(*torus_branches(surface, eye))
-
-
-@contour.register
-def _(surface: Quadric, eye: np.ndarray) -> Contour:
-    return Contour(*quadric_branches(surface, eye))
-
-
-def _of_ruled(wall: Ruled, eye: np.ndarray) -> Contour:
+def _(wall: Ruled, eye: np.ndarray) -> Contour:
     """Two generators, at the angles phi from the eye's radial with cos(phi) = r(z_e) / rho.
 
     r(z_e) is the radius at the eye's height, rho the eye's distance from the axis.
@@ -129,3 +110,13 @@ def _of_ruled(wall: Ruled, eye: np.ndarray) -> Contour:
         ends = [wall.point + z * wall.axis + (wall.radius + wall.slope * z) * toward for z in (low, high)]
         branches.append(Segment(*ends))
     return Contour(OK, tuple(branches))
+
+
+@contour.register
+def _(surface: Torus, eye: np.ndarray) -> Contour:
+    return Contour(*torus_branches(surface, eye))
+
+
+@contour.register
+def _(surface: Quadric, eye: np.ndarray) -> Contour:
+    return Contour(*quadric_branches(surface, eye))

@@ -5,7 +5,9 @@ Nothing of it needs the apex, so a slight taper is as well told as none.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,15 +17,36 @@ from scenes.parts.surfaces.surface import axes_beside, outwards
 _PARALLEL = 1e-14  # squared sine of the angle between a line and a generator below which they are parallel
 
 
-class Ruled(NamedTuple):
-    """Point of the axis, unit axis, radius there, slope k, ends (z0, z1), and whether the material is outside."""
+@dataclass(frozen=True, eq=False)
+class Ruled:
+    """What `scenes.parts.surfaces.Cylinder` and `Cone` have, and tell by the same formulas (see `Surface`).
+
+    Attributes
+    ----------
+    point : ndarray, shape (3,)
+        On the axis.
+    axis : ndarray, shape (3,)
+        Unit vector.
+    radius : float
+        At the point.
+    ends : tuple of float
+        Between which heights z0..z1 over the point, along the axis; infinite where not given.
+    hollow : bool
+        Whether the material is outside.
+    """
 
     point: np.ndarray
     axis: np.ndarray
     radius: float
-    slope: float
-    ends: tuple[float, float]
-    hollow: bool
+    ends: tuple[float, float] = (-math.inf, math.inf)
+    hollow: bool = False
+
+    parameters: ClassVar[tuple[str, ...]]
+
+    @property
+    def slope(self) -> float:
+        """Growth of the radius along the axis."""
+        return 0.0
 
     @property
     def cosine(self) -> float:
@@ -41,37 +64,41 @@ class Ruled(NamedTuple):
         return height, far, radial
 
     def values(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance of points (..., 3) near the wall, (...)."""
         height, far, _ = self.split(points)
         return outwards(self.hollow) * self.cosine * (far - (self.radius + self.slope * height))
 
     def normals(self, points: np.ndarray) -> np.ndarray:
+        """Unit normals away from the material, (..., 3)."""
         return outwards(self.hollow) * self.cosine * (self.split(points)[2] - self.slope * self.axis)
 
     def shape_operator(self, points: np.ndarray) -> np.ndarray:
+        """Derivative of the normal by the place, (..., 3, 3)."""
         _, far, radial = self.split(points)
         around = np.cross(self.axis, radial)
         bend = outwards(self.hollow) * self.cosine / far
         return bend[..., None, None] * around[..., :, None] * around[..., None, :]
 
     def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Along a tangent with parts x around and s along the generator the curvature falls as the radius grows."""
+        """Third derivative of the height along tangents (..., 3): the curvature falls as the radius grows, (...)."""
         _, far, radial = self.split(points)
         around = (tangents * np.cross(self.axis, radial)).sum(-1)
         upwards = tangents @ self.axis
         return outwards(self.hollow) * 3 * self.cosine * around**2 * self.slope * upwards / far**2
 
-    def shifts(self, points: np.ndarray, taper: bool) -> np.ndarray:
-        """For the point (3), two tilts of the axis, the radius, and with ``taper`` the half angle."""
+    def shifts(self, points: np.ndarray) -> np.ndarray:
+        """Move along the normal for a change of each parameter, the half angle in rad, (..., p)."""
         normals = self.normals(points)
         height, _, _ = self.split(points)
         away, sign = points - self.point, outwards(self.hollow)
         tilts = [turned(away, self.axis, beside, normals) for beside in axes_beside(self.axis)]
         columns = [*np.moveaxis(normals, -1, 0), *tilts, np.full(height.shape, sign * self.cosine)]
-        if taper:
+        if "half_angle" in self.parameters:
             columns.append(sign * height / self.cosine)
         return np.stack(columns, -1)
 
     def intersections(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Where lines meet this sheet, (..., 2)."""
         origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
         away = origins - self.point
         up = directions @ self.axis
@@ -98,11 +125,12 @@ class Ruled(NamedTuple):
         return np.sort(np.where(keep, found, np.inf), axis=-1)
 
     def within(self, points: np.ndarray) -> np.ndarray:
+        """Whether points lie between its ends, (...)."""
         height = (points - self.point) @ self.axis
         return (height >= self.ends[0]) & (height <= self.ends[1])
 
     def area_points(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Points (..., 3) that cover the surface evenly by area as u, v cover the unit square."""
+        """Points (..., 3) evenly by area as u, v cover the unit square; for finite ends."""
         low, high = self.ends
         start = self.radius + self.slope * low
         along = (high - low) * np.asarray(v, float)
