@@ -124,7 +124,7 @@ def rings_of(solid: Solid) -> Rings | None:
     heights = [float((wall.point - origin) @ axis) for wall in walls]
     beside = [np.linalg.norm(wall.point - origin - z * axis) for wall, z in zip(walls, heights, strict=True)]
     ends = [(z + wall.ends[0], z + wall.ends[1]) for wall, z in zip(walls, heights, strict=True)]
-    radii = [tuple(wall.radius + getattr(wall, "slope", 0.0) * end for end in wall.ends) for wall in walls]
+    radii = [tuple(wall.radius + wall.slope * end for end in wall.ends) for wall in walls]
     aligned = max(beside) <= near and all(wall.axis @ axis > 1 - _SAME for wall in walls)
     if not aligned or any(abs(a[1] - b[0]) > near for a, b in pairwise(ends)):
         return None
