@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import scenes
 from planner.features.limb_outline import limb_outline
 from planner.features.limbs import limb_rim
+from planner.features.measurand import measurands
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import sensor_position
+from planner.jitter import _half_angle
 from render import Quality
 from scenes import Ball, InvalidInput, Turned
 from tests.proofs.centres import centre_at, scene_beside
@@ -144,3 +147,24 @@ def test_the_ellipse_s_centre_is_not_taken_for_the_ball_s():
     assert found.agrees, found
     assert found.as_ellipse > 50
     assert found.fitted < 0.01
+
+
+def test_a_taper_seen_from_elsewhere_is_another():
+    """To who trusts the pose: the angle between both lines' images is that of a cone with the half angle told."""
+    scene = cone_of(scenes.load("shaft"))
+    camera = scene.camera.model_copy(update={"distance": 20 * 270.0, "focal_px": 20 * 1200.0})  # nearly parallel
+    scene, cone = scene.model_copy(update={"camera": camera}), scene.solid.curved[0]
+
+    def opening(pose, by=0.0):
+        outline = limb_outline(
+            cone.moved(sensor_position(camera, np.array(pose)), (0, 0, 0, by)), np.array(pose), camera
+        )
+        along = np.split(outline.outward[outline.seen], 2)
+        return float(along[0][0] @ along[1][0])
+
+    here, there = (75.0, 15.0), (75.5, 15.8)
+    seen = [measurands(Pictures.of(scene, np.array(pose))).seen for pose in (here, there)]
+    change = float(_half_angle(*seen, cone)) - cone.half_angle
+    found = brentq(lambda by: opening(here, by) - opening(there), -0.05, 0.05)
+    assert abs(change) > 1e-3
+    assert change == pytest.approx(found, rel=0.02)
