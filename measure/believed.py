@@ -21,7 +21,7 @@ def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
     ----------
     picture : Picture
         As it is believed to be taken.
-    errors : ndarray, shape (n, 2 E + 3 C)
+    errors : ndarray, shape (n, q)
         Of lines and circles, as numbered in `planner.features.seen`.
 
     Returns
@@ -43,7 +43,7 @@ def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
     normal = np.broadcast_to(known.seen.normals, along.shape)
     points = known.seen.start + offset * normal + image_centre(known.seen.camera)
     turned = unit_normals(along + turn * np.linalg.norm(along, axis=-1, keepdims=True) * normal)
-    circles = errors[:, 2 * edges :].reshape(len(errors), -1, 3).swapaxes(0, 1)
+    circles = tuple(errors[:, known.seen.numbers(c)] for c in range(len(known.circles)))
     seen = found_in_images(known, layout_of(picture), turned, points, circles)
     none = np.zeros((len(errors), errors.shape[1], errors.shape[1]))
     return values(seen, known.quantities, on_plane, none).value

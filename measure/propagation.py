@@ -137,7 +137,9 @@ def _responses(
         parts.append(_of_lines(clean, picture, layout, found, estimator, threshold))
     for name, circle in zip(found.known.circles, found.circles, strict=True):
         good = str(circle.state[0]) in status.MEASURED
-        parts.append(circle_response(clean, picture, name) if good else np.full((3, clean.size), np.nan))
+        parts.append(
+            circle_response(clean, picture, name) if good else np.full((circle.errors.shape[1], clean.size), np.nan)
+        )
     rows = np.concatenate(parts)
     lost = ~np.isfinite(rows).all(1)
     return np.where(lost[:, None], 0.0, rows), lost

@@ -94,8 +94,8 @@ def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float 
     first = picture.scene.locator.thresholds[0]
     shape = find_shape(images, layout, estimator, first if threshold is None else threshold)
     circles = tuple(find_circle(images, picture, name) for name in known.circles)
-    seen = found_in_images(known, layout, shape.normals, shape.points, np.array([c.errors for c in circles]))
-    errors = _errors(shape, circles)
+    seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles))
+    errors = _errors(shape, circles, known.seen)
     return Found(
         known=known,
         shape=shape,
@@ -107,9 +107,9 @@ def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float 
 
 
 def found_in_images(
-    known: Measurands, layout: Layout, normals: np.ndarray, points: np.ndarray, circle_errors: np.ndarray
+    known: Measurands, layout: Layout, normals: np.ndarray, points: np.ndarray, circle_errors: tuple[np.ndarray, ...]
 ) -> Seen:
-    """What is seen in n images: lines of unit normals and points (n, E, 2), and errors (C, n, 3) of the circles."""
+    """What is seen in n images: lines of unit normals and points (n, E, 2), and errors (n, p) of each circle."""
     expected, count = known.seen, len(normals)
     names = known.view.names
     corners = {}
@@ -119,9 +119,11 @@ def found_in_images(
     lengths = np.linalg.norm(expected.along, axis=-1)[:, None]
     centres = np.broadcast_to(expected.centres, (count, *expected.centres.shape)).copy()
     radii = np.broadcast_to(expected.radii, (count, *expected.radii.shape)).copy()
+    angles = np.broadcast_to(expected.half_angles, (count, *expected.half_angles.shape)).copy()
     for c, (name, errors) in enumerate(zip(known.circles, circle_errors, strict=True)):
         centres[:, c] += errors[:, :2] @ np.array(expected.sideways(expected.solid.round(name)))
         radii[:, c] += errors[:, 2]
+        angles[:, c] += errors[:, 3:].sum(1)
     return Seen(
         solid=expected.solid,
         camera=expected.camera,
@@ -133,6 +135,7 @@ def found_in_images(
         circles=known.circles,
         centres=centres,
         radii=radii,
+        half_angles=angles,
         expected=False,
     )
 
@@ -158,12 +161,12 @@ def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
     return np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread)
 
 
-def _errors(shape: Shape, circles: tuple[Circles, ...]) -> np.ndarray:
+def _errors(shape: Shape, circles: tuple[Circles, ...], seen: Seen) -> np.ndarray:
     count, edges = len(shape.lines), shape.lines.shape[-1]
-    whole = np.zeros((count, edges + 3 * len(circles), edges + 3 * len(circles)))
+    whole = np.zeros((count, seen.count, seen.count))
     whole[:, :edges, :edges] = shape.lines
     for c, circle in enumerate(circles):
-        part = slice(edges + 3 * c, edges + 3 * c + 3)
+        part = seen.numbers(c)
         whole[:, part, part] = circle.covariance
     return whole
 

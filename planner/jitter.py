@@ -9,9 +9,9 @@ import numpy as np
 
 from planner.features.kinds import on_plane
 from planner.features.measurand import Measurands, measurands
-from planner.features.seen import Seen
+from planner.features.seen import Seen, half_angle_of
 from planner.imaging.pictures import Pictures
-from scenes import Centre, Curved, Scene, Wall
+from scenes import Centre, Circle, Curved, Scene, Wall
 
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
 
@@ -84,7 +84,7 @@ def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
     """What is found, circles too: their centres sought along the rays, their radii by the depth."""
     if not found.circles:
         return found
-    centres, radii = [], []
+    centres, radii, angles = [], [], []
     for c, name in enumerate(found.circles):
         centre, each = here.seen.centres[..., c, :], found.solid.round(name)
         feature = Wall(surface=name) if isinstance(each, Curved) else Centre(circle=name)
@@ -95,4 +95,19 @@ def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
         depths = there.seen.depth(there.seen.centres[..., c, :]), found.depth(seen)
         centres.append(seen)
         radii.append(found.radii[..., c] * depths[1] / depths[0])
-    return replace(found, centres=np.stack(centres, -2), radii=np.stack(radii, -1))
+        angles.append(_half_angle(here.seen, there.seen, each))
+    return replace(found, centres=np.stack(centres, -2), radii=np.stack(radii, -1), half_angles=np.stack(angles, -1))
+
+
+def _half_angle(here: Seen, there: Seen, each: Circle | Curved) -> np.ndarray:
+    """Of a cone, rad, to who believes in another pose; 0 of what is none.
+
+    From afar the sine of half the angle between both limbs is that of the half angle over that between axis and sight.
+    """
+    if half_angle_of(each) == 0:
+        return np.zeros(there.eye.shape[:-1])
+    sines = []
+    for seen in (here, there):
+        sight = each.centre - seen.eye
+        sines.append(np.linalg.norm(np.cross(sight, each.surface.axis), axis=-1) / np.linalg.norm(sight, axis=-1))
+    return np.arcsin(np.clip(np.sin(each.half_angle) * sines[0] / sines[1], -1, 1))

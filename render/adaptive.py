@@ -33,6 +33,23 @@ def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP) -> np.ndarray:
     return maximum_filter(marked, 2 * reach + 1) if reach else marked
 
 
+def bent(fine: np.ndarray, step: float = STEP) -> np.ndarray:
+    """Fine pixels at which, or beside which, brightness does not run on evenly, as a mask: not those of a slope alone.
+
+    >>> bent(np.array([[0.0, 1, 2, 3, 4, 60, 60, 60, 60]]), 0.1).astype(int)
+    array([[0, 0, 0, 1, 1, 1, 1, 0, 0]])
+    """
+    wide = np.pad(fine, 1, mode="reflect", reflect_type="odd") if min(fine.shape) > 1 else np.pad(fine, 1, mode="edge")
+    rows, columns = fine.shape
+
+    def beside(y: int, x: int) -> np.ndarray:
+        return wide[1 + y : 1 + y + rows, 1 + x : 1 + x + columns]
+
+    ways = (0, 1), (1, 0), (1, 1), (1, -1)
+    bend = np.max([np.abs(beside(y, x) + beside(-y, -x) - 2 * fine) for y, x in ways], axis=0)
+    return maximum_filter(bend > step * max(float(fine.max()), np.finfo(float).tiny), 3)
+
+
 def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
     """Fine pixels of the crop that edges and circles are located from, and their surroundings, as a mask."""
     locator, shape = picture.scene.locator, [(part.stop - part.start) // supersample for part in crop]

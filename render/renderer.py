@@ -14,7 +14,7 @@ from planner.imaging.backlight import backlights
 from planner.imaging.lens import confusion, recorded
 from planner.imaging.projection import depth, project_ideal
 from render import variant as variants
-from render.adaptive import crossed, near_edges, refine
+from render.adaptive import bent, crossed, near_edges, refine
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.large import Renders, fine_pixels, is_large
 from render.mosaic import mosaic, refine_tiles
@@ -23,7 +23,9 @@ from render.parts import Part, parts, within_cone
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
-from scenes import InvalidInput, Picture, Scene
+from scenes import Backlight, InvalidInput, Picture, Scene
+
+_NEAR = 16  # rays of a fine pixel beside an edge, where what is random is faint
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,10 @@ class Quality:
         Rays of a fine pixel that an edge crosses, a square number; 256 when not given, but in scalar variants 64 for a
         diffuse surface, and 16 for the paper's reflectance where it has no texture (`render.texture`) and runs as
         interpreted Python, some 40 times slower. Where single rays are random all pixels that the task's edges are
-        located from get as many.
+        located from get as many; of curved parts whose random light is faint, in scalar variants, 16.
     random_samples : int, optional
         Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
-        light of finite size), a square number; 16 when not given.
+        light of finite size), a square number; 16 when not given, 4 in scalar variants where that light is faint.
     seed : int
 
     On Task1's 16 settings, eight seeds, a scalar variant's lines lie within 0.00024 px (rms; 0.0007 at most) of the
@@ -142,6 +144,18 @@ def _even(part: Part) -> bool:
     return part.active & MANY_WAYS == {"light_size"} and is_plain(part.picture.scene) and not part.silhouette
 
 
+def _quiet(part: Part, sharp: frozenset[str]) -> bool:
+    """Whether what is random about the rays is but a small part of the light: on curved parts, what faces send to each
+    other, and what a backlight sends round them."""
+    picture = part.picture
+    round_the_part = isinstance(picture.scene.lights[0], Backlight)
+    return (
+        bool(picture.scene.solid.curved)
+        and not part.silhouette
+        and (round_the_part or part.active - sharp == {"interreflection"})
+    )
+
+
 def _defocus(picture: Picture) -> float:
     """Radius of the largest circle of confusion, px."""
     camera = picture.scene.camera
@@ -160,11 +174,12 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
     if textures is not None and smooth:
         active = sharp
     interpreted = scalar and bool(active & CUSTOM) and (textures is None or sharp != active)
-    plain = scalar and (textures is None or not active & CUSTOM)
+    plain, quiet = scalar and (textures is None or not active & CUSTOM), scalar and _quiet(part, sharp)
     many = quality.edge_samples or (16 if interpreted else 64 if plain else 256)
-    samples = quality.samples or (1 if scalar and not picture.scene.textures else 4)
+    even_faces = not picture.scene.textures and not (picture.scene.solid.curved and sharp == active)
+    samples = quality.samples or (1 if scalar and even_faces else 4)
 
-    few = quality.random_samples or 16
+    few = quality.random_samples or (4 if quiet else 16)
     bounces = SURFACES - 1 if "interreflection" in active else 0
     large = is_large(crop, k, sharp != active)
     at_once = LARGE_AT_ONCE if large else AT_ONCE
@@ -206,9 +221,16 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
         bare = picture.with_scene(picture.scene.model_copy(update={"textures": ()}))
         plain = textured(bare, sharp) if textures is not None else None
         even = rendered(load(sharp, 1, plain, shown=bare))
-    marked = crossed(even, math.ceil(k * _defocus(picture)))
+    away = math.ceil(k * _defocus(picture))
+    marked = crossed(even, away)
+    if picture.scene.solid.curved and not away:
+        marked &= bent(even)  # their shading slopes more than a plane face's
     if sharp != active:
         loaded = load(active, few)
-        marked |= near_edges(picture, crop, k)
+        near = near_edges(picture, crop, k)
         fine = rendered(loaded) if scalar else refine(loaded, rays, fine, np.ones_like(marked), few)
+        if quiet:
+            fine = again(loaded, active, fine, near & ~marked, min(_NEAR, many))
+        else:
+            marked |= near
     return again(loaded, active, fine, marked, many)

@@ -8,6 +8,7 @@ import numpy as np
 
 from scenes.measurands import Centre, Corner, Quantity, Side, Wall
 from scenes.parts.solid import Solid
+from scenes.parts.surfaces import Cone, Sphere
 
 _FLAT = 1e-6  # of the object's size: how far a feature may be from the plane of the others
 _PARALLEL = 1e-6  # sine of an angle that is none
@@ -36,6 +37,7 @@ def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:
     for one, other in combinations(quantity.features, 2):
         if place_of(one) == place_of(other):
             raise ValueError(f"{key} must be different features, got {place_of(one)!r} twice")
+    _check_shape(solid, key, quantity)
     if quantity.kind == "distance":
         return
     points = points_of(solid, quantity)
@@ -46,6 +48,17 @@ def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:
         raise ValueError(f"{key} must be edges that are not parallel, got {', '.join(quantity.edges)}")
     if quantity.kind == "width" and np.linalg.norm(np.cross(*along)) > np.sin(np.radians(30)):
         raise ValueError(f"{key} must be edges within 30 degrees of parallel, got {', '.join(quantity.edges)}")
+
+
+def _check_shape(solid: Solid, key: str, quantity: Quantity) -> None:
+    """A taper is a cone's, a position without datum edges a ball's."""
+    wanted = {"taper": Cone, "position": Sphere}.get(quantity.kind)
+    if wanted is None or not isinstance(quantity.features[0], Wall):
+        return
+    name = quantity.features[0].surface
+    if not isinstance(solid.round(name).surface, wanted):
+        word = {Cone: "a cone", Sphere: "a ball"}[wanted]
+        raise ValueError(f"{key} must be {word} for kind {quantity.kind}, got {name!r}")
 
 
 def place_of(feature: Corner | Centre | Side | Wall) -> str:

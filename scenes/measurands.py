@@ -9,18 +9,24 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenes.model import Model, Title
-from scenes.ranges import Length, Positive
+from scenes.ranges import Coordinate, Positive
 
-Kind = Literal["distance", "width", "offset", "angle", "diameter", "position"]
+Kind = Literal["distance", "width", "offset", "angle", "diameter", "taper", "position"]
 _WANTED = {
-    "distance": "pp",
-    "width": "ee",
-    "offset": "pe",
-    "angle": "ee",
-    "diameter": "r",
-    "position": "pee",
-}  # of each kind the features in their order: p a corner or centre, r a circle or a curved surface, e an edge
-_WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "e": "an edge"}
+    "distance": ("pp",),
+    "width": ("ee",),
+    "offset": ("pe",),
+    "angle": ("ee",),
+    "diameter": ("r",),
+    "taper": ("s",),
+    "position": ("pee", "s"),
+}  # of each kind the features in their order: p a corner or centre, r a circle or a curved surface s, e an edge
+_WORDS = {
+    "p": "a corner or a circle",
+    "r": "a circle or a curved surface",
+    "s": "a curved surface",
+    "e": "an edge",
+}
 
 
 class Corner(Model):
@@ -118,7 +124,7 @@ class Quantity:
         Of the measurand; a position's two coordinates are NAME.x, from its first datum edge, and NAME.y, from its
         second.
     features : tuple
-        A coordinate's are the feature and that datum edge.
+        A coordinate's are the feature and that datum edge; a ball has none.
     nominal : float or None
         The value that is wanted, in the scene's unit or degrees; the object's own where None.
     tolerance : Tolerance or None
@@ -141,7 +147,12 @@ class Quantity:
     @property
     def is_angle(self) -> bool:
         """Whether its unit is degrees."""
-        return self.kind == "angle"
+        return self.kind in ("angle", "taper")
+
+    @property
+    def axis(self) -> int:
+        """Of a ball's coordinate: 0 for x, 1 for y."""
+        return int(self.name.endswith(".y"))
 
 
 class Measurand(Model):
@@ -149,8 +160,9 @@ class Measurand(Model):
 
     ``distance`` between two corners or centres of circles; ``width`` from the middle of the first edge to the line of
     the second; ``offset`` of a corner or centre from the line of an edge; ``angle`` between two edges; ``diameter`` of
-    a circle, a ball or a round wall, a cone's in its middle; ``position`` of a corner or centre from two datum edges,
-    as two offsets with two nominal values.
+    a circle, a ball or a round wall, a cone's in its middle; ``taper`` of a cone, the angle between opposite lines of
+    its wall; ``position`` of a corner or centre from two datum edges, as two offsets with two nominal values, or of a
+    ball's centre in the scene's x and y, its z being that of the scene.
     """
 
     name: Title
@@ -159,7 +171,7 @@ class Measurand(Model):
     """What is measured of the features."""
     features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=3)]
     """Corners, circles and edges, in the order that the kind asks for."""
-    nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Length, Length] | None = None
+    nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
     """The value that is wanted, the scene's unit or degrees; two for a position; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
     """How far the value may lie from it, the scene's unit or degrees: one number for both sides, or plus and minus."""
@@ -171,12 +183,15 @@ class Measurand(Model):
         wanted = _WANTED[self.kind]
         if not self.name or not self.name.isprintable():
             raise ValueError(f"name must be a printable text, got {self.name!r}")
-        if len(self.features) != len(wanted) or not all(map(_is, wanted, self.features)):
+        if not any(len(self.features) == len(each) and all(map(_is, each, self.features)) for each in wanted):
             got = ", ".join(" ".join(feature.edges) for feature in self.features)
-            raise ValueError(f"features must be {_list(wanted)} for kind {self.kind}, got {got}")
+            told = "; or ".join(map(_list, wanted))
+            raise ValueError(f"features must be {told} for kind {self.kind}, got {got}")
         if self.nominal is not None and isinstance(self.nominal, tuple) != (self.kind == "position"):
             number = "two numbers" if self.kind == "position" else "one number"
             raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
+        if isinstance(self.nominal, tuple) and len(self.features) > 1 and not min(self.nominal) > 0:
+            raise ValueError(f"nominal must be two numbers greater than 0 from datum edges, got {self.nominal}")
         return self
 
     @property
@@ -185,14 +200,15 @@ class Measurand(Model):
         if self.kind != "position":
             return (Quantity(self.name, self.kind, self.features, self.nominal, self.tolerance, self.weight),)
         feature, *datums = self.features
+        each = [(datum,) for datum in datums] or [(), ()]
         return tuple(
-            Quantity(f"{self.name}.{axis}", self.kind, (feature, datum), nominal, self.tolerance, self.weight)
-            for axis, datum, nominal in zip("xy", datums, self.nominal or (None, None), strict=True)
+            Quantity(f"{self.name}.{axis}", self.kind, (feature, *datum), nominal, self.tolerance, self.weight)
+            for axis, datum, nominal in zip("xy", each, self.nominal or (None, None), strict=True)
         )
 
 
 def _is(wanted: str, feature: Corner | Centre | Side | Wall) -> bool:
-    kinds = {"p": (Corner, Centre), "r": (Centre, Wall), "e": Side}
+    kinds = {"p": (Corner, Centre), "r": (Centre, Wall), "s": Wall, "e": Side}
     return isinstance(feature, kinds[wanted])
 
 

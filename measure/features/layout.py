@@ -171,7 +171,8 @@ def layout_of(picture: Picture) -> Layout:
     view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
     seen = facing(solid, pictures.sensor_at)
-    shadings = face_shadings(pictures) if picture.lights else [None] * len(solid.faces)
+    wanted = picture.lights and names  # beside no edge nobody asks for it
+    shadings = face_shadings(pictures) if wanted else [None] * len(solid.faces)
     turned = [edge for edge in solid.edges if seen[list(edge.faces)].any()]  # trimmed for whatever the light may be
     if any(shadings):
         seen = seen & np.array([shading is not None for shading in shadings])

@@ -43,10 +43,10 @@ class Circles:
 
     Attributes
     ----------
-    errors : ndarray, shape (n, 3)
+    errors : ndarray, shape (n, p)
         Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius;
-        of a curved surface those of `Curved.parameters`.
-    covariance : ndarray, shape (n, 3, 3)
+        of a curved surface those of `Curved.parameters`, of a cone four.
+    covariance : ndarray, shape (n, p, p)
     state : ndarray of str, shape (n,)
     near : ndarray of bool, shape (n,)
         Whether so many points are found that the circle must be where they say, or near it.
@@ -60,12 +60,12 @@ class Circles:
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
     """A circle or a curved surface of the object in images (n, height, width)."""
-    return _find(images, picture, name, (0.0, 0.0, 0.0), _PASSES)
+    return _find(images, picture, name, _unmoved(picture, name), _PASSES)
 
 
 def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarray:
-    """Derivative of the circle's three parameters by the pixels of a noise-free image, (3, height * width)."""
-    moved = (0.0, 0.0, 0.0)
+    """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width)."""
+    moved = _unmoved(picture, name)
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
@@ -76,6 +76,11 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarra
         moved = _rounded(tool, np.array(moved) + change)
     taken = points.valid[0] & (tool.weights > 0)
     return fit[0][:, taken] @ response[np.flatnonzero(taken)]
+
+
+def _unmoved(picture: Picture, name: str) -> tuple[float, ...]:
+    each = picture.scene.solid.round(name)
+    return (0.0,) * (each.count if isinstance(each, Curved) else 3)
 
 
 def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, ...], passes: int) -> Circles:
@@ -98,11 +103,11 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
 
 
 def _measured(images: np.ndarray, tool: RimTool) -> Circles:
-    count = len(images)
+    count, numbers = len(images), tool.design.shape[1]
     if tool.state not in status.MEASURED:
         return Circles(
-            np.full((count, 3), np.nan),
-            np.full((count, 3, 3), np.nan),
+            np.full((count, numbers), np.nan),
+            np.full((count, numbers, numbers), np.nan),
             np.full(count, tool.state),
             np.zeros(count, bool),
         )
@@ -119,13 +124,13 @@ def _measured(images: np.ndarray, tool: RimTool) -> Circles:
 
 
 def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
-    """Covariance (n, 3, 3) at the contrast that each image shows."""
+    """Covariance (n, p, p) at the contrast that each image shows."""
     contrast = np.where(points.valid, points.contrast, 0.0)
     number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
     smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
     inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
     rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
-    rows = rows.reshape(len(images), 3, -1)
+    rows = rows.reshape(len(images), fit.shape[1], -1)
     used = images.reshape(len(images), -1)[:, tool.locator.pixels]
     variance = tool.optics.noise_at(used)
     variance = tool.optics.noise_variance if variance is None else variance[:, None]
@@ -133,7 +138,7 @@ def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> n
 
 
 def _is_far(tool: RimTool, errors: np.ndarray) -> np.ndarray:
-    """Whether circles with errors (n, 3) are farther from the expected one than the locator captures, bool (n,)."""
+    """Whether circles with errors (n, p) are farther from the expected one than the locator captures, bool (n,)."""
     return np.abs(np.nan_to_num(errors) @ tool.design.T).max(-1) > _CAPTURE
 
 

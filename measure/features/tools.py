@@ -1,4 +1,4 @@
-"""What measures a circle or a curved surface from places around it: three numbers by least squares."""
+"""What measures a circle or a curved surface from places around it: three numbers or four, by least squares."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class RimTool:
     Attributes
     ----------
     locator : CrossingLocator
-    design : ndarray, shape (m, 3)
-        Derivative of each place's offset by its three parameters, ideal px for the scene's unit.
+    design : ndarray, shape (m, p)
+        Derivative of each place's offset by its p parameters, ideal px for the scene's unit.
     weights : ndarray, shape (m,)
         Of the places in the least squares: the length that each stands for, and where the light is known the squared
         contrast over the noise's variance; 0 where it is not taken.
@@ -43,15 +43,15 @@ class RimTool:
         return self.locator.unit_response()
 
     def fit(self, valid: np.ndarray) -> np.ndarray:
-        """Least-squares maps (n, 3, m) from offsets at the valid places (n, m) to the three parameters."""
+        """Least-squares maps (n, p, m) from offsets at the valid places (n, m) to the parameters."""
         weights = self.weights * valid
         gram = np.einsum("nm,mi,mj->nij", weights, self.design, self.design)
         scale = np.sqrt(np.einsum("nii->ni", gram))
         good = (scale > 0).all(-1)
-        scale[~good], gram[~good] = 1.0, np.eye(3)
+        scale[~good], gram[~good] = 1.0, np.eye(self.design.shape[1])
         unit = gram / (scale[:, :, None] * scale[:, None, :])
         good &= np.linalg.eigvalsh(unit)[:, 0] > 1e-8
-        unit[~good] = np.eye(3)
+        unit[~good] = np.eye(self.design.shape[1])
         found = np.linalg.inv(unit) / (scale[:, :, None] * scale[:, None, :])
         found = np.einsum("nij,mj,nm->nim", found, self.design, weights)
         found[~good] = np.nan

@@ -44,7 +44,7 @@ class Features:
         return measurands(self.pictures)
 
     def errors(self, station: Station) -> np.ndarray:
-        """Errors of lines and circles, as numbered in `planner.features.seen`, shape (2 E + 3 C,).
+        """Errors of lines and circles, as numbered in `planner.features.seen`, shape (q,).
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
         circle's centre in its plane and change of its radius (the scene's unit). NaN where a feature is not seen.
@@ -78,7 +78,7 @@ class Features:
 
     @cached_property
     def _rims(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (3, n)."""
+        """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (p, n)."""
         found = []
         for name in self.known.circles:
             circle = self.pictures.scene.solid.round(name)
@@ -111,15 +111,15 @@ class Features:
 
 
 def _fit(seen: Rim) -> np.ndarray:
-    """Weighted least squares from offsets around a rim to its circle, (3, n); NaN where it is not found."""
+    """Weighted least squares from offsets around a rim to its circle, (p, n); NaN where it is not found."""
     ratio = seen.squared / seen.noise_variance
     used = (seen.clear | seen.crowded[..., None]) & (ratio >= MIN_CONTRAST**2)
     weight = np.where(used, ratio * seen.arc, 0.0)
     size = np.sqrt(np.einsum("n,ni,ni->i", weight, seen.design, seen.design))
     if not (size > 0).all():
-        return np.full((3, len(weight)), np.nan)
+        return np.full((seen.design.shape[1], len(weight)), np.nan)
     design = seen.design / size
     gram = np.einsum("n,ni,nj->ij", weight, design, design)
     if np.linalg.eigvalsh(gram)[0] < 1e-10:
-        return np.full((3, len(weight)), np.nan)
+        return np.full((seen.design.shape[1], len(weight)), np.nan)
     return np.linalg.solve(gram, (design * weight[:, None]).T) / size[:, None]

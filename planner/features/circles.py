@@ -37,9 +37,9 @@ class Rim:
 
     Attributes
     ----------
-    design : ndarray, shape (..., n, 3)
-        Derivative of each point's place along its normal by the circle's three parameters (`planner.features.seen`), px
-        for the scene's unit.
+    design : ndarray, shape (..., n, p)
+        Derivative of each point's place along its normal by the circle's three parameters (`planner.features.seen`;
+        a cone's four), px for the scene's unit.
     arc : ndarray, shape (..., n)
         Length of image that each point stands for, px.
     squared : ndarray, shape (..., n)
@@ -130,9 +130,10 @@ def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:
     enough = enough & np.isfinite(information).all((-1, -2))
     size = np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1)))
     enough &= (size > 0).all(-1)
+    same = np.eye(size.shape[-1])
     size = np.where(enough[..., None], size, 1.0)
-    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), np.eye(3))
+    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), same)
     enough &= np.linalg.eigvalsh(scaled)[..., 0] > 1e-10
-    scaled = np.where(enough[..., None, None], scaled, np.eye(3))
+    scaled = np.where(enough[..., None, None], scaled, same)
     inverse = np.linalg.inv(scaled) / (size[..., None] * size[..., None, :])
-    return np.where(enough[..., None, None], inverse, np.diag(np.full(3, np.inf)))
+    return np.where(enough[..., None, None], inverse, np.diag(np.full(len(same), np.inf)))

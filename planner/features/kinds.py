@@ -29,6 +29,10 @@ def in_image(seen: Seen, quantity: Quantity) -> Evaluated:
     """In the image: px, or degrees."""
     if quantity.kind == "diameter":
         return _diameter_in_image(seen, quantity)
+    if quantity.kind == "taper":
+        return _taper(seen, quantity)
+    if _is_own(quantity):
+        return _coordinate(seen, quantity, _along_axis(seen, quantity))
     return _KINDS[quantity.kind](seen, quantity, None, _side(seen, quantity, in_space=False))
 
 
@@ -40,6 +44,10 @@ def on_plane(seen: Seen, quantity: Quantity) -> Evaluated:
     if quantity.kind == "diameter":
         _, _, radius, number = seen.circle(quantity.features[0])
         return Evaluated(2 * radius, {number: np.full(np.shape(radius), 2.0)})
+    if quantity.kind == "taper":
+        return _taper(seen, quantity)
+    if _is_own(quantity):
+        return _coordinate(seen, quantity, 1.0)
     plane = _plane(seen, quantity)
     return _KINDS[quantity.kind](seen, quantity, plane, _side(seen, quantity, in_space=True))
 
@@ -133,6 +141,47 @@ def _diameter_in_image(seen: Seen, quantity: Quantity) -> Evaluated:
     per_length = seen.camera.focal_px / seen.depth(centre.at)
     forward = -2 * (radius * per_length / seen.depth(centre.at))[..., None] * seen.axes.forward
     return Evaluated(2 * radius * per_length, {**_sum([(forward, centre.moves)]), number: 2 * per_length})
+
+
+def _taper(seen: Seen, quantity: Quantity) -> Evaluated:
+    """Angle between opposite lines of a cone's wall, degrees: no foreshortening, in the image either."""
+    angle, number = seen.half_angle(quantity.features[0])
+    sign = np.sign(seen.solid.round(quantity.features[0].surface).half_angle)
+    return Evaluated(2 * _DEGREE * sign * angle, {number: np.full(np.shape(angle), 2 * _DEGREE * sign)})
+
+
+def _is_own(quantity: Quantity) -> bool:
+    """Whether it is a ball's coordinate in the scene's own axes."""
+    return quantity.kind == "position" and len(quantity.features) == 1
+
+
+def _level(seen: Seen, quantity: Quantity) -> Point:
+    """A ball's centre along the line of sight to it, at the height that the scene gives it."""
+    curved, found, _, _ = seen.circle(quantity.features[0])
+    sight = found.at - seen.eye
+    reach = (curved.centre[2] - seen.eye[..., 2]) / sight[..., 2]
+    moves = {
+        k: reach[..., None] * (move - sight * (move[..., 2] / sight[..., 2])[..., None])
+        for k, move in found.moves.items()
+    }
+    return Point(seen.eye + reach[..., None] * sight, moves)
+
+
+def _coordinate(seen: Seen, quantity: Quantity, scale: np.ndarray | float) -> Evaluated:
+    """x or y of a ball's centre, times a scale."""
+    point, k = _level(seen, quantity), quantity.axis
+    return Evaluated(scale * point.at[..., k], {number: scale * move[..., k] for number, move in point.moves.items()})
+
+
+def _along_axis(seen: Seen, quantity: Quantity) -> np.ndarray:
+    """Image of a unit length along the scene's x or y at a ball's centre, px: coordinates in the image are along it."""
+    centre, axes = seen.solid.round(quantity.features[0].surface).centre, seen.axes
+    z, step = seen.depth(centre), np.eye(3)[quantity.axis]
+    screen, away = np.stack([axes.right, axes.down], -2), centre - seen.eye
+    slid = seen.camera.focal_px * (
+        screen @ step - (screen @ away[..., None])[..., 0] * (axes.forward @ step)[..., None] / z[..., None]
+    )
+    return np.linalg.norm(slid, axis=-1) / z
 
 
 def side_of(unit: np.ndarray, plane: np.ndarray | None) -> np.ndarray:

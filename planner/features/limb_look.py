@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from planner.features.limb_lent import unlent
 from planner.features.limb_locator import box_cumulant, limb_crossing
 from planner.features.limb_outline import LimbOutline, clear_of_ends, framed
 from planner.features.locator import edge_blur, reach
@@ -19,6 +20,7 @@ from planner.imaging.limbs.shading import Profile, fitted
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import camera_frame, from_axis
 from planner.imaging.rays import first_face
+from planner.imaging.revolved import light_around, passes, rings_of
 from scenes import Curved
 
 _NODES = 12  # places inside the limb at which the level is found
@@ -101,8 +103,11 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
 
 
 def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
-    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n)."""
-    scene, found = pictures.scene, clear_of_ends(outline, pictures.scene)
+    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n).
+
+    Nor light that a floor or an obstacle sends there.
+    """
+    scene, found = pictures.scene, clear_of_ends(outline, pictures.scene) & unlent(pictures, outline)
     if scene.bodies.is_convex:
         return found
     far, at = reach(scene.locator.scale_px, scene.camera.blur_px), np.nan_to_num(outline.at, nan=1e9)
@@ -145,16 +150,24 @@ def _profile(
     hit = np.isfinite(first) & outline.seen[..., None]
     where = np.where(hit[..., None], eye + np.where(hit, first, 0.0)[..., None] * way, points[..., None, :])
     material = scene.surfaces.of(curved.faces[0])
-    found = signal(pictures, where, curved.surface.normals(where), 2, _lit(pictures, curved, points), material=material)
-    found = np.where(hit, found, 0.0)
+    found = signal(
+        pictures, where, curved.surface.normals(where), 2, _lit(pictures, curved, points, where), material=material
+    )
+    found = np.where(hit, found + light_around(pictures, curved, where), 0.0)
     return found, fitted(places, found.reshape(-1, _NODES), far)
 
 
-def _lit(pictures: Pictures, curved: Curved, points: np.ndarray) -> tuple[np.ndarray, ...] | None:
-    """Of each emitter whether other things leave its light to the limb, (..., n, 1); None where there are none."""
+def _lit(pictures: Pictures, curved: Curved, points: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, ...] | None:
+    """Of each emitter whether other things leave its light to places inside the limb; None where there are none.
+
+    Exact, (..., n, J), of a lone turned part; else as it is at the limb, (..., n, 1).
+    """
     scene = pictures.scene
     if scene.bodies.is_convex:
         return None
+    rings = rings_of(scene.solid) if not scene.obstacles else None
+    if rings is not None:
+        return tuple(passes(rings, inside, emitter.at[..., None, None, :]) for emitter in pictures.emitters)
     found = []
     for emitter in pictures.emitters:
         light, place = np.broadcast_arrays(emitter.at[..., None, :], points)

@@ -1,4 +1,4 @@
-"""Places along the limb of a curved surface, seen from many sensors, and what its three parameters do to them."""
+"""Places along the limb of a curved surface, seen from many sensors, and what its parameters do to them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class LimbOutline:
         Images from the image's middle, px, and unit normals away from the body.
     arc, from_end, curvature : ndarray, shape (..., n)
         Length of image that each stands for, and to the nearer end of its line, px; curvature of the image, 1 / px.
-    design : ndarray, shape (..., n, 3)
-        Derivative of the place along ``outward`` by the three of `Curved.parameters`.
+    design : ndarray, shape (..., n, p)
+        Derivative of the place along ``outward`` by those of `Curved.parameters`.
     """
 
     points: np.ndarray
@@ -62,11 +62,11 @@ def limb_outline(curved: Curved, sensors: np.ndarray, camera: Camera, count: int
 def _from_one(curved: Curved, pose: np.ndarray, camera: Camera, count: int) -> LimbOutline:
     found = limb(curved.surface, pose, camera, count if isinstance(curved.surface, Sphere) else count // _STRANDS)
     strands = found.strands if found.status == OK else ()
-    take = curved.parameters(sensor_position(camera, pose)) if strands else np.zeros((1, 3))
+    take = curved.parameters(sensor_position(camera, pose)) if strands else np.zeros((1, curved.count))
     if isinstance(curved.surface, Sphere):
         pieces = [_piece(strand, take, count) for strand in strands]
-        return _joined(pieces, count)
-    return _joined([_piece(strand, take, count // _STRANDS + 1) for strand in strands], count + _STRANDS)
+        return _joined(pieces, count, curved.count)
+    return _joined([_piece(strand, take, count // _STRANDS + 1) for strand in strands], count + _STRANDS, curved.count)
 
 
 def _piece(strand: Strand, take: np.ndarray, size: int) -> list[np.ndarray]:
@@ -83,8 +83,8 @@ def _filled(part: np.ndarray, size: int) -> np.ndarray:
     return whole
 
 
-def _joined(pieces: list[list[np.ndarray]], size: int) -> LimbOutline:
-    shapes = (3,), (3,), (2,), (2,), (), (), (), (3,)
+def _joined(pieces: list[list[np.ndarray]], size: int, parameters: int) -> LimbOutline:
+    shapes = (3,), (3,), (2,), (2,), (), (), (), (parameters,)
     parts = zip(*pieces, strict=True) if pieces else ((np.empty((0, *shape)),) for shape in shapes)
     return LimbOutline(*(_filled(np.concatenate(part), size) for part in parts))
 

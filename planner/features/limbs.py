@@ -1,7 +1,8 @@
 """A limb as an outline that a round thing is found from, beside the rims of circles (`planner.features.circles`).
 
 The sensor's distance is known, so a surface's parameters are three (`scenes.Curved.parameters`): where it is, two of
-them, and its radius. Found at another distance, the same picture would mean another radius.
+them, and its radius; of a cone its half angle, too. Found at another distance, the same picture would mean another
+radius.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def _limb_rim(pictures: Pictures, curved: Curved) -> Rim:
 
 
 def step_model_error(pictures: Pictures, curved: Curved) -> np.ndarray:
-    """What the three parameters would be off by if the limb of one picture were taken for a step, (3,).
+    """What the p parameters would be off by if the limb of one picture were taken for a step, (p,).
 
     By least squares, weighted as they are found; NaN where they are not.
     """
@@ -37,7 +38,7 @@ def step_model_error(pictures: Pictures, curved: Curved) -> np.ndarray:
     weight = np.where(each.clear, each.arc * each.squared / each.noise_variance, 0.0)
     size = np.sqrt(weight @ each.design**2)
     if not (size > 0).all():
-        return np.full(3, np.nan)
+        return np.full(curved.count, np.nan)
     root = np.sqrt(weight)
     return np.linalg.lstsq(root[:, None] * each.design / size, root * seen.shift, rcond=None)[0] / size
 

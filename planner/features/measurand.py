@@ -15,7 +15,7 @@ import numpy as np
 
 from planner.features.kinds import Evaluated, in_image, on_plane
 from planner.features.projected_edges import ProjectedEdges, circles, corner_features, projected_edges
-from planner.features.seen import Seen, corner_response, unit_normals
+from planner.features.seen import Seen, corner_response, half_angle_of, unit_normals
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import from_axis
@@ -55,7 +55,7 @@ class Measurands:
 
     @property
     def gradient(self) -> np.ndarray:
-        """Derivatives of the values in the image by the parameters of `Seen`, shape (..., M, 2 E + 3 C)."""
+        """Derivatives of the values in the image by the parameters of `Seen`, shape (..., M, q)."""
         return self._image[1]
 
     @cached_property
@@ -66,7 +66,7 @@ class Measurands:
 
     @property
     def gradient_object(self) -> np.ndarray:
-        """The same of the values on the planes of the features, shape (..., M, 2 E + 3 C)."""
+        """The same of the values on the planes of the features, shape (..., M, q)."""
         return self._plane[1]
 
     @cached_property
@@ -90,9 +90,8 @@ class Measurands:
         return gradient[..., 0:last:2], gradient[..., 1:last:2]
 
     def of_circle(self, gradient: np.ndarray, c: int) -> np.ndarray:
-        """A gradient's part by the three parameters of the c-th circle, (..., M, 3)."""
-        first = 2 * len(self.view.names) + 3 * c
-        return gradient[..., first : first + 3]
+        """A gradient's part by the parameters of the c-th circle, (..., M, 3) or (..., M, 4)."""
+        return gradient[..., self.seen.numbers(c)]
 
     def depends(self) -> np.ndarray:
         """Which quantity needs which edges, then circles, bool, shape (M, E + C)."""
@@ -172,6 +171,7 @@ def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
         circles=tuple(rim.name for rim in rims),
         centres=np.broadcast_to(np.array([rim.centre for rim in rims]).reshape(-1, 3), (*lead, len(rims), 3)),
         radii=np.broadcast_to(np.array([rim.radius for rim in rims]), (*lead, len(rims))),
+        half_angles=np.broadcast_to(np.array([half_angle_of(rim) for rim in rims]), (*lead, len(rims))),
         expected=True,
     )
 

@@ -3,8 +3,8 @@
 The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px)
 at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
 change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
-`Curved.parameters`. They are numbered in that order: 2 e, 2 e + 1 for the edge e of E; then 2 E +
-3 c, ... for the circle c. Image coordinates are ideal px from the image's middle, in which lines are straight.
+`Curved.parameters`, of a cone four. They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then the circles
+(`Seen.numbers`). Image coordinates are ideal px from the image's middle, in which lines are straight.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class Seen:
         The C circles.
     centres : ndarray, shape (..., C, 3)
         Their centres.
-    radii : ndarray, shape (..., C)
+    radii, half_angles : ndarray, shape (..., C)
+        The latter, rad, of cones; else 0.
     expected : bool
         Whether this is the object itself, whose points need not be sought along the rays.
     """
@@ -74,12 +75,24 @@ class Seen:
     circles: tuple[str, ...]
     centres: np.ndarray
     radii: np.ndarray
+    half_angles: np.ndarray
     expected: bool
 
     @property
     def count(self) -> int:
         """Number of parameters, q."""
-        return 2 * len(self.names) + 3 * len(self.circles)
+        return 2 * len(self.names) + sum(self.sizes)
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """How many parameters each circle has."""
+        each = (self.solid.round(name) for name in self.circles)
+        return tuple(one.count if isinstance(one, Curved) else 3 for one in each)
+
+    def numbers(self, c: int) -> slice:
+        """Which parameters are those of the c-th circle."""
+        first = 2 * len(self.names) + sum(self.sizes[:c])
+        return slice(first, first + self.sizes[c])
 
     @property
     def normals(self) -> np.ndarray:
@@ -130,9 +143,14 @@ class Seen:
     def circle(self, feature: Centre | Wall) -> tuple[Circle | Curved, Point, np.ndarray, int]:
         """A circle or a curved surface, its centre, its radius (...) and the number of that among the parameters."""
         c = self.circles.index(place_of(feature))
-        circle, first = self.solid.round(place_of(feature)), 2 * len(self.names) + 3 * c
+        circle, first = self.solid.round(place_of(feature)), self.numbers(c).start
         moves = {first + i: axis for i, axis in enumerate(self.sideways(circle))}
         return circle, Point(self.centres[..., c, :], moves), self.radii[..., c], first + 2
+
+    def half_angle(self, wall: Wall) -> tuple[np.ndarray, int]:
+        """Of a cone (...), rad, and its number among the parameters."""
+        c = self.circles.index(wall.surface)
+        return self.half_angles[..., c], self.numbers(c).start + 3
 
     def sideways(self, each: Circle | Curved) -> tuple[np.ndarray, np.ndarray]:
         """The two directions (..., 3) in which the centre of a circle or a curved surface is found."""
@@ -209,6 +227,11 @@ def plane_axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     one = np.cross(axis, helper)
     one /= np.linalg.norm(one)
     return one, np.cross(axis, one)
+
+
+def half_angle_of(each: Circle | Curved) -> float:
+    """Of a cone, rad; else 0."""
+    return each.half_angle if isinstance(each, Curved) else 0.0
 
 
 def feature_names(features: tuple) -> str:

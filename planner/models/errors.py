@@ -35,9 +35,9 @@ class Errors:
         Root mean square contrast along each straight edge, grey levels.
     noise_variance : ndarray, shape (..., E)
         Mean variance of the noise along each straight edge, grey levels^2.
-    circles : tuple of ndarray, shape (..., 3, 3)
-        Covariance of each circle's three parameters, the scene's unit squared; infinite diagonal where it cannot be
-        found.
+    circles : tuple of ndarray, shape (..., p, p)
+        Covariance of each circle's three parameters, or a cone's four, the scene's unit squared; infinite diagonal
+        where it cannot be found.
     crowded : tuple of ndarray of bool, shape (...)
         Whether something disturbs most of each circle.
     joint : tuple of ndarray, optional

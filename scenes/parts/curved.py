@@ -37,6 +37,16 @@ class Curved:
         """Its length; of a cone that in its middle."""
         return self.surface.radius
 
+    @property
+    def count(self) -> int:
+        """How many numbers it is found by: three, of a cone four."""
+        return 4 if isinstance(self.surface, Cone) else 3
+
+    @property
+    def half_angle(self) -> float:
+        """Between axis and wall, rad; 0 but for a cone."""
+        return math.radians(self.surface.half_angle_deg) if isinstance(self.surface, Cone) else 0.0
+
     def sideways(self, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Two directions (..., 3) across the line of sight from an eye (..., 3), by which its place is told.
 
@@ -55,12 +65,12 @@ class Curved:
         return one / np.where(size > 0, size, np.nan), np.zeros_like(one)
 
     def parameters(self, eye: np.ndarray) -> np.ndarray:
-        """The surface's own p parameters for one of the three by which it is found, from an eye (3,), shape (p, 3).
+        """The surface's own p parameters for one of those by which it is found, from an eye (3,), (p, count).
 
         Both shifts of `sideways`, of a cylinder or cone the first and a turn of the axis (rad) that way; then the
-        radius. The distance from the eye is held, and the taper.
+        radius; of a cone then its half angle (rad). The distance from the eye is held.
         """
-        found = np.zeros((len(self.surface.parameters), 3))
+        found = np.zeros((len(self.surface.parameters), self.count))
         one, two = self.sideways(eye)
         found[:3, 0] = one
         if isinstance(self.surface, Sphere):
@@ -68,15 +78,30 @@ class Curved:
         else:
             found[3:5, 1] = [one @ beside for beside in axes_beside(self.surface.axis)]
         found[self.surface.parameters.index("radius"), 2] = 1.0
+        if isinstance(self.surface, Cone):
+            found[self.surface.parameters.index("half_angle"), 3] = 1.0
         return found
 
     def moved(self, eye: np.ndarray, errors: tuple[float, ...]) -> Curved:
-        """The same with errors of the three."""
+        """The same with errors of these."""
         one, two = self.sideways(eye)
         place = self.centre + errors[0] * one
         if isinstance(self.surface, Sphere):
             made = replace(self.surface, centre=place + errors[1] * two, radius=self.radius + errors[2])
         else:
             axis = self.surface.axis + math.tan(errors[1]) * one
-            made = replace(self.surface, point=place, axis=axis, radius=self.radius + errors[2])
+            made = _turned(self.surface, place, axis, self.radius + errors[2], *errors[3:])
         return replace(self, surface=made)
+
+
+def _turned(surface: Cylinder | Cone, point: np.ndarray, axis: np.ndarray, radius: float, more: float = 0.0):
+    """A cylinder or cone elsewhere, a cone's half angle ``more`` (rad) larger; it ends where its radius would."""
+    if isinstance(surface, Cylinder):
+        return replace(surface, point=point, axis=axis, radius=radius)
+    angle = surface.half_angle_deg + math.degrees(more)
+    slope, (low, high) = math.tan(math.radians(angle)), surface.ends
+    if slope > 0:
+        low = max(low, -radius / slope)
+    elif slope < 0:
+        high = min(high, -radius / slope)
+    return replace(surface, point=point, axis=axis, radius=radius, half_angle_deg=angle, ends=(low, high))
