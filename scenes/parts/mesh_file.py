@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from scenes.parts.curved import Curved
 from scenes.parts.part_file import PartFile
 from scenes.parts.solid import Solid
 from scenes.units import Unit, in_unit
@@ -35,6 +36,12 @@ class Mesh(PartFile):
     def solid_in(self, unit: Unit | None) -> Solid:
         """Vertices, faces, edges and circles in a unit, the file's own where not given; read once."""
         return self._once(self._read, 1.0 if None in (unit, self.units) else in_unit(1.0, self.units, unit))
+
+    def curved_in(self, unit: Unit | None) -> tuple[Curved, ...]:
+        """Cylinders recognised among the facets that can be measured."""
+        from scenes.parts.walls import recognised_walls  # loads scipy.optimize
+
+        return recognised_walls(self.solid_in(unit))
 
     def _read(self, file: Path, scale: float) -> Solid:
         from scenes.parts import mesh  # loads trimesh

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +12,7 @@ import numpy as np
 from pydantic import PrivateAttr, ValidationInfo, field_validator
 
 from scenes.model import Model
+from scenes.parts.curved import Curved
 from scenes.parts.solid import Solid
 from scenes.units import Unit
 
@@ -50,6 +53,10 @@ class PartFile(Model):
         """The same in another unit; read once."""
         raise NotImplementedError
 
+    def curved_in(self, unit: Unit | None) -> tuple[Curved, ...]:
+        """Curved surfaces that the scene may measure; facets stand for those that it does not."""
+        raise NotImplementedError
+
     def _once(self, read: Callable[..., Any], *how: object) -> Any:
         """What ``read(file, *how)`` gives; read again only of a copy of the record that says something else."""
         made, asked = self._made, (self._said, how)
@@ -57,6 +64,12 @@ class PartFile(Model):
             made = _Made(asked, read(self.file, *how))
             self._made = made
         return made.part
+
+
+@lru_cache(maxsize=64)
+def with_walls(solid: Solid, walls: tuple[Curved, ...], names: tuple[str, ...] | None = None) -> Solid:
+    """The solid with curved surfaces, all or those of some names; facets stand for the others as before."""
+    return replace(solid, curved=tuple(wall for wall in walls if names is None or wall.name in names))
 
 
 class _Made(NamedTuple):

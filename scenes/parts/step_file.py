@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+from scenes.parts.curved import Curved
 from scenes.parts.part_file import PartFile
 from scenes.parts.solid import Solid
 from scenes.units import Unit
@@ -25,6 +26,10 @@ class Step(PartFile):
     def solid_in(self, unit: Unit | None) -> Solid:
         """Vertices, faces, edges and circles in a unit, mm where not given; read once."""
         return self.part_in(unit).solid
+
+    def curved_in(self, unit: Unit | None) -> tuple[Curved, ...]:
+        """Curved surfaces that can be measured, as exact as the file."""
+        return self.part_in(unit).curved
 
     def part_in(self, unit: Unit | None) -> StepPart:
         """Exact surfaces and edges in a unit, mm where not given; read once."""
