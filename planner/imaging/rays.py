@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -108,16 +108,26 @@ def _may_meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> np.n
         return every
     frame = np.linalg.qr(np.column_stack([toward, np.eye(3)]))[0][:, :3]
     frame[:, 0] *= np.sign(frame[:, 0] @ toward)
-    corners, start, step = plates.corners @ frame, origins @ frame, vectors @ frame
+    start, step = origins @ frame, vectors @ frame
     if not (step[:, 0] > 0).all():
         return every
-    depths = np.maximum([corners[..., 0].min(), corners[..., 0].max()], start[:, :1])  # (n, 2)
+    low, high = _ends(plates.corners @ frame[:, 0])
+    away = _ROUND * max(plates.farthest, np.abs(start).max())
+    found = np.flatnonzero(high >= start[:, 0].min() - away)
+    depths = np.maximum([low.min(), high.max()], start[:, :1])  # (n, 2)
     reached = start[:, None, 1:] + ((depths - start[:, :1]) / step[:, :1])[..., None] * step[:, None, 1:]
-    away = _ROUND * max(np.abs(corners).max(), np.abs(start).max())
-    low, high = reached.min((0, 1)) - away, reached.max((0, 1)) + away
-    across = corners[..., 1:]
-    beside = ((across.max(0) >= low) & (across.min(0) <= high)).all(-1)
-    return beside & (corners[..., 0].max(0) >= start[:, 0].min() - away)
+    for k in (0, 1):
+        low, high = _ends(plates.corners[:, found] @ frame[:, k + 1])
+        found = found[(high >= reached[..., k].min() - away) & (low <= reached[..., k].max() + away)]
+    every[:] = False
+    every[found] = True
+    return every
+
+
+def _ends(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest of three rows, each (T,)."""
+    one, two, three = heights
+    return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
 
 
 def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -143,6 +153,11 @@ class _Plates:
     heights: np.ndarray
     duals: np.ndarray
     shifts: np.ndarray
+
+    @cached_property
+    def farthest(self) -> float:
+        """Largest coordinate of a corner."""
+        return float(np.abs(self.corners).max(initial=0.0))
 
     def some(self, which: np.ndarray) -> _Plates:
         """Those of them."""

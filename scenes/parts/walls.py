@@ -18,10 +18,12 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.parts.curved import Curved
 from scenes.parts.recognised import cylinders
+from scenes.parts.rims import MIN_SEGMENTS
 from scenes.parts.solid import Solid
-from scenes.parts.surfaces import Cone, Cylinder, Sphere, Surface
+from scenes.parts.surfaces import Cone, Cylinder, Sphere, Surface, axes_beside
 
 _SAME = 1e-7  # of the part's size: two surfaces are one, a corner lies at an end
+_STEP = 2 * np.pi / MIN_SEGMENTS * (1 + 1e-6)  # rad: a facet is not wider
 _LOOSE = 1e-3  # of the radius: the same of surfaces that were recognised
 
 
@@ -112,13 +114,16 @@ def _whole(solid: Solid, name: str, surface: Surface, faces: Iterable[int], near
     if surface.hollow or any(solid.holes[f] for f in faces if solid.holes):
         return None
     if isinstance(surface, Sphere):
-        return Curved(name, surface, faces) if _closed(loops) else None
-    shared = Counter(corner for loop in loops for corner in loop)
-    corners = np.array(sorted(shared))
+        return None if len(_borders(loops)) else Curved(name, surface, faces)
+    corners = np.array(sorted({corner for loop in loops for corner in loop}))
     heights = (solid.vertices[corners] - surface.point) @ surface.axis
     low, high = float(heights.min()), float(heights.max())
-    at_end = np.minimum(heights - low, high - heights) <= near
-    if not (at_end.all() and set(shared.values()) == {2} and high - low > near):
+    borders = np.searchsorted(corners, _borders(loops))  # (B, 2)
+    at_end = [(np.abs(heights - end) <= near)[borders].all(-1) for end in (low, high)]
+    if high - low <= near or not (at_end[0] | at_end[1]).all() or not (at_end[0].any() and at_end[1].any()):
+        return None
+    ends = solid.vertices[corners[borders[at_end[0]].ravel()]]
+    if _widest(ends, surface) > _STEP:
         return None
     middle, half = (low + high) / 2, (high - low) / 2
     change = {"point": surface.point + middle * surface.axis, "ends": (-half, half)}
@@ -129,7 +134,15 @@ def _whole(solid: Solid, name: str, surface: Surface, faces: Iterable[int], near
     return Curved(name, replace(surface, **change), faces)
 
 
-def _closed(loops: list[tuple[int, ...]]) -> bool:
-    """Whether every edge of the faces is one of two of them."""
-    sides = Counter(frozenset(pair) for loop in loops for pair in zip(loop, (*loop[1:], loop[0]), strict=True))
-    return set(sides.values()) == {2}
+def _widest(points: np.ndarray, surface: Cylinder | Cone) -> float:
+    """Largest step around the axis between points (n, 3), rad: a flat is no facet."""
+    one, two = axes_beside(surface.axis)
+    away = points - surface.point
+    angle = np.sort(np.arctan2(away @ two, away @ one))
+    return float(np.diff(angle, append=angle[0] + 2 * np.pi).max())
+
+
+def _borders(loops: list[tuple[int, ...]]) -> np.ndarray:
+    """Edges of one of the faces alone, shape (B, 2)."""
+    sides = Counter(tuple(sorted(pair)) for loop in loops for pair in zip(loop, (*loop[1:], loop[0]), strict=True))
+    return np.array([pair for pair, count in sides.items() if count == 1], int).reshape(-1, 2)
