@@ -1,4 +1,4 @@
-"""Curved surfaces of parts from files by their limbs: whole outer ones, as a turned part of the same numbers has them."""
+"""Curved surfaces of parts from files by their limbs: whole outer ones, predicted as a turned part of the same size."""
 
 import json
 import math

@@ -97,7 +97,9 @@ def report(scene: Scene) -> Group:
         axis = " ".join(f"{x + 0.0:.2f}" for x in wall["axis"])
         row = wall["name"], *map(_number, wall["point"]), axis, _number(wall["diameter"])
         walls.add_row(*row, f"{wall['residual']:.1e}", "hole" if wall["hole"] else "outer")
-    curved = _table(f"\nCurved surfaces to measure, {unit}", "name", "kind", "x", "y", "z", "axis", "radius", "residual")
+    curved = _table(
+        f"\nCurved surfaces to measure, {unit}", "name", "kind", "x", "y", "z", "axis", "radius", "residual"
+    )
     for each in known["surfaces"]:
         axis = " ".join(f"{x + 0.0:.2f}" for x in each["axis"] or ())
         residual = "" if each["residual"] is None else f"{each['residual']:.1e}"
