@@ -235,14 +235,14 @@ def _finish(options: list[Option], results: list[Result], best: int, aim: Aim, r
     if chosen.set_aside:
         sensor, light = chosen.sensor, chosen.light
     if refined and option.free:
-        starts = [(sensor, light)]
+        starts = [(sensor, light, _closely(scene, sensor, light, *how) if chosen.set_aside else result.variance)]
         if not chosen.set_aside and (found is None or not has_bound(scene, option.model)):
-            others = [c for c in choice[1:3] if c.edges == edges_of(scene)]
-            starts += [(np.array(list(c.sensor)), as_array(c.light)) for c in others]
+            others = [c for c in choice[1:3] if c.edges == edges_of(scene) and np.isfinite(c.variance)]
+            starts += [(np.array(list(c.sensor)), as_array(c.light), c.variance) for c in others]
         limits = option.step_deg, option.constraints
-        descents = [refine(scene, *at, *how, *limits, sizes=(0.7,)) for at in starts]
-        sensor, light, _ = min(descents, key=lambda descent: descent[2])
-        sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,))
+        descents = [refine(scene, *at, *how, *limits, sizes=(0.7,), known=known) for *at, known in starts]
+        sensor, light, known = min(descents, key=lambda descent: descent[2])
+        sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,), known=known)
         if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
             sensor, light, variance = chosen.sensor, chosen.light, on_grid
     if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look

@@ -22,7 +22,9 @@ def curved_shapes(mitsuba: Any, solid: Solid, bsdf: dict, own: np.ndarray) -> li
     if not solid.curved:
         return []
     found = [shape(mitsuba, each, bsdf) for each in solid.curved if own[each.faces[0]]]
-    return found + [_disc(mitsuba, circle, bsdf) for circle in _ends(solid) if own[circle.face]]
+    found += [_disc(mitsuba, circle, bsdf) for circle in _ends(solid) if own[circle.face]]
+    lunes = [_lunes(solid, circle) for circle in _rims(solid) if own[circle.face]]
+    return found + ([mesh(mitsuba, np.concatenate(lunes), bsdf)] if lunes else [])
 
 
 def stands_for(solid: Solid) -> np.ndarray:
@@ -58,12 +60,53 @@ def _cone(mitsuba: Any, surface: Cone, bsdf: dict) -> Any:
 
 
 def _ends(solid: Solid) -> list[Circle]:
-    """Of each plane face around the axis its widest circle: what is inside it lies within the part or on the face."""
-    widest: dict[int, Circle] = {}
+    """Circles of curved surfaces in whose place discs can be: each the widest of a plane face that only such have cut.
+
+    What is inside it lies within the part or on the face.
+    """
+    shapes = {face for each in solid.curved for face in each.faces}
+    of_face: dict[int, list[Circle]] = {}
     for circle in solid.circles:
-        if circle.face not in widest or circle.radius > widest[circle.face].radius:
-            widest[circle.face] = circle
-    return list(widest.values())
+        of_face.setdefault(circle.face, []).append(circle)
+    found = []
+    for face, circles in of_face.items():
+        loops = 1 + (len(solid.holes[face]) if solid.holes else 0)
+        widest = max(circles, key=lambda circle: circle.radius)
+        if len(circles) == loops and not any(c.hole for c in circles) and _wall(solid, widest) in shapes:
+            found.append(widest)
+    return found
+
+
+def _rims(solid: Solid) -> list[Circle]:
+    """Circles that bound other plane faces: the polygon that the mesh has there lies within the curved surface."""
+    shapes, ends = {face for each in solid.curved for face in each.faces}, {circle.name for circle in _ends(solid)}
+    outer = {circle.name: set(solid.faces[circle.face]) for circle in solid.circles if not circle.hole}
+    return [
+        circle
+        for circle in solid.circles
+        if circle.name not in ends
+        and _wall(solid, circle) in shapes
+        and {end for name in circle.edges for end in solid.edge(name).ends} <= outer.get(circle.name, set())
+    ]
+
+
+def _wall(solid: Solid, circle: Circle) -> int:
+    """One facet of the wall at a circle."""
+    return next(face for face in solid.edge(circle.edges[0]).faces if face != circle.face)
+
+
+def _lunes(solid: Solid, circle: Circle) -> np.ndarray:
+    """What lies between a circle and the polygon that stands for it, as triangles (T, 3, 3), outwards."""
+    one, two = axes_beside(circle.axis)
+    ends = solid.vertices[[solid.edge(name).ends for name in circle.edges]] - circle.centre
+    angle = np.arctan2(ends @ two, ends @ one)
+    step = (angle[:, 1] - angle[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    first, step = np.where(step > 0, angle[:, 0], angle[:, 1]), np.abs(step)
+    pieces = -(-_PIECES // len(angle))
+    at = first[:, None] + step[:, None] * np.arange(pieces + 1) / pieces
+    arc = circle.centre + circle.radius * (np.cos(at)[..., None] * one + np.sin(at)[..., None] * two)
+    corner = np.broadcast_to(arc[:, :1], arc[:, 1:-1].shape)
+    return np.stack([corner, arc[:, 1:-1], arc[:, 2:]], -2).reshape(-1, 3, 3)
 
 
 def _disc(mitsuba: Any, circle: Circle, bsdf: dict) -> dict:

@@ -19,12 +19,13 @@ from scenes.features import check_feature, check_quantity
 from scenes.filters import Filter, Lamp, check_names
 from scenes.lights import AnyLight
 from scenes.materials import FaceMaterial, Material
-from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, quantities_of
+from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, Wall, quantities_of
 from scenes.model import FileName, Model, Title
 from scenes.noise import Noise
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
+from scenes.parts.part_file import PartFile, with_walls
 from scenes.parts.solid import Solid, assembled
 from scenes.parts.step_file import Step
 from scenes.parts.turned import Turned
@@ -158,8 +159,25 @@ class Scene(Model):
 
     @property
     def solid(self) -> Solid:
-        """Vertices, faces and edges of the object."""
-        return self.object.solid_in(self.units)
+        """Vertices, faces and edges of the object; of a part from a file the curved surfaces that are measured."""
+        solid, names = self.object.solid_in(self.units), self._walls
+        return with_walls(solid, self.object.curved_in(self.units), names) if names else solid
+
+    @property
+    def all_walls(self) -> Solid:
+        """The same with every curved surface that may be measured."""
+        solid = self.object.solid_in(self.units)
+        if not isinstance(self.object, PartFile):
+            return solid
+        walls = self.object.curved_in(self.units)
+        return with_walls(solid, walls) if walls else solid
+
+    @property
+    def _walls(self) -> tuple[str, ...]:
+        """The curved surfaces of a part from a file that the measurands are about."""
+        if not isinstance(self.object, PartFile):
+            return ()
+        return tuple(f.surface for each in self.measurands for f in each.features if isinstance(f, Wall))
 
     @property
     def bodies(self) -> Solid:
@@ -301,9 +319,10 @@ class Scene(Model):
                 raise ValueError(f"measurands must have different names, got {name!r} twice")
         if self.task is not None:
             self._check_task(self.task)
+        whole = self.all_walls if self._walls else self.solid
         for i, measurand in enumerate(self.measurands):
             for k, feature in enumerate(measurand.features):
-                check_feature(self.solid, f"measurands[{i}].features[{k}]", feature)
+                check_feature(whole, f"measurands[{i}].features[{k}]", feature)
             for quantity in measurand.quantities:
                 check_quantity(self.solid, f"measurands[{i}].features", quantity)
 

@@ -107,8 +107,8 @@ def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) 
     Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the
     noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
     edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
-    that is used. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are
-    left out; a tenth of the rim must be left.
+    that is used; infinite where the pieces are so short that this would not be positive. Disturbed points and those of
+    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
@@ -118,22 +118,26 @@ def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) 
         np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
         for weight in (circle.arc, ends)
     )
-    inverse = _covariance(information, used.mean(-1) >= LEAST_SEEN)
+    scatter = 2 * np.sqrt(np.pi) * scale * information - 2 * scale**2 * at_ends
+    inverse = _covariance(information, (used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
-    found = kappa2 * (2 * np.sqrt(np.pi) * scale * known - 2 * scale**2 * known @ at_ends @ known)
-    return np.where(good, found, inverse)
+    return np.where(good, kappa2 * known @ scatter @ known, inverse)
+
+
+def _positive(matrices: np.ndarray) -> np.ndarray:
+    """Which symmetric matrices (..., p, p) are positive definite by more than rounding, bool, shape (...)."""
+    size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=-2, axis2=-1), 0.0))
+    good = np.isfinite(matrices).all((-1, -2)) & (size > 0).all(-1)
+    size = np.where(good[..., None], size, 1.0)
+    scaled = np.where(good[..., None, None], matrices / (size[..., None] * size[..., None, :]), np.eye(size.shape[-1]))
+    return good & (np.linalg.eigvalsh(scaled)[..., 0] > 1e-10)
 
 
 def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:
     """The inverse; infinite diagonal where singular."""
-    enough = enough & np.isfinite(information).all((-1, -2))
-    size = np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1)))
-    enough &= (size > 0).all(-1)
-    same = np.eye(size.shape[-1])
-    size = np.where(enough[..., None], size, 1.0)
+    enough, same = enough & _positive(information), np.eye(information.shape[-1])
+    size = np.where(enough[..., None], np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1))), 1.0)
     scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), same)
-    enough &= np.linalg.eigvalsh(scaled)[..., 0] > 1e-10
-    scaled = np.where(enough[..., None, None], scaled, same)
     inverse = np.linalg.inv(scaled) / (size[..., None] * size[..., None, :])
     return np.where(enough[..., None, None], inverse, np.diag(np.full(len(same), np.inf)))

@@ -24,6 +24,7 @@ from planner.imaging.revolved import light_around, passes, rings_of
 from scenes import Curved
 
 _NODES = 12  # places inside the limb at which the level is found
+_ALONG = 17  # places of a straight edge at which it is asked whether it is seen
 _BEFORE = 1e-3  # of the way to a rim: nearer than its facets are to it
 _FARTHEST = 1.0  # px that a crossing may be moved
 _ROUGH = 0.02  # of the contrast that the profile's terms may leave out
@@ -103,7 +104,7 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
 
 
 def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
-    """Places that neither the end of their line, nor a rim of the part, nor the end of a shadow disturbs, (..., n).
+    """Places that neither the end of their line, nor a rim or edge of the part, nor a shadow's end disturbs, (..., n).
 
     Nor light that a floor or an obstacle sends there.
     """
@@ -117,6 +118,13 @@ def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, se
         eye, to = np.broadcast_arrays(pictures.sensor_at[..., None, :], places)
         _, t = first_face(scene.bodies, eye, to - eye, ())
         found = found & (to_curve(at, there, t > 1 - _BEFORE) >= far)
+    for edge in scene.solid.sharp:
+        start, stop = scene.solid.vertices[list(edge.ends)]
+        places = start + np.linspace(0, 1, _ALONG)[:, None] * (stop - start)
+        eye, to = np.broadcast_arrays(pictures.sensor_at[..., None, :], places)
+        _, t = first_face(scene.bodies, eye, to - eye, ())
+        near = to_curve(at, from_axis(places, pictures.sensors, scene.camera)) < far
+        found = found & ~(near & (t > 1 - _BEFORE).any(-1, keepdims=True))
     lit = np.where(seen.good, seen.squared, 0.0)
     return found & steady(lit, np.zeros(lit.shape), np.nan_to_num(outline.arc), far)
 

@@ -178,7 +178,8 @@ def _stack(arrays: list, lead: tuple[int, ...], tail: tuple[int, ...]) -> np.nda
 def _near(edges: tuple[Edge, ...], wanted: list[Edge]) -> np.ndarray:
     """The vertices of the wanted edges and of those that share a vertex with them."""
     ends = {end for edge in wanted for end in edge.ends}
-    return np.array(sorted({end for edge in edges if ends & set(edge.ends) for end in edge.ends}), int)
+    near = (edge.ends for edge in edges if not ends.isdisjoint(edge.ends)) if ends else ()
+    return np.array(sorted({end for pair in near for end in pair}), int)
 
 
 def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np.ndarray, clear: float):

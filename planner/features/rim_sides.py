@@ -18,7 +18,6 @@ RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
 _MOST_SHIFT = 0.08  # px by shading: beyond, the wall is seen too flat for a first order
 _MOST_AWAY = 16  # places beyond which no jump is looked for
-_STRAIGHT = 9  # places on a straight edge to which a rim's distance is taken
 _AT_ONCE = 1 << 17  # numbers
 _STEP = 0.25  # px that a slope is taken over
 
@@ -151,13 +150,16 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
             wall = -spokes if other.hole else spokes
             turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
             nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), turned))
+    ends = _image(pictures, _straight_around(solid, circle.face))
+    return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
+
+
+@lru_cache(maxsize=64)
+def _straight_around(solid: Solid, face: int) -> np.ndarray:
+    """Ends of the straight edges of a face, those of one after the other, shape (2 E, 3)."""
     own = {name for rim in solid.circles for name in rim.edges}
-    for edge in solid.edges:
-        if circle.face in edge.faces and edge.name not in own:
-            start, stop = solid.vertices[list(edge.ends)]
-            places = start + np.linspace(0, 1, _STRAIGHT)[:, None] * (stop - start)
-            nearest = np.minimum(nearest, to_curve(there, _image(pictures, places)))
-    return nearest
+    ends = [edge.ends for edge in solid.edges if face in edge.faces and edge.name not in own]
+    return solid.vertices[np.array(ends, int).ravel()].reshape(-1, 3)
 
 
 def _image(pictures: Pictures, points: np.ndarray) -> np.ndarray:
@@ -183,8 +185,13 @@ def to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = N
 
     Of a closed one where ``shown`` (..., k) says which of its pieces count, each from its first point.
     """
-    closed = shown is not None
-    start, stop = (curve, np.roll(curve, -1, -2)) if closed else (curve[..., :-1, :], curve[..., 1:, :])
+    if shown is None:
+        return _to_pieces(points, curve[..., :-1, :], curve[..., 1:, :])
+    return _to_pieces(points, curve, np.roll(curve, -1, -2), shown)
+
+
+def _to_pieces(points: np.ndarray, start: np.ndarray, stop: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
+    """The same from straight pieces between points (..., k, 2), those that are shown; infinite without any."""
     nearest = np.full(points.shape[:-1], np.inf)
     pieces = start.shape[-2]
     many = max(1, _AT_ONCE // max(points.size, 1))
@@ -194,7 +201,7 @@ def to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = N
         size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
         share = np.clip((away * along).sum(-1) / size, 0, 1)
         apart = np.linalg.norm(away - share[..., None] * along, axis=-1)
-        if closed:
+        if shown is not None:
             apart = np.where(shown[..., None, k : k + many], apart, np.inf)
         nearest = np.minimum(nearest, apart.min(-1))
     return nearest

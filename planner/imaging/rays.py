@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from scenes import Solid
 
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
-_MANY, _FEW = 2000, 64  # triangles from which on so few rays are a bundle: those of one pose run close to each other
+_MANY, _FEW = 2000, 64  # triangles from which on rays are sorted, and bundles of them divided into some of so few
+_LEAST = 16  # rays from one place that are a bundle of their own
+_CELLS = 32  # a bundle's rays end in one of so many strips across the part
 _ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 
@@ -38,13 +41,47 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
         plates = plates.some(~np.isin(plates.faces, own))
     shape = origins.shape[:-1]
     origins, vectors = origins.reshape(-1, 3), vectors.reshape(-1, 3)
-    face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
-    together = _BUNDLE if len(plates.faces) <= _MANY else _FEW
-    for at in range(0, len(origins), together):
-        bundle = slice(at, at + together)
-        near = plates.some(_may_meet(plates, origins[bundle], vectors[bundle]))
-        face[bundle], t[bundle] = _first(near, origins[bundle], vectors[bundle])
+    if len(plates.faces) <= _MANY:
+        face, t = _in_bundles(plates, origins, vectors, (_BUNDLE,))
+    else:
+        face, t = np.empty(len(origins), int), np.empty(len(origins))
+        order = _alike(origins, vectors)
+        face[order], t[order] = _in_bundles(plates, origins[order], vectors[order], (_BUNDLE, _FEW))
     return face.reshape(shape), t.reshape(shape)
+
+
+def _alike(origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """An order of rays (n, 3) in which those that follow each other begin at one place and run close together."""
+    ends = origins + vectors
+    low, high = (end(ends, axis=0) for end in (np.nanmin, np.nanmax)) if len(ends) else (np.zeros(3), np.ones(3))
+    one, two = np.argsort(low - high)[:2]  # the part's two largest extents
+    with np.errstate(divide="ignore", invalid="ignore"):
+        strip = np.floor(_CELLS * np.nan_to_num((ends[:, one] - low[one]) / (high - low)[one]))
+    return np.lexsort((ends[:, two], strip, *origins.T))
+
+
+def _in_bundles(
+    plates: _Plates, origins: np.ndarray, vectors: np.ndarray, sizes: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`_first`, for bundles of rays of the first size, each divided into some of the next."""
+    face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    for bundle in _bundles(origins, sizes[0]):
+        rays = origins[bundle], vectors[bundle]
+        near = plates.some(_may_meet(plates, *rays))
+        face[bundle], t[bundle] = _in_bundles(near, *rays, sizes[1:]) if sizes[1:] else _first(near, *rays)
+    return face, t
+
+
+def _bundles(origins: np.ndarray, size: int) -> Iterator[slice]:
+    """Rays that follow each other, at most ``size``; from two places only where one has but few."""
+    onward = np.flatnonzero((origins[1:] != origins[:-1]).any(-1)) + 1
+    start = 0
+    for stop in (*onward.tolist(), len(origins)):
+        if stop - start < _LEAST and stop < len(origins):
+            continue
+        for at in range(start, stop, size):
+            yield slice(at, min(at + size, stop))
+        start = stop
 
 
 def _first(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -71,16 +108,26 @@ def _may_meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> np.n
         return every
     frame = np.linalg.qr(np.column_stack([toward, np.eye(3)]))[0][:, :3]
     frame[:, 0] *= np.sign(frame[:, 0] @ toward)
-    corners, start, step = plates.corners @ frame, origins @ frame, vectors @ frame
+    start, step = origins @ frame, vectors @ frame
     if not (step[:, 0] > 0).all():
         return every
-    depths = np.maximum([corners[..., 0].min(), corners[..., 0].max()], start[:, :1])  # (n, 2)
+    low, high = _ends(plates.corners @ frame[:, 0])
+    away = _ROUND * max(plates.farthest, np.abs(start).max())
+    found = np.flatnonzero(high >= start[:, 0].min() - away)
+    depths = np.maximum([low.min(), high.max()], start[:, :1])  # (n, 2)
     reached = start[:, None, 1:] + ((depths - start[:, :1]) / step[:, :1])[..., None] * step[:, None, 1:]
-    away = _ROUND * max(np.abs(corners).max(), np.abs(start).max())
-    low, high = reached.min((0, 1)) - away, reached.max((0, 1)) + away
-    across = corners[..., 1:]
-    beside = ((across.max(0) >= low) & (across.min(0) <= high)).all(-1)
-    return beside & (corners[..., 0].max(0) >= start[:, 0].min() - away)
+    for k in (0, 1):
+        low, high = _ends(plates.corners[:, found] @ frame[:, k + 1])
+        found = found[(high >= reached[..., k].min() - away) & (low <= reached[..., k].max() + away)]
+    every[:] = False
+    every[found] = True
+    return every
+
+
+def _ends(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest of three rows, each (T,)."""
+    one, two, three = heights
+    return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
 
 
 def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -106,6 +153,11 @@ class _Plates:
     heights: np.ndarray
     duals: np.ndarray
     shifts: np.ndarray
+
+    @cached_property
+    def farthest(self) -> float:
+        """Largest coordinate of a corner."""
+        return float(np.abs(self.corners).max(initial=0.0))
 
     def some(self, which: np.ndarray) -> _Plates:
         """Those of them."""

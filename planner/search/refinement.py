@@ -18,6 +18,7 @@ from scenes import InvalidInput, Scene
 def refine(
     scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, objective: str, step_deg: float,
     constraints: Constraints | None = None, value=None, sizes: tuple[float, ...] = (0.7, 0.1),
+    known: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
     """Nelder-Mead from poses of a sensor and of all free lights.
 
@@ -34,6 +35,9 @@ def refine(
         (sensor, light) to what is minimised; the variance when not given.
     sizes : tuple of float
         Of the simplices, one after the other: a fresh one, for the one before may have collapsed at a border.
+    known : float
+        What a search found at the beginning; it stands where rounding tells the other way whether a plane that is
+        seen edge-on is seen, or a border kept.
 
     Returns
     -------
@@ -41,6 +45,11 @@ def refine(
     light : ndarray, shape (2 F,)
     variance : float
         Not more than at the beginning.
+
+    Raises
+    ------
+    InvalidInput
+        If the beginning is not allowed, or nothing can be measured there.
     """
     constraints = constraints or Constraints()
     if value is None:
@@ -59,12 +68,13 @@ def refine(
         return value(s, k) if constraints.allows(scene, s, k) else np.inf
 
     unit = cost(np.zeros(begin.size))
+    unit = unit if np.isfinite(unit) else known
     if not np.isfinite(unit):
         raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
     x, least = np.zeros(begin.size), 1.0
     for size in sizes:
         found = minimize(
-            lambda x: min(cost(x) / unit, np.finfo(float).max), x, method="Nelder-Mead",
+            lambda x: min(cost(x) / unit, np.finfo(float).max) if x.any() else 1.0, x, method="Nelder-Mead",
             options={"initial_simplex": x + size * np.vstack([np.zeros(x.size), np.eye(x.size)]), "xatol": 1e-3,
                      "fatol": 1e-7, "maxfev": 250 if x.size <= 4 else 400},
         )  # fmt: skip

@@ -135,12 +135,17 @@ def lever(pictures: Pictures) -> np.ndarray:
 
 
 def required(scene: Scene) -> tuple[str, ...]:
-    """The straight edges that are needed, then those around the face of each circle, which stand for it."""
+    """The straight edges that are needed, then those around the face of each circle, which stand for it.
+
+    Of a face with none pieces of the circle itself do.
+    """
     solid, names = scene.solid, list(straight(scene))
     rims = {name for circle in solid.circles for name in circle.edges}
     for name in circles(scene):
-        face = solid.circle(name).face
-        names += [edge.name for edge in solid.edges if face in edge.faces and edge.name not in rims][:_STAND_INS]
+        circle = solid.circle(name)
+        beside = [edge.name for edge in solid.edges if circle.face in edge.faces and edge.name not in rims]
+        pieces = circle.edges[:: max(1, len(circle.edges) // _STAND_INS)]
+        names += (beside or pieces)[:_STAND_INS]
     return tuple(dict.fromkeys(names))
 
 

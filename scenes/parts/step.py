@@ -18,8 +18,10 @@ import trimesh
 from scenes.errors import InvalidInput
 from scenes.files import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
+from scenes.parts.curved import Curved
 from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Surface, Torus
+from scenes.parts.walls import exact_walls
 from scenes.units import Unit, in_unit
 
 FORMATS = (".step", ".stp")
@@ -93,12 +95,20 @@ class StepPart:
             raise InvalidInput("object.file must have faces without slivers, got some that vanish")
         return replace(found, face_names=self._face_names(found), circles=self._exact(found))
 
+    @cached_property
+    def curved(self) -> tuple[Curved, ...]:
+        """Whole outer spheres, cylinders and cones, as exact as the file, with the file's names or k1, k2, ..."""
+        return exact_walls(self.solid, self._owners(self.solid), self.surfaces, self.names)
+
+    def _owners(self, solid: Solid) -> np.ndarray:
+        """The part's face that each plane face of the solid belongs to, shape (F,)."""
+        _, first = np.unique(solid.triangle_faces, return_index=True)
+        return self.triangle_faces[first]
+
     def _face_names(self, solid: Solid) -> tuple[str, ...]:
         names, given = list(solid.face_names), set(solid.face_names)
         counts: dict[str, int] = {}
-        _, first = np.unique(solid.triangle_faces, return_index=True)
-        owners = self.triangle_faces[first]
-        for face, owner in enumerate(owners.tolist()):
+        for face, owner in enumerate(self._owners(solid).tolist()):
             name = self.names[owner]
             if not name:
                 continue

@@ -1,4 +1,4 @@
-"""What a scene's object has to name: vertices, edges and circles, with places and lengths."""
+"""What a scene's object has to name: vertices, edges, circles and curved surfaces, with places and lengths."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes import AnyLight, Scene
-from scenes.parts.recognised import cylinders
+from scenes import AnyLight, Curved, Mesh, Scene
+from scenes.parts.recognised import Recognised, cylinders
 
 
 def facts(scene: Scene) -> dict[str, Any]:
     """For JSON; lengths in the scene's unit."""
     solid = scene.solid
     here = {name: solid.vertex(name).tolist() for name in solid.corner_names}
+    facets = {each.name: each for each in (cylinders(solid) if isinstance(scene.object, Mesh) else ())}
     return {
         "scene": scene.name,
         "units": scene.units,
@@ -63,8 +64,9 @@ def facts(scene: Scene) -> dict[str, Any]:
                 "residual": each.residual,
                 "largest": each.largest,
             }
-            for each in cylinders(solid)
+            for each in facets.values()
         ],
+        "surfaces": [_surface(wall, facets.get(wall.name)) for wall in scene.all_walls.curved],
         "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
     }
 
@@ -95,6 +97,15 @@ def report(scene: Scene) -> Group:
         axis = " ".join(f"{x + 0.0:.2f}" for x in wall["axis"])
         row = wall["name"], *map(_number, wall["point"]), axis, _number(wall["diameter"])
         walls.add_row(*row, f"{wall['residual']:.1e}", "hole" if wall["hole"] else "outer")
+    curved = _table(
+        f"\nCurved surfaces to measure, {unit}", "name", "kind", "x", "y", "z", "axis", "radius", "residual"
+    )
+    for each in known["surfaces"]:
+        axis = " ".join(f"{x + 0.0:.2f}" for x in each["axis"] or ())
+        residual = "" if each["residual"] is None else f"{each['residual']:.1e}"
+        curved.add_row(
+            each["name"], each["kind"], *map(_number, each["centre"]), axis, _number(each["radius"]), residual
+        )
     faces = _table(f"\nPlane faces, by their middles, {unit}", "name", "x", "y", "z", "normal", "material")
     for face in known["faces"]:
         normal = " ".join(f"{x + 0.0:.2f}" for x in face["normal"])
@@ -103,8 +114,24 @@ def report(scene: Scene) -> Group:
     for light in scene.lights:
         numbers = light.distance, light.intensity, light.half_size
         lights.add_row(light.kind, light.mount, *(f"{value:.4g}" for value in numbers))
-    tables = (t for t in (corners, edges, circles, walls, faces, lights) if t.row_count)
+    tables = (t for t in (corners, edges, circles, walls, curved, faces, lights) if t.row_count)
     return Group(*parts, *tables, Text(_smooth(scene)))
+
+
+def _surface(wall: Curved, recognised: Recognised | None) -> dict[str, Any]:
+    """A curved surface; what is left of its recognition, None where the surface is known exactly."""
+    surface = wall.surface
+    axis, ends = getattr(surface, "axis", None), getattr(surface, "ends", None)
+    return {
+        "name": wall.name,
+        "kind": surface.kind,
+        "centre": wall.centre.tolist(),
+        "axis": None if axis is None else axis.tolist(),
+        "radius": wall.radius,
+        "half_angle": getattr(surface, "half_angle_deg", None),
+        "length": None if ends is None else ends[1] - ends[0],
+        "residual": recognised and recognised.residual,
+    }
 
 
 def _kind(light: AnyLight) -> dict[str, str]:
