@@ -28,31 +28,31 @@ def told(image, known=True):
 
 @pytest.mark.parametrize(("coded", "bend"), [(False, 0.0), (True, 1.2)])
 def test_bend(coded, bend, rng):
-    """Unbiased to a tenth, with a true standard error: 25 pictures; one 1.7 times as large would be seen."""
+    """Unbiased to 0.15, with a true standard error: 16 pictures; one 1.7 times as large would be seen."""
     curves = [measure.photo.quadrilateral.expected(image, CORNERS, measure.photo.recording.recording(Photograph(image)))
-              .blur.tone for image in (shot(3.0, rng, coded) for _ in range(25))]  # fmt: skip
+              .blur.tone for image in (shot(3.0, rng, coded) for _ in range(16))]  # fmt: skip
     found = np.array([curve.bend for curve in curves])
     error = np.mean([curve.error for curve in curves])
-    assert found.mean() == pytest.approx(bend, abs=0.12)
-    assert found.std(ddof=1) / error == pytest.approx(1.0, abs=0.42)
+    assert found.mean() == pytest.approx(bend, abs=0.15)
+    assert found.std(ddof=1) / error == pytest.approx(1.0, abs=0.55)
 
 
 def test_a_curve_that_was_not_undone_is_a_misfit(rng):
     """At contrast over noise 40, where goodness of fit alone does not see it and the corners are 20 sigma off."""
-    images = [shot(3.0, rng, coded=True) for _ in range(6)]
+    images = [shot(3.0, rng, coded=True) for _ in range(3)]
     found = [told(image) for image in images]
     assert {one.status for one in found} == {status.MISFIT}
     assert np.median([one.p_value for one in found]) > 1e-3
-    assert {told(shot(3.0, rng)).status for _ in range(6)} == {status.OK}
+    assert {told(shot(3.0, rng)).status for _ in range(3)} == {status.OK}
 
 
 def test_what_neither_file_nor_picture_tells(rng):
     """At contrast over noise 12 it matters and is not seen; where the contrast is small beside the level it does not
     matter; at 80 the picture shows it."""
-    assert {told(shot(13.0, rng), False).status for _ in range(4)} == {status.TONE_UNKNOWN}
-    assert {told(shot(13.0, rng)).status for _ in range(4)} == {status.OK}
-    assert {told(shot(2.0, rng, contrast=10.0, background=180.0), False).status for _ in range(4)} == {status.OK}
-    assert {told(shot(2.0, rng), False).status for _ in range(4)} == {status.OK}
+    assert {told(shot(13.0, rng), False).status for _ in range(2)} == {status.TONE_UNKNOWN}
+    assert {told(shot(13.0, rng)).status for _ in range(2)} == {status.OK}
+    assert {told(shot(2.0, rng, contrast=10.0, background=180.0), False).status for _ in range(2)} == {status.OK}
+    assert {told(shot(2.0, rng), False).status for _ in range(2)} == {status.OK}
 
 
 def test_what_is_known_of_files(tmp_path, rng):
