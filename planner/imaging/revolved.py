@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -19,7 +20,8 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
 from scenes import Curved, Scene, Solid
-from scenes.parts.surfaces import Cone, Cylinder, axes_beside
+from scenes.parts.surfaces import axes_beside
+from scenes.parts.surfaces.ruled import Ruled
 
 _ON_WALL, _ON_SHOULDER, _AROUND = 20, 10, 64  # rings, and places on a ring
 _FINE = 5  # places in one of them, around, over which a form factor is summed
@@ -114,40 +116,61 @@ def _passes(rings: Rings, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
     return free
 
 
+class _Stretch(NamedTuple):
+    """A wall in heights along the first one's axis: (z, r) of its lower and of its upper end."""
+
+    wall: Curved
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+
 @lru_cache(maxsize=16)
 def rings_of(solid: Solid) -> Rings | None:
-    """The rings of a part of outer walls that follow each other along one axis; None of any other."""
-    walls = [each.surface for each in solid.curved]
-    if not walls or not all(isinstance(wall, Cylinder | Cone) and not wall.hollow for wall in walls):
+    """The rings of a part of outer walls that follow each other along one axis, and nothing else; None of any other."""
+    walls = [each for each in solid.curved if isinstance(each.surface, Ruled) and not each.surface.hollow]
+    if not walls or len(walls) < len(solid.curved) or not _is_turned(solid):
         return None
-    origin, axis, near = walls[0].point, walls[0].axis, _SAME * solid.extent
-    heights = [float((wall.point - origin) @ axis) for wall in walls]
-    beside = [np.linalg.norm(wall.point - origin - z * axis) for wall, z in zip(walls, heights, strict=True)]
-    ends = [(z + wall.ends[0], z + wall.ends[1]) for wall, z in zip(walls, heights, strict=True)]
-    radii = [tuple(wall.radius + wall.slope * end for end in wall.ends) for wall in walls]
-    aligned = max(beside) <= near and all(wall.axis @ axis > 1 - _SAME for wall in walls)
-    if not aligned or any(abs(a[1] - b[0]) > near for a, b in pairwise(ends)):
+    origin, axis, near = walls[0].surface.point, walls[0].surface.axis, _SAME * solid.extent
+    found = sorted((_stretch(wall, wall.surface, origin, axis) for wall in walls), key=lambda each: each.low)
+    if any(abs(a.high[0] - b.low[0]) > near for a, b in pairwise(found)):
         return None
     rows, of_wall, own, count = [], {}, [], 0
-    for k, wall in enumerate(solid.curved):
-        rows.append(_cells((ends[k][0], radii[k][0]), (ends[k][1], radii[k][1]), _ON_WALL))
-        of_wall[wall.name] = slice(count, count + _ON_WALL)
-        own += [wall.faces] * _ON_WALL
+    for each, following in zip(found, [*found[1:], None], strict=True):
+        rows.append(_cells(each.low, each.high, _ON_WALL))
+        of_wall[each.wall.name] = slice(count, count + _ON_WALL)
+        own += [each.wall.faces] * _ON_WALL
         count += _ON_WALL
-        step = radii[k + 1][0] - radii[k][1] if k + 1 < len(walls) else 0.0
-        if abs(step) > near:
-            rows.append(_cells((ends[k][1], radii[k][1]), (ends[k][1], radii[k + 1][0]), _ON_SHOULDER))
-            own += [_shoulder(solid, origin + ends[k][1] * axis, axis, near)] * _ON_SHOULDER
+        if following is not None and abs(following.low[1] - each.high[1]) > near:
+            rows.append(_cells(each.high, (each.high[0], following.low[1]), _ON_SHOULDER))
+            own += [_shoulder(solid, origin + each.high[0] * axis, axis, near)] * _ON_SHOULDER
             count += _ON_SHOULDER
-    profile = [_ends(*pair) for pair in zip(ends, radii, strict=True)]
+    profile = [_ends(each.low, each.high) for each in found]
     axes = np.stack([*axes_beside(axis), axis])
     return Rings(*np.concatenate(rows, 1), of_wall, tuple(own), np.concatenate(profile), axes, origin)
 
 
-def _ends(heights: tuple[float, float], radii: tuple[float, float]) -> np.ndarray:
-    share = np.linspace(0, 1, 2 if radii[0] == radii[1] else _PIECES + 1)[:, None]
-    low, high = np.array([heights, radii]).T
-    return low + share * (high - low)
+def _is_turned(solid: Solid) -> bool:
+    """Whether the walls are about one axis, and all that is no facet of theirs is plane and across it."""
+    first, near = solid.curved[0].surface, _SAME * solid.extent
+    for each in solid.curved:
+        away = each.surface.point - first.point
+        if np.linalg.norm(np.cross(away, first.axis)) > near or abs(each.surface.axis @ first.axis) < 1 - _SAME:
+            return False
+    rest = np.ones(len(solid.faces), bool)
+    rest[[face for each in solid.curved for face in each.faces]] = False
+    return bool((np.abs(solid.normals[rest] @ first.axis) > 1 - _SAME).all())
+
+
+def _stretch(wall: Curved, surface: Ruled, origin: np.ndarray, axis: np.ndarray) -> _Stretch:
+    middle, sign = float((surface.point - origin) @ axis), 1.0 if surface.axis @ axis > 0 else -1.0
+    ends = sorted((middle + sign * end, surface.radius + surface.slope * end) for end in surface.ends)
+    return _Stretch(wall, *ends)
+
+
+def _ends(low: tuple[float, float], high: tuple[float, float]) -> np.ndarray:
+    """Two places (z, r) and, of a cone, some between them, (k, 2)."""
+    share = np.linspace(0, 1, 2 if low[1] == high[1] else _PIECES + 1)[:, None]
+    return np.array(low) + share * (np.array(high) - np.array(low))
 
 
 def _cells(low: tuple[float, float], high: tuple[float, float], count: int) -> np.ndarray:

@@ -21,7 +21,9 @@ from scenes.parts.recognised import cylinders
 from scenes.parts.rims import MIN_SEGMENTS
 from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cone, Cylinder, Sphere, Surface, axes_beside
+from scenes.parts.surfaces.ruled import Ruled
 
+_LIMBED = Sphere | Cylinder | Cone
 _SAME = 1e-7  # of the part's size: two surfaces are one, a corner lies at an end
 _STEP = 2 * np.pi / MIN_SEGMENTS * (1 + 1e-6)  # rad: a facet is not wider
 _LOOSE = 1e-3  # of the radius: the same of surfaces that were recognised
@@ -66,7 +68,8 @@ def exact_walls(
         owner = int(owners[faces[0]])
         given, called = names[owner], {wall.name for wall in found}
         name = given if given and given not in taken | called else f"k{len(found) + 1}"
-        wall = _whole(solid, name, surfaces[owner], faces, near)
+        surface = surfaces[owner]
+        wall = _whole(solid, name, surface, faces, near) if isinstance(surface, _LIMBED) else None
         if wall is not None:
             found.append(wall)
     return tuple(found)
@@ -76,7 +79,7 @@ def _kinds(surfaces: tuple[Surface | None, ...], near: float) -> np.ndarray:
     """A number for each different outer sphere, cylinder and cone, -1 for all else."""
     kinds, known = np.full(len(surfaces), -1), []
     for i, surface in enumerate(surfaces):
-        if isinstance(surface, Sphere | Cylinder | Cone) and not surface.hollow:
+        if isinstance(surface, _LIMBED) and not surface.hollow:
             same = (k for k, other in enumerate(known) if _alike(surface, other, near))
             kinds[i] = next(same, len(known))
             if kinds[i] == len(known):
@@ -84,19 +87,19 @@ def _kinds(surfaces: tuple[Surface | None, ...], near: float) -> np.ndarray:
     return kinds
 
 
-def _alike(one: Surface, other: Surface, near: float) -> bool:
+def _alike(one: Sphere | Ruled, other: Sphere | Ruled, near: float) -> bool:
     """Whether two surfaces are one, wherever they end."""
-    if type(one) is not type(other):
-        return False
-    if isinstance(one, Sphere):
+    if isinstance(one, Sphere) or isinstance(other, Sphere):
+        if not (isinstance(one, Sphere) and isinstance(other, Sphere)):
+            return False
         return bool(np.abs([*(one.centre - other.centre), one.radius - other.radius]).max() <= near)
     away = other.point - one.point
     along = float(away @ one.axis)
     turned = float(one.axis @ other.axis)
-    slope, slopes = (getattr(s, "half_angle_deg", 0.0) for s in (one, other))
-    radius = one.radius + np.tan(np.radians(slope)) * along
+    slope, slopes = (np.arctan(s.slope) for s in (one, other))
+    radius = one.radius + one.slope * along
     off = [*(away - along * one.axis), radius - other.radius, (1 - abs(turned)) * one.radius]
-    return bool(np.abs(off).max() <= near and abs(slopes * np.sign(turned) - slope) <= np.degrees(_SAME))
+    return bool(np.abs(off).max() <= near and abs(slopes * np.sign(turned) - slope) <= _SAME)
 
 
 def _pieces(solid: Solid, kinds: np.ndarray) -> list[np.ndarray]:
@@ -108,7 +111,9 @@ def _pieces(solid: Solid, kinds: np.ndarray) -> list[np.ndarray]:
     return [np.flatnonzero(group == g) for g in dict.fromkeys(group[kinds >= 0].tolist())]
 
 
-def _whole(solid: Solid, name: str, surface: Surface, faces: Iterable[int], near: float) -> Curved | None:
+def _whole(
+    solid: Solid, name: str, surface: Sphere | Cylinder | Cone, faces: Iterable[int], near: float
+) -> Curved | None:
     """The surface between its ends, its point in their middle; None where it is hollow or not whole."""
     loops, faces = [solid.faces[f] for f in faces], tuple(int(f) for f in faces)
     if surface.hollow or any(solid.holes[f] for f in faces if solid.holes):
@@ -126,15 +131,14 @@ def _whole(solid: Solid, name: str, surface: Surface, faces: Iterable[int], near
     if _widest(ends, surface) > _STEP:
         return None
     middle, half = (low + high) / 2, (high - low) / 2
-    change = {"point": surface.point + middle * surface.axis, "ends": (-half, half)}
-    if isinstance(surface, Cone):
-        change["radius"] = surface.radius + float(np.tan(np.radians(surface.half_angle_deg))) * middle
-        if change["radius"] <= half * abs(np.tan(np.radians(surface.half_angle_deg))):
-            return None
-    return Curved(name, replace(surface, **change), faces)
+    radius = surface.radius + surface.slope * middle
+    if radius <= half * abs(surface.slope):
+        return None
+    point = surface.point + middle * surface.axis
+    return Curved(name, replace(surface, point=point, radius=radius, ends=(-half, half)), faces)
 
 
-def _widest(points: np.ndarray, surface: Cylinder | Cone) -> float:
+def _widest(points: np.ndarray, surface: Ruled) -> float:
     """Largest step around the axis between points (n, 3), rad: a flat is no facet."""
     one, two = axes_beside(surface.axis)
     away = points - surface.point
