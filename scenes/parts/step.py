@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -19,7 +20,7 @@ from scenes.errors import InvalidInput
 from scenes.files import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
 from scenes.parts.curved import Curved
-from scenes.parts.solid import Solid
+from scenes.parts.solid import Edge, Solid
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Surface, Torus
 from scenes.parts.walls import exact_walls
 from scenes.units import Unit, in_unit
@@ -93,7 +94,15 @@ class StepPart:
         found = mesh.solid(body)
         if len(found.triangles) != len(self.triangles):
             raise InvalidInput("object.file must have faces without slivers, got some that vanish")
-        return replace(found, face_names=self._face_names(found), circles=self._exact(found))
+        edges = tuple(self._known(found))
+        return replace(found, face_names=self._face_names(found), circles=self._exact(found), edges=edges)
+
+    def _known(self, solid: Solid) -> Iterator[Edge]:
+        """The edges; those between facets of one face are none of the part, however unevenly it was divided."""
+        owners = self._owners(solid)
+        for edge in solid.edges:
+            one, two = owners[list(edge.faces)]
+            yield replace(edge, kind="smooth") if one == two and edge.kind == "sharp" else edge
 
     @cached_property
     def curved(self) -> tuple[Curved, ...]:

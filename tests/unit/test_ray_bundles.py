@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import scenes
+from planner.imaging import rays as rays_module
 from planner.imaging.rays import _first, _may_meet, _plates, first_face
 
 
@@ -35,3 +36,20 @@ def test_the_same_is_met(kind, rng):
     assert met > 10
     if kind == "rim":
         assert left < 0.5 * 4 * len(plates.faces)
+
+
+@pytest.mark.parametrize("kind", ["rim", "parallel", "towards", "every way"])
+def test_many_triangles_are_met_in_small_bundles(kind, rng, monkeypatch):
+    """As if the bracket had thousands: rays from several places in any order, sorted, and back in their order."""
+    monkeypatch.setattr(rays_module, "_MANY", 100)
+    solid = scenes.load("bracket_mm").solid
+    parts = [rays(kind, solid, rng, count) for count in (1, 20, 300, 900)]
+    order = rng.permutation(1221)
+    origins, vectors = (np.concatenate(each)[order] for each in zip(*parts, strict=True))
+    vectors[0] = np.nan
+    face, t = first_face(solid, origins, vectors, ())
+    with np.errstate(invalid="ignore"):
+        whole = _first(_plates(solid), origins, vectors)
+    assert (face == whole[0]).all()
+    assert t == pytest.approx(whole[1], rel=1e-12)
+    assert (face >= 0).sum() > 10
