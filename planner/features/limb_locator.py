@@ -11,7 +11,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import gamma, pbdv
 
 from planner.features.locator import edge_blur
@@ -106,6 +105,8 @@ def _second_and_third(weights: np.ndarray, square: np.ndarray, x: np.ndarray) ->
 @lru_cache(maxsize=8)
 def _cylinder_functions(count: int) -> BSpline:
     """D_(k - p / 2)(-x) for |x| up to `_TOLD`, k of 1, 2, 5, 6 and p below ``count``, to 1e-13: a table's are quick."""
+    from scipy.interpolate import make_interp_spline  # slow to load, and rarely needed
+
     nodes = np.linspace(-_TOLD, _TOLD, 385)
     index = np.add.outer([1.0, 2.0, 5.0, 6.0], -np.arange(count) / 2).ravel()
     return make_interp_spline(nodes, pbdv(index, -nodes[:, None])[0], 7)
