@@ -8,13 +8,16 @@ Gamma(p + 1) w^(p - 2) exp(-x^2 / 4) D_(1-p)(-x) / sqrt(2 pi) at x = y / w, with
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import gamma, pbdv
 
 from planner.features.locator import edge_blur
 from planner.imaging.limbs.shading import Profile
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 _STEPS, _LONGEST = 20, 0.5  # of Newton's method; w
 _SETTLED = 1e-10  # w

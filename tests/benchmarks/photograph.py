@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.photograph [NAME ...]
 
-Makes the pictures (2592 x 1944 px) and runs the whole command for each, a process of its own, with ``--json`` and with an
-overlay (``-o``) beside: processor time (user and system), wall time, the largest resident memory, and the statuses.
+Makes the pictures (2592 x 1944 px) and runs the whole command for each, a process of its own, with ``--json`` and with
+an overlay (``-o``) beside: processor time (user and system), wall time, the largest resident memory, and the statuses.
 The limit is 2 s on a core that does nothing else, and 500 MiB; NAME picks pictures by the beginnings of their names.
 """
 
@@ -112,7 +112,7 @@ PICTURES: dict[str, tuple[Callable[[], np.ndarray], str]] = {
 def cost(photo: Path, *options: str) -> Cost:
     """Of ``ice measure`` with a photograph, in a process of its own."""
     command = [sys.executable, "-m", "validation.cli", "measure", str(photo), "--json", *options]
-    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as wrong:
         begun = time.perf_counter()
         process = subprocess.Popen(command, stdout=out, stderr=wrong, env={**os.environ, **threads})
