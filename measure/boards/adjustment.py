@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.optimize import least_squares
 
 from measure.boards.chessboard import Board
 from measure.boards.parameters import Model
@@ -73,6 +72,8 @@ def adjust(boards: Sequence[Board], square: float, model: Model, start: np.ndarr
             row[:, :k], row[:, k + 6 * i : k + 6 * i + 6] = model.derivatives(by_camera), by_pose
             rows.append(row)
         return np.concatenate(rows)
+
+    from scipy.optimize import least_squares  # slow to load, and rarely needed
 
     with np.errstate(all="ignore"):
         found = least_squares(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
@@ -109,6 +108,8 @@ def most_likely(
         values = start.copy()
         values[which] = part
         return values
+
+    from scipy.optimize import least_squares  # slow to load, and rarely needed
 
     found = least_squares(
         lambda part: (problem.expected(full(part), noise) - observed) / sigma,

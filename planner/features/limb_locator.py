@@ -8,14 +8,16 @@ Gamma(p + 1) w^(p - 2) exp(-x^2 / 4) D_(1-p)(-x) / sqrt(2 pi) at x = y / w, with
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.special import gamma, pbdv
 
 from planner.features.locator import edge_blur
 from planner.imaging.limbs.shading import Profile
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 _STEPS, _LONGEST = 20, 0.5  # of Newton's method; w
 _SETTLED = 1e-10  # w
@@ -106,6 +108,8 @@ def _second_and_third(weights: np.ndarray, square: np.ndarray, x: np.ndarray) ->
 @lru_cache(maxsize=8)
 def _cylinder_functions(count: int) -> BSpline:
     """D_(k - p / 2)(-x) for |x| up to `_TOLD`, k of 1, 2, 5, 6 and p below ``count``, to 1e-13: a table's are quick."""
+    from scipy.interpolate import make_interp_spline  # slow to load, and rarely needed
+
     nodes = np.linspace(-_TOLD, _TOLD, 385)
     index = np.add.outer([1.0, 2.0, 5.0, 6.0], -np.arange(count) / 2).ravel()
     return make_interp_spline(nodes, pbdv(index, -nodes[:, None])[0], 7)

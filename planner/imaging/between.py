@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from planner.imaging.bore import Bore, bores, light_in_bore, place_in
 from planner.imaging.emitters import GLANCE, Emitter, emitters
@@ -13,6 +13,9 @@ from planner.imaging.exchange import Exchanged, exchanged
 from planner.imaging.pictures import Pictures
 from planner.imaging.reflectance import diffuse
 from scenes import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RectBivariateSpline
 
 
 def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from planner.features.seen import plane_axes
 from planner.imaging.emitters import Emitter
@@ -20,6 +20,9 @@ from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
 from scenes import Circle, Scene, Solid
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RectBivariateSpline
 
 _AROUND, _DEEP = 48, 24  # patches
 _FINE = 5  # places in a patch, around, over which a form factor is averaged
@@ -67,6 +70,8 @@ def light_in_bore(
 
     Irradiance in units of the signal of a white face. ``others`` sends what comes from outside.
     """
+    from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
+
     white = diffuse(scene.surfaces.of(bore.faces[0]))
     form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
     outside = 0.0, 0.0

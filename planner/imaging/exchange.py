@@ -10,15 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from planner.imaging.emitters import Emitter
 from planner.imaging.irradiance import beam
 from planner.imaging.rays import first_face
 from planner.imaging.reflectance import diffuse
 from scenes import Scene, Solid
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RectBivariateSpline
 
 _PATCHES = 160  # about, on all faces together
 _LEAST = 6  # of a face, each way
@@ -237,6 +240,8 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     )
     direct = _direct(scene, exchange.patches, emitters)
     sent = np.linalg.solve(np.eye(direct.size) - white[:, None] * exchange.between, white * direct)
+    from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
+
     told = {
         sheet.face: RectBivariateSpline(sheet.u, sheet.v, (factors @ sent).reshape(sheet.u.size, sheet.v.size))
         for sheet, factors in zip(exchange.sheets, exchange.at_nodes, strict=True)

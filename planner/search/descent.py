@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize
 
 from planner.search.refinement import shifted
 
@@ -63,6 +62,8 @@ def descend(
                 return np.finfo(float).max
             least = found
         return min(found / unit, np.finfo(float).max)
+
+    from scipy.optimize import minimize  # slow to load, and rarely needed
 
     x, lowest = np.zeros(ends[-1]), 1.0
     for size in sizes:

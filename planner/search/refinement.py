@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import direction
@@ -71,6 +70,8 @@ def refine(
     unit = unit if np.isfinite(unit) else known
     if not np.isfinite(unit):
         raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {sensor}, {light}")
+    from scipy.optimize import minimize  # slow to load, and rarely needed
+
     x, least = np.zeros(begin.size), 1.0
     for size in sizes:
         found = minimize(

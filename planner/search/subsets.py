@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement, islice
 
 import numpy as np
-from scipy.optimize import linprog
 
 from planner.search.trusted import DEAREST
 
@@ -205,6 +204,8 @@ def _relaxed(told: np.ndarray, over: str) -> tuple[float, np.ndarray]:
     """
     if over != "minimax":
         return _least_sum(told)
+    from scipy.optimize import linprog  # slow to load, and rarely needed
+
     (pictures, quantities), scale = told.shape, told.max()
     found = linprog(
         np.r_[np.zeros(pictures), -1.0], A_ub=np.c_[-told.T / scale, np.ones(quantities)], b_ub=np.zeros(quantities),

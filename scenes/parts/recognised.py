@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -112,6 +111,8 @@ def _least_squares(points: np.ndarray, point: np.ndarray, axis: np.ndarray, radi
     def distances(numbers):
         start, way = line(numbers)
         return np.linalg.norm(np.cross(away - start, way), axis=1) - numbers[4]
+
+    from scipy.optimize import least_squares  # slow to load, and rarely needed
 
     done = least_squares(distances, [0.0, 0.0, 0.0, 0.0, 1.0], method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     start, way = line(done.x)
