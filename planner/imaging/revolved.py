@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from planner.imaging.emitters import GLANCE, Emitter, emitters
 from planner.imaging.irradiance import beam
@@ -22,6 +21,9 @@ from planner.imaging.reflectance import diffuse
 from scenes import Curved, Scene, Solid
 from scenes.parts.surfaces import axes_beside
 from scenes.parts.surfaces.ruled import Ruled
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RectBivariateSpline
 
 _ON_WALL, _ON_SHOULDER, _AROUND = 20, 10, 64  # rings, and places on a ring
 _FINE = 5  # places in one of them, around, over which a form factor is summed
@@ -229,6 +231,8 @@ def _told(pictures: Pictures, rings: Rings, name: str) -> RectBivariateSpline:
     part = rings.of_wall[name]
     angles = np.concatenate([_ANGLES[-3:] - 2 * np.pi, _ANGLES, _ANGLES[:4] + 2 * np.pi])
     values = np.concatenate([arriving[part, -3:], arriving[part], arriving[part, :4]], 1)
+    from scipy.interpolate import RectBivariateSpline  # takes a tenth of a second to load
+
     return RectBivariateSpline(rings.z[part], angles, values)
 
 
