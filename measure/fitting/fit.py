@@ -16,9 +16,11 @@ from measure.fitting.result import HELD, Fit
 from measure.fitting.start import aligned_difference, near, shows_something
 from measure.goodness import WORST
 from measure.photo.noise import noise_sigma
-from measure.status import LOW_CONTRAST, MISFIT, OK
+from measure.photo.tone_curve import tone_curve
+from measure.status import LOW_CONTRAST, MISFIT, OK, worst
 from planner.imaging.whole import check_drawable
 from scenes import InvalidInput, Noise, Picture, Scene, Setting, several
+from scenes.photograph import Photograph
 
 _ROUNDS = 2  # of weights and noise
 _GROSS = 50.0  # noise variances: a mean squared residual of more is no part that the scene knows
@@ -44,9 +46,9 @@ def fit(
     ----------
     scene : Scene
         One convex body before darkness, without textures.
-    images : sequence of array_like, shape (height, width)
-        Grey levels of photographs, as large as the camera's; those that differ by noise alone are repetitions of one
-        pose, and tell the noise (`measure.fitting.photograph.grouped`).
+    images : sequence of array_like, shape (height, width), or of Photograph
+        Grey levels of photographs, linear in the light, as large as the camera's; those that differ by noise alone are
+        repetitions of one pose, and tell the noise (`measure.fitting.photograph.grouped`).
     sensor, light : Pose or pair of float, optional
         Where the search begins, degrees, for all photographs; the scene's settings, whichever is nearest, where not
         given. Some 15 degrees off are found back.
@@ -70,12 +72,13 @@ def fit(
             raise InvalidInput(f"free must be some of {', '.join(OPTIONS)}, got {name!r}")
     if noise not in ("estimated", "given"):
         raise InvalidInput(f"noise must be estimated or given, got {noise!r}")
-    shots = tuple(grouped(list(images)))
+    known = all(image.tone_known for image in images if isinstance(image, Photograph))
+    shots = tuple(grouped([image.levels if isinstance(image, Photograph) else image for image in images]))
     _check_size(scene, shots)
     begin = scene.noise if noise == "given" else _guessed(scene.noise, shots)
     pictures = tuple(_nearest(scene, each, sensor, light, begin) for each in shots)
     parameters = Parameters.of(pictures, tuple(free))
-    return _fitted(parameters, shots, begin, noise == "estimated")
+    return _fitted(parameters, shots, begin, noise == "estimated", known)
 
 
 def _check_size(scene: Scene, shots: tuple[Shots, ...]) -> None:
@@ -118,7 +121,7 @@ def _difference(picture: Picture, shots: Shots, noise: Noise) -> float:
     return aligned_difference(Parameters.of((picture,)), (shots,), noise)
 
 
-def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, estimated: bool) -> Fit:
+def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, estimated: bool, known: bool) -> Fit:
     if not all(shows_something(each, noise) for each in shots):
         return _nothing(parameters, shots)
     values = near(parameters, shots, noise)
@@ -130,7 +133,7 @@ def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, esti
             break
         values[which[~kept]] = parameters.start()[which[~kept]]
         which = which[kept]
-    return _result(parameters, shots, values, noise, told, which, final)
+    return _result(parameters, shots, values, noise, told, which, final, known)
 
 
 def _solved(parameters, shots, values, noise, which, estimated):
@@ -195,13 +198,14 @@ def _told(parameters: Parameters, which: np.ndarray, white: np.ndarray) -> np.nd
     return kept
 
 
-def _result(parameters, shots, values, noise, told, which, final) -> Fit:
+def _result(parameters, shots, values, noise, told, which, final, known) -> Fit:
     problem, covariance, white, variance = final
     sigma = np.sqrt(variance)
     expected = problem.expected(values, noise)
     rest = (problem.observed() - expected) / sigma
     freedom = np.inf if told is None else told.freedom
     p = p_value(parts(rest, expected / sigma, expected, problem.pixels, white, covariance), freedom)
+    tone = tone_curve(white * sigma[:, None], expected, rest * sigma, 1 / sigma, which.size).status(known)
     whole = np.zeros((values.size, values.size))
     whole[np.ix_(which, which)] = covariance
     statuses = tuple(OK if i in which else HELD for i in range(values.size))
@@ -216,7 +220,7 @@ def _result(parameters, shots, values, noise, told, which, final) -> Fit:
         )
         whole = _with_noise(whole, told, noise)
         statuses = (*statuses, OK, OK)
-    status = MISFIT if p < WORST else HELD if HELD in statuses else OK
+    status = MISFIT if p < WORST else worst(tone, HELD if HELD in statuses else OK)
     repeated = any(each.count > 1 for each in shots)
     return Fit(
         names, units, start, values, whole, statuses, status, p, scene, pictures,

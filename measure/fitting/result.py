@@ -30,7 +30,9 @@ class Fit:
         "ok", or "ill_conditioned": the photographs do not tell it, and it is held at its start.
     status : str
         "ok"; "misfit" where the photographs are not what the model says, and neither values nor standard errors are to
-        be trusted; "ill_conditioned" where something is held; "low_contrast" where nothing stands out of the noise.
+        be trusted, a tone curve that was not undone among that; "ill_conditioned" where something is held;
+        "tone_unknown" where neither files nor photographs tell whether levels are linear in the light, and a value
+        would move by more than 0.3 standard errors; "low_contrast" where nothing stands out of the noise.
     p_value : float
         Goodness of fit.
     scene : Scene

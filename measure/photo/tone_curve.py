@@ -16,6 +16,7 @@ from measure.goodness import WORST
 
 _CODED = 1.2  # b of sRGB and its like: a file that does not say what it is holds either light or this
 _CLEAR = 12.0  # by how much the one's chi-square must exceed the other's
+_SLIGHT = 2.0  # standard errors that a power may be from 1: beyond it may be a weaker curve than sRGB
 _HARMLESS = 0.3  # of a standard error: a shift that does not count
 _DARKEST = 1e-3  # of the brightest level: darker ones are taken for this
 
@@ -46,7 +47,8 @@ class ToneCurve:
         """Whether levels are either linear in the light rather than sRGB, or it makes no difference."""
         if abs(self.shift) < _HARMLESS:
             return True
-        return bool(((_CODED - self.bend) ** 2 - self.bend**2) / self.error**2 > _CLEAR)
+        clear = ((_CODED - self.bend) ** 2 - self.bend**2) / self.error**2 > _CLEAR
+        return bool(clear and abs(self.bend) < _SLIGHT * self.error)
 
     def status(self, known: bool) -> str:
         """``misfit``, ``tone_unknown`` or ``ok``; ``known`` where levels are said to be linear in the light."""

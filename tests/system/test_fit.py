@@ -10,6 +10,7 @@ import measure
 import planner
 import render
 import scenes
+from scenes.photograph import Photograph
 from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt
 from validation import picture_file
 from validation.cli.application import app
@@ -163,3 +164,11 @@ def test_a_mesh_stays_where_it_is(tmp_path, rng):
     written = fitted_scene.write(found, "wedge", tmp_path / "there" / "fitted.toml")
     assert len(written.solid.vertices) == len(wedge.solid.vertices)
     assert written.camera.distance == found.value("camera.distance")
+
+
+def test_files_that_do_not_tell_their_tone_curve_are_not_taken_for_light(shot):
+    """Of the power 0.85, which the fit explains: told by the picture, or said to be unknown."""
+    hidden, _, photograph = shot
+    coded = np.rint(255 * (photograph / 255) ** 0.85)
+    assert hidden.fit([Photograph(coded, 255.0, tone_known=False)]).status in ("tone_unknown", "misfit")
+    assert hidden.fit([Photograph(photograph, 255.0, tone_known=False)]).status in ("ok", "tone_unknown")

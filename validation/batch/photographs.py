@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, ValidationError
 
-from scenes import InvalidInput, Pose, Scene, image_file
+from scenes import InvalidInput, Pose, Scene, photograph
 from scenes.errors import describe
 from scenes.files import read_toml
 from scenes.model import Model
@@ -202,7 +202,7 @@ def _readable(scene: Scene, wanted: list[list[Path]], progress) -> tuple[list[tu
 
 
 def _read(path: Path, size: tuple[int, int]) -> np.ndarray:
-    image = image_file.read(path)
+    image = photograph.read(path).levels
     if image.shape != size:
         raise InvalidInput(
             f"{path} must be {size[1]} x {size[0]} px as the camera, got {image.shape[1]} x {image.shape[0]}"

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import scenes
-from scenes import InvalidInput, image_file
+from scenes import InvalidInput
+from scenes.photograph import read
+from validation.cli import recorded
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -33,6 +35,8 @@ def fit_command(
     light: Annotated[str | None, typer.Option(metavar="P,A", help="The same of the free light, or of each.")] = None,
     free: Annotated[str, typer.Option(metavar="LIST", help="Free besides: focal, k1, with commas between.")] = "",
     noise: Annotated[str, typer.Option(help="estimated, or given by the scene.")] = "estimated",
+    gamma: recorded.Gamma = None,
+    channel: recorded.Channel = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Write the fitted scene.")
     ] = None,
@@ -48,10 +52,11 @@ def fit_command(
     check_file("--output", output, ".toml")
     check_file("--residuals", residuals, ".png")
     loaded = scenes.load(scene)
-    images = [image_file.read(path) for path in photographs]
+    images = [read(path, gamma, channel) for path in photographs]
     import measure
 
     found = measure.fit(loaded, images, *poses, free=tuple(filter(None, free.split(","))), noise=noise)
+    levels = [image.levels for image in images]
     if output:
         from validation import fitted_scene
 
@@ -59,7 +64,7 @@ def fit_command(
     if residuals:
         from validation.report import residuals as picture
 
-        picture.draw(found, images, residuals)
+        picture.draw(found, levels, residuals)
     if as_json:
         say({"scene": loaded.name, **facts(found), "fitted": None if output is None else str(output)}, True, "")
     else:
@@ -113,6 +118,10 @@ def _said(found: Fit) -> str:
     if found.status == "low_contrast":
         return "low_contrast: nothing in the photograph stands out of its noise"
     text = f"{found.status} (goodness of fit: p = {found.p_value:.2g}); {len(found.pictures)} pose(s), {whence}"
+    if found.status == "tone_unknown":
+        text += (
+            "\nNeither the files nor the photographs tell whether levels are linear in the light: say it by --gamma."
+        )
     if found.status == "misfit":
         text += "\nThe photographs are not what the model says: neither values nor standard errors are to be trusted."
     return text
