@@ -21,6 +21,14 @@ def box(width: float, height: float, degrees: float, centre, shape: tuple[int, i
     return _drawn(body, centre, shape, blur)
 
 
+def parallelogram(corners: np.ndarray, shape: tuple[int, int], blur: float) -> np.ndarray:
+    """Part of each pixel that a parallelogram (4, 2), px, fills."""
+    (ax, ay), (bx, by) = corners[1] - corners[0], corners[3] - corners[0]
+    square = galsim.Box(1.0, 1.0, gsparams=_EXACT)
+    body = galsim.Transform(square, jac=(ax, bx, ay, by), gsparams=_EXACT).withFlux(abs(ax * by - ay * bx))
+    return _drawn(body, corners.mean(0), shape, blur)
+
+
 def ellipse(parameters, shape: tuple[int, int], blur: float) -> np.ndarray:
     """Part of each pixel that an ellipse fills: (x, y, a, b), px, and the angle of a in degrees."""
     x, y, a, b, angle = parameters

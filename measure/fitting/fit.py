@@ -24,6 +24,7 @@ from scenes.photograph import Photograph
 
 _ROUNDS = 2  # of weights and noise
 _GROSS = 50.0  # noise variances: a mean squared residual of more is no part that the scene knows
+_HARMLESS = 0.3  # standard errors that a value may move with what is held
 _SINGULAR = 1e-10  # of the information's largest eigenvalue, parameters scaled alike
 
 
@@ -198,6 +199,15 @@ def _told(parameters: Parameters, which: np.ndarray, white: np.ndarray) -> np.nd
     return kept
 
 
+def _alone(problem: Problem, values: np.ndarray, noise: Noise, which: np.ndarray, final) -> np.ndarray:
+    """Which of the free parameters hardly move with what is held, which may be anything within reason, bool (f,)."""
+    _, covariance, white, variance = final
+    held = np.setdiff1d(np.arange(values.size), which)
+    beside = problem.jacobian(values, noise, held) / np.sqrt(variance)[:, None]
+    moved = covariance @ (white.T @ beside) * [problem.parameters.free[i].known for i in held]
+    return (np.abs(moved) < _HARMLESS * np.sqrt(np.diag(covariance))[:, None]).all(1)
+
+
 def _result(parameters, shots, values, noise, told, which, final, known) -> Fit:
     problem, covariance, white, variance = final
     sigma = np.sqrt(variance)
@@ -208,7 +218,8 @@ def _result(parameters, shots, values, noise, told, which, final, known) -> Fit:
     tone = tone_curve(white * sigma[:, None], expected, rest * sigma, 1 / sigma, which.size).status(known)
     whole = np.zeros((values.size, values.size))
     whole[np.ix_(which, which)] = covariance
-    statuses = tuple(OK if i in which else HELD for i in range(values.size))
+    told_alone = which[_alone(problem, values, noise, which, final)]
+    statuses = tuple(OK if i in told_alone else HELD for i in range(values.size))
     start, (values, whole) = parameters.start(), parameters.settled(values, whole)
     scene, pictures = _scene(parameters, values, noise)
     names, units = parameters.names, tuple(each.unit for each in parameters.free)

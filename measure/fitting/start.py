@@ -20,7 +20,7 @@ _COARSE = (
 _SMOOTH, _SHARP = 1.5, 1.0  # shrunk px of the Gaussian; at least
 _TURNS = (-12.0, 0.0, 12.0)
 _KEPT = 3
-_POOR = 4.0  # of the best attempt's misfit to be expected from noise: then other starts are tried
+_POOR = 1.0  # of the best attempt's misfit to be expected from noise: then other starts are tried
 _GLANCE = 256  # px of a photograph's larger side, to see where the object is
 _FEW, _FAINT = 4, 20.0  # pixels that are averaged; standard deviations, of which white noise spans 8
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from tests.proofs.affine_fits import affine_fits
 from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
@@ -21,6 +22,7 @@ from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command()(affine_fits)
 app.command()(boards)
 app.command()(conditions)
 app.command()(crowded)

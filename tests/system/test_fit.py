@@ -11,6 +11,7 @@ import planner
 import render
 import scenes
 from scenes.photograph import Photograph
+from tests.proofs import affine_fits
 from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt
 from validation import picture_file
 from validation.cli.application import app
@@ -172,3 +173,15 @@ def test_files_that_do_not_tell_their_tone_curve_are_not_taken_for_light(shot):
     coded = np.rint(255 * (photograph / 255) ** 0.85)
     assert hidden.fit([Photograph(coded, 255.0, tone_known=False)]).status in ("tone_unknown", "misfit")
     assert hidden.fit([Photograph(photograph, 255.0, tone_known=False)]).status in ("ok", "tone_unknown")
+
+
+@pytest.mark.parametrize(("number", "held"), [(0, {"camera.exposure", "light.polar", "light.azimuth"}), (11, set())])
+def test_photographs_that_another_maker_drew(number, held):
+    """Two lit faces tell no light and no exposure, three do; what goes with what is held is not told either."""
+    rng = np.random.default_rng([1, number])
+    scene, true = affine_fits.hidden(rng)
+    found = affine_fits.fitted(scene, true, rng)
+    assert {name for name, said in zip(found.names, found.statuses, strict=True) if said != "ok"} == held
+    each = affine_fits.pulls(found, true)
+    assert len(each) == 12 - len(held)
+    assert max(map(abs, each.values())) < 3.5

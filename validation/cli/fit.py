@@ -105,7 +105,7 @@ def _table(name: str, found: Fit) -> Table:
     rows = zip(found.names, found.units, found.start, found.values, found.standard_errors, found.statuses, strict=True)
     for name, unit, start, value, error, status in rows:
         told = f"{error:.2g}" if status == "ok" else "-"
-        held = "" if status == "ok" else "held: the photographs do not tell it"
+        held = "" if status == "ok" else "the photographs do not tell it"
         made.add_row(name, f"{start:.6g}", f"{value:.6g}", told, unit, held)
     return made
 
