@@ -16,7 +16,7 @@ _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear light, red, green, blue (IEC 
 _SEEN = 1_000_000  # pixels that tell a channel's contrast and noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Photograph:
     """Levels of light.
 

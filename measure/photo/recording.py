@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,10 +52,7 @@ def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording
 
     Edges that hardly stand out of the noise pass for smooth, and look like noise that is not white.
     """
-    image = photo.levels
-    scale = scale_of(image, photo.full)
-    patches = smooth_patches(image, scale.limits, scale.step)
-    curve = curve_of(patches, scale, image)
+    patches, curve, compressed = _whole(photo)
     if corners is not None:
         patches = _beside(patches, corners)
     found = correlation(patches, curve)
@@ -64,7 +62,16 @@ def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording
         added = (total - 1) * curve.step**2 / 12  # the rounding's part stays as it is
         curve = replace(curve, dark=max(total * curve.dark + added, 0.0), gain=total * curve.gain)
         found = replace(found, kernel=found.kernel / total)
-    return Recording(curve, found, photo.compressed or is_compressed(image, scale.step), patches)
+    return Recording(curve, found, compressed, patches)
+
+
+@lru_cache(maxsize=1)  # several shapes of one photograph are measured one after the other
+def _whole(photo: Photograph) -> tuple[Patches, NoiseCurve, bool]:
+    """Smooth patches, noise against level, and whether it was compressed."""
+    scale = scale_of(photo.levels, photo.full)
+    patches = smooth_patches(photo.levels, scale.limits, scale.step)
+    compressed = photo.compressed or is_compressed(photo.levels, scale.step)
+    return patches, curve_of(patches, scale, photo.levels), compressed
 
 
 def _beside(patches: Patches, corners: np.ndarray) -> Patches:
