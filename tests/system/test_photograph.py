@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -123,6 +124,19 @@ def test_overlay(tmp_path):
         overlay.write(tmp_path / "a.gif", image, found)
     with pytest.raises(InvalidInput, match="--output must be a writable file"):
         overlay.write(tmp_path / "no" / "a.png", image, found)
+
+
+def test_a_board_is_drawn_with_all_its_corners(tmp_path):
+    """And one that is not measured without an ellipse."""
+    image = board()
+    found = measure.photograph(image)
+    (one,) = found.found
+    ovals = len(overlay.figure(image, found).axes[0].patches)
+    assert ovals >= len(one.corners) == 35
+    covariance = one.covariance.copy()
+    covariance[:2] = covariance[:, :2] = np.nan
+    less = replace(found, found=(replace(one, covariance=covariance),))
+    assert len(overlay.figure(image, less).axes[0].patches) == ovals - 1
 
 
 def ice(*arguments):

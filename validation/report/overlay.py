@@ -96,12 +96,13 @@ def _factors(found: measure.Shapes, scale: float) -> tuple[float, float]:
 
 
 def _largest(one: measure.Found) -> float:
-    return max(float(np.linalg.eigvalsh(block)[-1]) for block in _blocks(one))
+    known = [block for block in _blocks(one) if np.isfinite(block).all()]
+    return max((float(np.linalg.eigvalsh(block)[-1]) for block in known), default=0.0)
 
 
 def _blocks(one: measure.Found) -> list[np.ndarray]:
-    """Covariance of each corner, or of the centre."""
-    count = 4 if one.corners is not None else 1
+    """Covariance of each corner, NaN where a board's is not measured, or of the centre."""
+    count = 1 if one.corners is None else len(one.corners)
     return [one.covariance[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(count)]
 
 
@@ -140,7 +141,8 @@ def _drawn(axes: Axes, one: measure.Found, number: int, scale: float, residual: 
     if one.covariance is not None:
         middles = one.corners if one.corners is not None else one.ellipse[None, :2]
         for middle, block in zip(middles, _blocks(one), strict=True):
-            _oval(axes, middle, corner**2 * block, colour)
+            if np.isfinite(block).all():
+                _oval(axes, middle, corner**2 * block, colour)
     if outline is not None:
         middle = outline.mean(0)
         taken = [each.get_position() for each in axes.texts if each.get_text().isdigit()]
