@@ -94,21 +94,21 @@ def report(scene: Scene) -> Group:
         circles.add_row(*row, "hole" if circle["hole"] else "outer")
     walls = _table(f"\nCylinders among the facets, {unit}", "name", "x", "y", "z", "axis", "diameter", "residual", "")
     for wall in known["cylinders"]:
-        axis = " ".join(f"{x + 0.0:.2f}" for x in wall["axis"])
+        axis = " ".join(f"{x:z.2f}" for x in wall["axis"])
         row = wall["name"], *map(_number, wall["point"]), axis, _number(wall["diameter"])
         walls.add_row(*row, f"{wall['residual']:.1e}", "hole" if wall["hole"] else "outer")
     curved = _table(
         f"\nCurved surfaces to measure, {unit}", "name", "kind", "x", "y", "z", "axis", "radius", "residual"
     )
     for each in known["surfaces"]:
-        axis = " ".join(f"{x + 0.0:.2f}" for x in each["axis"] or ())
+        axis = " ".join(f"{x:z.2f}" for x in each["axis"] or ())
         residual = "" if each["residual"] is None else f"{each['residual']:.1e}"
         curved.add_row(
             each["name"], each["kind"], *map(_number, each["centre"]), axis, _number(each["radius"]), residual
         )
     faces = _table(f"\nPlane faces, by their middles, {unit}", "name", "x", "y", "z", "normal", "material")
     for face in known["faces"]:
-        normal = " ".join(f"{x + 0.0:.2f}" for x in face["normal"])
+        normal = " ".join(f"{x:z.2f}" for x in face["normal"])
         faces.add_row(face["name"], *map(_number, face["at"]), normal, face["material"] or "")
     lights = _table(f"\nLights, {unit}", "kind", "mount", "distance", "intensity", "half size")
     for light in scene.lights:
