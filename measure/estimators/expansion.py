@@ -74,7 +74,7 @@ class Pieces:
         direction = away / lengths[:, None]
         normal = np.stack([-direction[:, 1], direction[:, 0]], 1)
         steps = _vertex_steps(model, moving)
-        found = _integrals(model, state, moving, lengths, normal, direction)
+        found = _integrals(model, state, lengths)
         return cls(
             tuple(pixels for pixels, _ in found),
             tuple(rows for _, rows in found),
@@ -173,52 +173,43 @@ def _contrast_steps(model: BlurredModel, moving: np.ndarray, ends: np.ndarray) -
     return steps
 
 
-def _integrals(model, state, moving, lengths, normal, direction):
+def _integrals(model: BlurredModel, state: State, lengths: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each moving piece its pixels and the integrals along it, (ROWS, p)."""
-    nodes, (traced, kernels, scatter, _) = model.nodes, model.drawn(state)
-    slot = scatter.slot
+    nodes, (traced, kernels, scatter, product, _) = model.nodes, model.drawn(state)
     contrast = model.contrasts(state, traced)
-    x, y = [
-        [k, *(kernels.derivative(axis, order) for order in (1, 2, 3))] for axis, k in ((0, kernels.x), (1, kernels.y))
-    ]
+    x, y = ([k, *(kernels.derivative(axis, order) for order in (1, 2, 3))]
+            for axis, k in ((0, kernels.x), (1, kernels.y)))  # fmt: skip
     size = np.linalg.norm(traced.tangent, axis=1)
     found = []
-    for n, piece in enumerate(moving):
-        here = np.flatnonzero(nodes.piece == piece)
+    for length, piece in zip(lengths, model.moving, strict=True):
+        here = slice(*np.searchsorted(nodes.piece, [piece, piece + 1]))
         tangent = traced.tangent[here] / size[here, None]
         nx, ny = -tangent[:, 1], tangent[:, 0]
-        stretch = traced.area[here] * lengths[n] / size[here]  # recorded px across for an ideal one
-        pixels, index = np.unique(slot[here], return_inverse=True)
-        index = index.ravel()
+        stretch = traced.area[here] * length / size[here]  # recorded px across for an ideal one
+        pixels, local = scatter.of_nodes(here)
         weight = nodes.weight[here] * traced.area[here]
         dim = weight * contrast[here]
         kx, ky = ([k[here] for k in part] for part in (x, y))
         images = [
-            (dim, _sum(kx, ky, ((0, 0, 1.0),))),
-            (weight, _sum(kx, ky, ((0, 0, 1.0),))),
+            (dim, product[here]),
+            (weight, product[here]),
             (dim * stretch, _sum(kx, ky, ((1, 0, nx), (0, 1, ny)))),
-            (dim * size[here] / lengths[n], _sum(kx, ky, ((1, 0, tangent[:, 0]), (0, 1, tangent[:, 1])))),
+            (dim * size[here] / length, _sum(kx, ky, ((1, 0, tangent[:, 0]), (0, 1, tangent[:, 1])))),
             (dim * stretch**2, _sum(kx, ky, ((2, 0, nx**2), (1, 1, 2 * nx * ny), (0, 2, ny**2)))),
             (dim * stretch**3, _sum(kx, ky, (
                 (3, 0, nx**3), (2, 1, 3 * nx**2 * ny), (1, 2, 3 * nx * ny**2), (0, 3, ny**3)))),
         ]  # fmt: skip
-        rows = np.empty((ROWS, pixels.size))
-        for (kernel, powers), first in zip(_ROWS, _STARTS, strict=False):
-            scale, image = images[kernel]
-            for power in range(powers):
-                values = image * (scale * nodes.t[here] ** power)[:, None, None]
-                rows[first + power] = np.bincount(index, values.ravel(), pixels.size)
-        inside = pixels < model.x.size
-        found.append((pixels[inside], rows[:, inside]))
+        powers = np.vander(nodes.t[here], max(count for _, count in _ROWS), increasing=True)
+        rows = [
+            local.at_all(images[kernel][1], images[kernel][0][:, None] * powers[:, :count]).T for kernel, count in _ROWS
+        ]
+        found.append((pixels, np.concatenate(rows)))
     return found
 
 
 def _sum(x: list[np.ndarray], y: list[np.ndarray], terms) -> np.ndarray:
     """Sum of factor times derivative of k(x) k(y), (n, w, w)."""
-    return sum(
-        y[j][:, :, None] * (x[i] * np.reshape(factor, (-1, 1)) if np.ndim(factor) else x[i] * factor)[:, None]
-        for i, j, factor in terms
-    )
+    return sum(y[j][:, :, None] * (x[i] * factor[:, None])[:, None] for i, j, factor in terms)
 
 
 class Seen(NamedTuple):

@@ -16,12 +16,11 @@ import numpy as np
 from scipy.special import ndtr
 
 from planner.imaging.arrangement import BACKGROUND, Arrangement
+from planner.imaging.kernels import Kernels, Scatter
 from planner.imaging.lens import lens_jacobian
+from planner.imaging.quadrature import Nodes
 
 LEAST_BLUR = 0.3  # px; a sharper image is modelled as this sharp
-_REACH = 5.0  # standard deviations of the blur at which a kernel ends: 3e-7 of a step is cut off
-_SPACING = 1.1  # largest distance of nodes in standard deviations of the blur: 1e-6 of a step
-_PANEL = 40  # nodes of one Gauss-Legendre rule at most
 
 
 class State(NamedTuple):
@@ -32,14 +31,6 @@ class State(NamedTuple):
     blur: float
 
 
-class Nodes(NamedTuple):
-    """Quadrature nodes on all pieces, n of them: piece, fraction of its length, weight."""
-
-    piece: np.ndarray
-    t: np.ndarray
-    weight: np.ndarray
-
-
 class Traced(NamedTuple):
     """The nodes' recorded places (n, 2), tangents dx/dt (n, 2), area factors of the lens (n,), blurs (n,)."""
 
@@ -47,46 +38,6 @@ class Traced(NamedTuple):
     tangent: np.ndarray
     area: np.ndarray
     blur: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Kernels:
-    """Kernels of each node on its window of w x w pixels, and where they lie.
-
-    Attributes
-    ----------
-    x, y : ndarray, shape (n, w)
-        k at the columns and rows of the window.
-    column, row : ndarray of int, shape (n,)
-        The window's first pixel.
-    reach : int
-        The window is 2 reach + 1 wide.
-    place : ndarray, shape (n, 2)
-    blur : ndarray, shape (n,)
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    column: np.ndarray
-    row: np.ndarray
-    place: np.ndarray
-    blur: np.ndarray
-
-    def derivative(self, axis: int, order: int) -> np.ndarray:
-        """Derivative of k by the node's x (axis 0) or y (axis 1), order 1 to 3, shape (n, w)."""
-        upper, lower = self._bounds(axis)
-        s = self.blur[:, None]
-
-        def density(u):
-            hermite = (1, -u, u * u - 1)[order - 1]
-            return hermite * np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
-
-        return (density(upper) - density(lower)) / s**order
-
-    def _bounds(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
-        first = self.row if axis else self.column
-        u = self.place[:, axis, None] - first[:, None] - np.arange(self.x.shape[1])
-        return (u + 0.5) / self.blur[:, None], (u - 0.5) / self.blur[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +89,7 @@ class BlurredModel:
         arrangement = self.arrangement
         ends = arrangement.recorded(arrangement.vertices[arrangement.pieces])
         lengths = np.nan_to_num(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1))
-        parts = [_rule(float(length), max(arrangement.blur_px, LEAST_BLUR)) for length in lengths]
-        piece = np.repeat(np.arange(len(parts)), [t.size for t, _ in parts])
-        t, weight = (np.concatenate(part) if parts else np.empty(0) for part in zip(*parts, strict=True))
-        return Nodes(piece, t, weight)
+        return Nodes.on(lengths, max(arrangement.blur_px, LEAST_BLUR))
 
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:
@@ -208,27 +156,18 @@ class BlurredModel:
             blur = np.sqrt(state.blur**2 + radius**2 / 4)
         return Traced(place, tangent, area, blur)
 
-    def kernels(self, traced: Traced) -> Kernels:
-        """Pixel kernels around each node."""
-        reach = int(np.ceil(_REACH * float(traced.blur.max(initial=LEAST_BLUR)) + 1))
-        place = np.nan_to_num(traced.place, nan=-1e6, posinf=1e6, neginf=-1e6)
-        first = np.rint(np.clip(place, -1e6, 1e6)).astype(int) - reach
-        kernels = []
-        for axis in (0, 1):
-            u = place[:, axis, None] - first[:, axis, None] - np.arange(2 * reach + 2) + 0.5
-            edges = ndtr(u / traced.blur[:, None])
-            kernels.append(edges[:, :-1] - edges[:, 1:])
-        return Kernels(kernels[0], kernels[1], first[:, 0], first[:, 1], place, traced.blur)
-
     def slots(self, kernels: Kernels) -> np.ndarray:
         """Number of the pixel at each place of each node's window, P where there is none, (n, w, w)."""
-        left, top, width, height = self._window
-        steps = np.arange(kernels.x.shape[1])
-        row, column = kernels.row[:, None] - top + steps, kernels.column[:, None] - left + steps
-        row = np.where((row >= 0) & (row < height), row * width, width * height)
-        inside = (column >= 0) & (column < width)
-        place = np.where(inside[:, None, :], row[:, :, None] + column[:, None, :], width * height)
-        return self._slots[np.minimum(place, width * height)]
+        column = kernels.column[:, None] - self._window[0] + np.arange(kernels.x.shape[1])
+        return self._looked_up(self._slots, kernels, np.where(column < self._window[2], column, -1))
+
+    def _looked_up(self, table: np.ndarray, kernels: Kernels, column: np.ndarray) -> np.ndarray:
+        """What a table says of columns (n, c) of the window, outside if < 0, in the rows of kernels, (n, w, c)."""
+        _, top, width, height = self._window
+        row, outside = kernels.row[:, None] - top + np.arange(kernels.y.shape[1]), width * height
+        row = np.where((row >= 0) & (row < height), row * np.int64(width), outside)
+        column = np.where(column >= 0, column, outside)
+        return table.take(row[:, :, None] + column[:, None, :], mode="clip")
 
     def image(self, state: State) -> np.ndarray:
         """Expected grey levels above darkness, shape (P,)."""
@@ -244,60 +183,51 @@ class BlurredModel:
         image = state.levels @ drawn.design
         if not derivatives:
             return image, None
-        geometry, blur = self._moves(state, drawn.traced, drawn.kernels, drawn.scatter)
+        geometry, blur = self._moves(state, drawn)
         return image, np.concatenate([geometry, drawn.design, blur[None]]).T
 
     def drawn(self, state: State) -> Drawn:
         """What does not depend on the levels; kept of the last state, for often levels alone change."""
         return _drawn(self, state.vertices.tobytes(), float(state.blur))
 
-    def design_of(self, traced: Traced, kernels: Kernels, scatter: Scatter) -> np.ndarray:
+    def design_of(self, traced: Traced, kernels: Kernels, scatter: Scatter, product: np.ndarray) -> np.ndarray:
         """What `design` gives.
 
         A level that is linear across the kernel adds its slope times the kernel's variance times the coverage's slope.
         """
-        arrangement = self.arrangement
         covered = self._coverage(traced, kernels)
-        variance = float(np.mean(traced.blur**2)) + 1 / 12 if traced.blur.size else 0.0
-        density = scatter.by_piece(self.nodes.weight, len(arrangement.pieces))
-        normal = np.zeros((len(arrangement.pieces), 2))
-        total = np.zeros(len(arrangement.pieces))
-        np.add.at(normal, self.nodes.piece, self.nodes.weight[:, None] * traced.tangent[:, ::-1] * [-1, 1])
-        np.add.at(total, self.nodes.piece, self.nodes.weight)
-        normal = normal / np.maximum(total, 1e-300)[:, None]
-        rows = []
-        for region, (basis, slope) in enumerate(zip(self.basis, self.slopes, strict=True)):
-            sign = (arrangement.sides[:, 0] == region).astype(float) - (arrangement.sides[:, 1] == region)
-            rise = (sign[:, None] * normal).T @ density
-            rows.append(basis * covered[region] + variance * np.einsum("bip,ip->bp", slope, rise))
-        return np.concatenate(rows)
+        if not any(slope.any() for slope in self.slopes):
+            return np.concatenate([basis * part for basis, part in zip(self.basis, covered, strict=True)])
+        variance = float(np.mean(traced.blur**2)) + 1 / 12
+        rise = scatter.by_piece(product, self.nodes.weight[:, None] * traced.tangent[:, ::-1] * [-1, 1])
+        parts = zip(self.basis, covered, self.slopes, (self._signs @ rise).swapaxes(0, 1), strict=True)
+        return np.concatenate(
+            [basis * part + variance * np.einsum("bip,ip->bp", slope, to) for basis, part, slope, to in parts]
+        )
+
+    @cached_property
+    def _signs(self) -> np.ndarray:
+        """1 where a region lies on a piece's first side, -1 on its other, (R, N)."""
+        regions, sides = np.arange(len(self.arrangement.regions))[:, None], self.arrangement.sides
+        return (sides[:, 0] == regions).astype(float) - (sides[:, 1] == regions)
 
     def _coverage(self, traced: Traced, kernels: Kernels) -> np.ndarray:
         """Part of each pixel that each region covers, (R, P).
 
         K itself does not end to the left of a node, but K(u) - K(u - 1) does: its sum from the right is K.
         """
-        arrangement, (left, top, width, height) = self.arrangement, self._window
-        reach, size = (kernels.x.shape[1] - 1) // 2, self.x.size
-        s = traced.blur[:, None]
-        u = kernels.place[:, :1] - kernels.column[:, None] + 1.5 - np.arange(2 * reach + 4)
-        edge = _ramp(u / s) * s
+        left, _, width, _ = self._window
+        s, steps = traced.blur[:, None], np.arange(kernels.x.shape[1] + 1) - 1
+        edge = _ramp((kernels.place[:, :1] - kernels.column[:, None] + 1.5 - np.arange(len(steps) + 2)) / s) * s
         rise = edge[:, :-2] - 2 * edge[:, 1:-1] + edge[:, 2:]
-        column = np.minimum(kernels.column[:, None] - left + np.arange(-1, 2 * reach + 1), width - 1)
-        row = kernels.row[:, None] - top + np.arange(2 * reach + 1)
-        value = (kernels.y * (self.nodes.weight * traced.tangent[:, 1])[:, None])[:, :, None] * rise[:, None]
-        inside = ((row >= 0) & (row < height))[:, :, None] & (column >= 0)[:, None, :]
-        place = self._last[np.where(inside, row[:, :, None] * width + column[:, None, :], height * width)]
-        covered = np.empty((len(arrangement.regions), size))
-        sides = arrangement.sides[self.nodes.piece]
-        for region in range(1, len(arrangement.regions)):
-            beside = (sides == region).any(1)
-            sign = np.where(sides[beside, :1] == region, 1.0, -1.0)[:, :, None]
-            found = np.bincount(place[beside].ravel(), (sign * value[beside]).ravel(), size + 1)
-            found[size] = 0.0
-            total = found[::-1].cumsum()[::-1]  # of this row and all below
-            covered[region, self._order] = total[:-1] - total[self._below]
-        covered[BACKGROUND] = 1 - covered[1:].sum(0)
+        last = self._looked_up(self._last, kernels, np.minimum(kernels.column[:, None] - left + steps, width - 1))
+        scatter = Scatter(last, self.nodes.piece, len(self._signs.T), self.x.size)
+        value, weight = kernels.y[:, :, None] * rise[:, None], self.nodes.weight * traced.tangent[:, 1]
+        found = self._signs @ scatter.by_piece(value, weight[:, None])[0]
+        total = np.concatenate([found[:, ::-1].cumsum(1)[:, ::-1], np.zeros((len(found), 1))], 1)
+        covered = np.empty_like(found)
+        covered[:, self._order] = total[:, :-1] - total[:, self._below]
+        covered[BACKGROUND] = 1 - np.delete(covered, BACKGROUND, 0).sum(0)
         return covered
 
     def contrasts(self, state: State, traced: Traced) -> np.ndarray:
@@ -312,23 +242,30 @@ class BlurredModel:
                     found[here] += sign * (state.levels[part] @ basis)
         return found
 
-    def _moves(self, state, traced, kernels, scatter) -> tuple[np.ndarray, np.ndarray]:
+    def _moves(self, state: State, drawn: Drawn) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives by the free vertices' coordinates (2 F, P) and by the blur (P,)."""
-        arrangement, nodes = self.arrangement, self.nodes
+        arrangement, nodes, (traced, _, scatter, product, _) = self.arrangement, self.nodes, drawn
         weight = nodes.weight * self.contrasts(state, traced)
         along = state.vertices[arrangement.pieces[:, 1]] - state.vertices[arrangement.pieces[:, 0]]
         place = np.full(len(arrangement.vertices), -1)
         place[self.free] = np.arange(self.free.size)
         rows = np.zeros((2 * self.free.size, self.x.size))
-        for end, share in enumerate((1 - nodes.t, nodes.t)):
-            images = scatter.by_piece(weight * traced.area * share, len(arrangement.pieces))
+        shares = weight * traced.area * np.stack([1 - nodes.t, nodes.t])
+        for end, images in enumerate(scatter.by_piece(product, shares.T)):
             for piece, vertex in enumerate(place[arrangement.pieces[:, end]]):
                 if vertex >= 0:
                     rows[2 * vertex] += along[piece, 1] * images[piece]
                     rows[2 * vertex + 1] -= along[piece, 0] * images[piece]
-        leaning = nodes.weight * self._leaning(state, traced)
-        blur = scatter.blur(weight, traced, kernels) - scatter.at_all(leaning)
-        return rows, blur * state.blur
+        leaning = scatter.at_all(product, nodes.weight * self._leaning(state, traced))
+        return rows, (self._spread(weight, drawn) - leaning) * state.blur
+
+    def _spread(self, weight: np.ndarray, drawn: Drawn) -> np.ndarray:
+        """Derivative by the blur over the blur: a blurred image obeys the heat equation, (P,)."""
+        _, kernels, scatter, _, _ = drawn
+        across, down = (weight[:, None] * drawn.traced.tangent).T
+        values = (kernels.derivative(0, 1) * down[:, None])[:, None] * kernels.y[:, :, None]
+        values -= (kernels.derivative(1, 1) * across[:, None])[:, :, None] * kernels.x[:, None]
+        return scatter.at_all(values, np.ones(len(weight)))
 
     def _leaning(self, state: State, traced: Traced) -> np.ndarray:
         """Slope of the contrast across the piece, times its tangent's length, at each node, (n,)."""
@@ -354,83 +291,23 @@ def _ramp(u: np.ndarray) -> np.ndarray:
     return u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
 
 
-@dataclass(frozen=True, eq=False)
-class Scatter:
-    """Adds the nodes' kernels up at the pixels.
-
-    Attributes
-    ----------
-    slot : ndarray of int, shape (n, w, w)
-        Pixel of each place of each node's window; ``size`` for none.
-    product : ndarray, shape (n, w, w)
-        k(x) k(y).
-    piece : ndarray of int, shape (n,)
-    size : int
-        Number of pixels.
-    """
-
-    slot: np.ndarray
-    product: np.ndarray
-    piece: np.ndarray
-    size: int
-
-    @classmethod
-    def of(cls, model: BlurredModel, kernels: Kernels) -> Scatter:
-        slot = model.slots(kernels)
-        return cls(slot, kernels.y[:, :, None] * kernels.x[:, None, :], model.nodes.piece, model.x.size)
-
-    def by_piece(self, weight: np.ndarray, count: int) -> np.ndarray:
-        """Sum of weight (n,) times kernel for each piece, (count, P)."""
-        return self.add(self.product * weight[:, None, None], count)
-
-    def at_all(self, weight: np.ndarray) -> np.ndarray:
-        """Sum of weight (n,) times kernel, (P,)."""
-        values = self.product * weight[:, None, None]
-        return np.bincount(self.slot.ravel(), values.ravel(), self.size + 1)[:-1]
-
-    def add(self, values: np.ndarray, count: int) -> np.ndarray:
-        """Sum of values (n, w, w) for each piece at each pixel, (count, P)."""
-        found = np.bincount(self._index.ravel(), values.ravel(), count * (self.size + 1))
-        return found.reshape(count, self.size + 1)[:, :-1]
-
-    @cached_property
-    def _index(self) -> np.ndarray:
-        return self.piece[:, None, None] * (self.size + 1) + self.slot
-
-    def blur(self, weight: np.ndarray, traced: Traced, kernels: Kernels) -> np.ndarray:
-        """Derivative by the blur over the blur: a blurred image obeys the heat equation, (P,)."""
-        across = kernels.y[:, :, None] * (kernels.derivative(0, 1) * (weight * traced.tangent[:, 1])[:, None])[:, None]
-        across -= (kernels.derivative(1, 1) * (weight * traced.tangent[:, 0])[:, None])[:, :, None] * kernels.x[:, None]
-        return np.bincount(self.slot.ravel(), across.ravel(), self.size + 1)[:-1]
-
-
 class Drawn(NamedTuple):
-    """The nodes where a state puts them, their kernels, these at the pixels, and what `BlurredModel.design` gives."""
+    """What a state's levels do not change.
+
+    The nodes where it puts them, their kernels, these at the pixels, k(x) k(y) (n, w, w), and `BlurredModel.design`.
+    """
 
     traced: Traced
     kernels: Kernels
     scatter: Scatter
+    product: np.ndarray
     design: np.ndarray
 
 
 @lru_cache(maxsize=1)
 def _drawn(model: BlurredModel, vertices: bytes, blur: float) -> Drawn:
     traced = model.trace(State(np.frombuffer(vertices).reshape(-1, 2), np.empty(0), blur))
-    kernels = model.kernels(traced)
-    scatter = Scatter.of(model, kernels)
-    return Drawn(traced, kernels, scatter, model.design_of(traced, kernels, scatter))
-
-
-@lru_cache(maxsize=4096)
-def _rule(length: float, blur: float) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Legendre nodes and weights on (0, 1) for a piece so many px long: panels of at most `_PANEL` nodes."""
-    wanted = np.pi / 2 * min(length, 1e5) / (_SPACING * blur) + 4
-    panels = int(np.ceil(wanted / _PANEL))
-    nodes, weights = _legendre(int(np.ceil(wanted / panels)))
-    t = (np.arange(panels)[:, None] + (1 + nodes) / 2).ravel() / panels
-    return t, np.tile(weights / 2, panels) / panels
-
-
-@lru_cache(maxsize=128)
-def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.polynomial.legendre.leggauss(count)
+    kernels = Kernels.around(traced.place, traced.blur, LEAST_BLUR)
+    scatter = Scatter(model.slots(kernels), model.nodes.piece, len(model.arrangement.pieces), model.x.size)
+    product = kernels.product()
+    return Drawn(traced, kernels, scatter, product, model.design_of(traced, kernels, scatter, product))

@@ -12,7 +12,7 @@ EQUIVALENT: dict[str, str] = {
     'render/build.py: "near_clip": 1e-3 / camera.distance,': "nothing stands so near to the sensor",
     "validation/statistics.py: pairs = np.stack([np.asarray(first, float), np.asarray(second, float)], axis=1)":
         "of two axes the second is the last",
-    "planner/imaging/blurred.py: wanted = np.pi / 2 * min(length, 99999.0) / (_SPACING * blur) + 4":
+    "planner/imaging/quadrature.py: wanted = min(length, 99999.0) / blur + _MORE":
         "no piece in an image is so long",
     "measure/estimators/strip.py: blurs=(thin * nodes / sigma).sum(1)[:, None],":
         "a column of the least squares whose own coefficient nobody reads: its sign is free",
