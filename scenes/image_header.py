@@ -54,7 +54,7 @@ def header(data: bytes) -> Header:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data)) as image:
-                return _told(image)
+                return _told(image, data)
     except Image.DecompressionBombError:
         return Header((MOST_PIXELS + 1,))
     except Exception:  # every format raises its own
@@ -63,15 +63,20 @@ def header(data: bytes) -> Header:
         raise ValueError("no header of an image") from None
 
 
-def _told(image: Image.Image) -> Header:
+def _told(image: Image.Image, data: bytes) -> Header:
     size, lossy = image.size, image.format == "JPEG" and _loses(image)
     try:
-        exif = image.getexif()
+        exif = _exif(image, data)
         turn = exif.get(_ORIENTATION, 1) if image.format != "TIFF" else 1  # the decoder turns TIFF by itself
         curve, by = _tone(image, exif)
     except Exception:  # a broken note beside good pixels
         return Header(size, compressed=lossy)
     return Header(size, turn if turn in range(1, 9) else 1, curve, by, lossy)
+
+
+def _exif(image: Image.Image, data: bytes) -> Image.Exif:
+    """Its EXIF data. A PNG may have them behind its pixels, so that these are decoded first: only where it has any."""
+    return image.getexif() if image.format != "PNG" or b"exif" in data.lower() else Image.Exif()
 
 
 def _loses(image: Image.Image) -> bool:

@@ -13,6 +13,9 @@ from measure.boards.parameters import Model
 from scenes.errors import InvalidInput
 
 _TRIES = 200
+_LEAST = 0.05  # of the image's longer side: a focal length that no lens has
+_HELD = cv2.CALIB_USE_INTRINSIC_GUESS + cv2.CALIB_FIX_FOCAL_LENGTH + cv2.CALIB_FIX_PRINCIPAL_POINT
+_SHORTEST = 1e-2  # of the focal length where the search begins: boards that tell none let it go anywhere
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Adjusted:
 def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], model: Model) -> np.ndarray:
     """Where to begin: OpenCV's calibration, every corner counting the same.
 
+    Boards that tell no focal length may get one below 0, or next to none: then that of a common lens is held.
+
     Raises
     ------
     InvalidInput
@@ -41,12 +46,15 @@ def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], 
     there = [board.measured for board in boards]
     objects = [_object(board, square)[good].astype(np.float32) for board, good in zip(boards, there, strict=True)]
     corners = [board.corners[good].astype(np.float32) for board, good in zip(boards, there, strict=True)]
+    size = image_shape[::-1]
     try:
-        _, matrix, coefficients, turns, places = cv2.calibrateCamera(
-            objects, corners, image_shape[::-1], None, None, flags=model.flags
-        )
+        told = cv2.calibrateCamera(objects, corners, size, None, None, flags=model.flags)
+        if not min(told[1][0, 0], told[1][1, 1]) > _LEAST * max(size):
+            common = np.array([[max(size), 0, (size[0] - 1) / 2], [0, max(size), (size[1] - 1) / 2], [0, 0, 1]], float)
+            told = cv2.calibrateCamera(objects, corners, size, common, np.zeros(5), flags=model.flags | _HELD)
     except cv2.error:
         raise InvalidInput("boards must determine a camera, got boards from which none can be found") from None
+    _, matrix, coefficients, turns, places = told
     poses = [np.concatenate([np.ravel(turn), np.ravel(place)]) for turn, place in zip(turns, places, strict=True)]
     found = np.concatenate([model.values(matrix, coefficients), *poses])
     if not np.isfinite(found).all():
@@ -75,10 +83,14 @@ def adjust(boards: Sequence[Board], square: float, model: Model, start: np.ndarr
 
     from scipy.optimize import least_squares  # slow to load, and rarely needed
 
+    least = np.full(start.size, -np.inf)
+    focal = [i for i, name in enumerate(model.names) if name in ("fx", "fy")]
+    least[focal] = _SHORTEST * start[focal]
     with np.errstate(all="ignore"):
         found = least_squares(
-            residual, start, jacobian, method="trf", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=_TRIES
-        )
+            residual, start, jacobian, (least, np.inf), "trf", x_scale="jac",
+            xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=_TRIES,
+        )  # fmt: skip
     camera, poses = model.camera(found.x[:k]), found.x[k:].reshape(-1, 6)
     left = tuple(view.left(camera, pose, board) for view, pose, board in zip(views, poses, boards, strict=True))
     return Adjusted(found.x, _inverse(found.jac), float(2 * found.cost), found.fun.size, left)

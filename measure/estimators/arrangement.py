@@ -8,6 +8,7 @@ a stack around the place found for one of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -179,9 +180,10 @@ class ArrangementEstimator:
         """All parameters as one array (q,)."""
         return np.concatenate([state.vertices[self.model.free].ravel(), state.levels, [state.blur]])
 
-    def taken(self, images: np.ndarray, order: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """The used pixels of images (n, height, width), (n, P)."""
-        return np.take(images.reshape(len(images), -1), self.pixels[order], 1).astype(float, copy=False)
+    def taken(self, images: np.ndarray | Sequence[np.ndarray], order: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """The used pixels of n images (height, width), (n, P)."""
+        pixels = self.pixels[order]
+        return np.stack([image.ravel().take(pixels) for image in images]).astype(float, copy=False)
 
     def expected(self, state: State, derivatives: bool = True):
         """Recorded level (P,), one over its noise's variance, its derivative by the signal, the signal's Jacobian."""

@@ -158,6 +158,17 @@ def gaussian_rows(places: np.ndarray, scale: float, shape: tuple[int, int], weig
     return sparse.csr_array((values.ravel(), columns.ravel(), starts), (len(places), shape[0] * shape[1]))
 
 
+def reached(kernel: sparse.csr_array, *others: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
+    """The pixels (P,) that rows (m, H W) and flat indices reach, in order, and the rows at these alone, (m, P)."""
+    seen = np.zeros(kernel.shape[1], bool)
+    for indices in (kernel.indices, *others):
+        seen[indices] = True
+    pixels = np.flatnonzero(seen)
+    place = np.empty(seen.size, np.int32)
+    place[pixels] = np.arange(pixels.size)
+    return pixels, sparse.csr_array((kernel.data, place[kernel.indices], kernel.indptr), (kernel.shape[0], pixels.size))
+
+
 def _polarity(profiles: np.ndarray) -> np.ndarray:
     """+1 where the image brightens along the normal, else -1; one sign an image, shape (n,)."""
     return np.where(_rise(profiles).sum(0) >= 0, 1.0, -1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across
+from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.features.calipers import Caliper
 from measure.features.optics import Optics
 from planner.features.locator import edge_blur
@@ -26,12 +26,11 @@ def gradient_along(
     ``gain`` (m,) and ``blur`` (m,) are 1 and the optics' where not given.
     """
     offsets, across, toward = places_across(places, normals, optics.window_px)
-    kernel = second_derivative(across, toward, optics.scale_px, optics.shape)
-    pixels = np.unique(kernel.indices)
+    pixels, kernel = reached(second_derivative(across, toward, optics.scale_px, optics.shape))
     total = np.hypot(optics.scale_px, edge_blur(optics.blur_px if blur is None else blur)) * np.ones(len(places))
     nothing = np.zeros((len(places), 0)), np.zeros((0, pixels.size))
     return CrossingLocator(
-        positions, offsets, pixels, kernel[:, pixels], np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),
+        positions, offsets, pixels, kernel, np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),
         *nothing,
     )  # fmt: skip
 

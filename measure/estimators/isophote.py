@@ -10,10 +10,9 @@ in its response. Through the points of an edge goes the line that the contour of
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from measure import status
-from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across
+from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.estimators.strip import HALF_WIDTH, pixels_beside
 from measure.features.calipers import Caliper, distance_to_segment
 from measure.features.layout import BACKGROUND, Layout
@@ -33,9 +32,9 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
     optics = caliper.optics
     places, normals, gain = caliper.curve()
     offsets, across, _ = places_across(places, normals, optics.window_px)
-    kernel = -gaussian_rows(across, optics.scale_px, optics.shape)
     sides = [_side(layout, index, caliper, sign) for sign in (1, -1)]
-    pixels = np.unique(np.concatenate([kernel.indices, *(used for used, *_ in sides)]))
+    smoothed = gaussian_rows(across, optics.scale_px, optics.shape)
+    pixels, kernel = reached(-smoothed, *(used for used, *_ in sides))
     level = np.zeros((6, pixels.size))
     for k, (used, rows, *_) in enumerate(sides):
         level[3 * k : 3 * k + 3, np.searchsorted(pixels, used)] = rows / 2
@@ -45,7 +44,7 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
         positions=caliper.positions,
         offsets=offsets,
         pixels=pixels,
-        kernel=sparse.csr_array(kernel[:, pixels]),
+        kernel=kernel,
         slope_to_contrast=np.sqrt(2 * np.pi) * np.hypot(optics.scale_px, edge_blur(blur)),
         gain=gain * np.ones(len(places)),
         basis=np.concatenate([basis for _, _, basis, _ in sides], 1),
@@ -65,7 +64,7 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.n
     for segment in (*layout.ends[layout.visible], *layout.others):
         if not np.array_equal(segment, layout.ends[index]):
             clearance = np.minimum(clearance, distance_to_segment(points, *segment))
-    own = (layout.labels().flat[flat] == face) & (clearance > 0)
+    own = (layout.face_at(flat) == face) & (clearance > 0)
     if own.sum() < _FEWEST:
         own = clearance > 0  # a face too thin for pixels of its own: what is seen beyond it
     limit = min(start, _QUIETEST * clearance[own].max(initial=0.0))

@@ -188,14 +188,31 @@ class PointEstimator:
         return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
 
     def respond(self, clean: np.ndarray) -> np.ndarray:
+        return self._response(clean).toarray()
+
+    def respond_within(self, clean: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+        """The same at some pixels, flat indices in order that hold all of `pixels`, (2, P)."""
+        told = self._response(clean).tocoo()
+        found = np.zeros((2, pixels.size))
+        row, column = told.coords
+        found[row, np.searchsorted(pixels, column)] = told.data
+        return found
+
+    def _response(self, clean: np.ndarray) -> sparse.csr_array:
+        """Derivative of (level, slope) by an image's pixels, (2, H W)."""
         points, response = self.locator.linear_response(clean)
         count = response.shape[0]
         keep = points.valid[0, :count]
         if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
-            return np.full((2, clean.size), np.nan)
+            return sparse.csr_array(np.full((2, 1), np.nan)) @ _row(self.pixels, clean.size)
         weights = np.broadcast_to(points.weights, points.along.shape)[0, :count][keep]
         lines = _level_and_slope(points.along[0, :count][keep], weights)
-        return lines @ sparse.csr_array(response)[np.flatnonzero(keep)]
+        return sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
+
+
+def _row(pixels: np.ndarray, size: int) -> sparse.csr_array:
+    """1 at some of an image's pixels, (1, H W)."""
+    return sparse.csr_array((np.ones(pixels.size), pixels, [0, pixels.size]), (1, size))
 
 
 def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -209,7 +226,7 @@ class SeparateEstimator:
     """Several edges, each by an estimator of its own; None for an edge that cannot be measured."""
 
     calipers: tuple[Caliper, ...]
-    parts: tuple[PointEstimator | LikelihoodEstimator | None, ...]
+    parts: tuple[PointEstimator | None, ...]
     thinning: Thinning | None = None
     """Canny's choice of pixels where it is made once for all parts."""
 
@@ -223,17 +240,8 @@ class SeparateEstimator:
         none = np.zeros((n, 1), int)
         missing = Estimate(nothing, nothing, np.zeros((n, 1, 2)), none, none, np.full((n, 1), status.LOW_CONTRAST))
         seen = self.thinning(images) if self.thinning else images
-        parts = [missing if part is None else self._estimate(part, seen, images) for part in self.parts]
+        parts = [missing if part is None else part.estimate(seen, _noise_of(part, images)) for part in self.parts]
         return Estimate(*(np.concatenate(column, 1) for column in zip(*parts, strict=True)))
-
-    def _estimate(self, part, seen: np.ndarray | Thinned, images: np.ndarray) -> Estimate:
-        if not isinstance(part, PointEstimator):
-            return part.estimate(images)
-        optics = part.caliper.optics
-        variance = optics.noise_variance
-        if optics.noise is not None and optics.noise.gain > 0:
-            variance = optics.noise_at(images.reshape(len(images), -1)[:, part.pixels]).mean(1)
-        return part.estimate(seen, variance)
 
     def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
         edges = len(self.parts)
@@ -251,8 +259,16 @@ class SeparateEstimator:
     def respond_within(self, clean: np.ndarray) -> np.ndarray:
         """The same at `pixels` alone, (2 E, P)."""
         pixels = self.pixels
-        return np.concatenate([part.respond(clean)[:, pixels] if part else np.zeros((2, pixels.size))
+        return np.concatenate([part.respond_within(clean, pixels) if part else np.zeros((2, pixels.size))
                                for part in self.parts])  # fmt: skip
+
+
+def _noise_of(part: PointEstimator, images: np.ndarray) -> np.ndarray | float:
+    """Mean variance of the noise at the pixels of one edge, grey levels^2, of all images or of each (n,)."""
+    optics = part.caliper.optics
+    if optics.noise is None or optics.noise.gain <= 0:
+        return optics.noise_variance
+    return optics.noise_at(images.reshape(len(images), -1)[:, part.pixels]).mean(1)
 
 
 def _noisy(noise: Noise) -> Noise:

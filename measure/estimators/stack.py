@@ -71,7 +71,7 @@ def find(tool: ArrangementEstimator, images: np.ndarray, locate: Locate, first: 
 def _around(tool, images, part, centre, collected, number, first) -> np.ndarray:
     """Solve some images around a centre and collect those for which it holds: which they are."""
     expansion, batches = centre.expansion, np.split(part, range(_BATCH, part.size, _BATCH))
-    seen = [expansion.see(tool.taken(images[batch], expansion.order)) for batch in batches]
+    seen = [expansion.see(tool.taken([images[i] for i in batch], expansion.order)) for batch in batches]
     solved = expansion.solve(Seen(*map(np.concatenate, zip(*seen, strict=True))))
     good, settled = _good(tool, solved, centre), np.ones(part.size, bool)
     if first:  # the centre is its own, but for what is left of the last step

@@ -78,9 +78,8 @@ def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[
         away = distance_to_segment(points[keep], *segment)
         crowded = segment.tobytes() in apart  # too near all along: nothing would be left, so it is flagged instead
         keep[keep] = (away > clear) | (crowded & (away > NEARER * np.abs(across[keep])))
-    labels = layout.labels().flat[flat]
     expected = np.where(across > 0, *layout.sides[index])
-    keep &= (labels == expected) | (np.abs(across) < 1)
+    keep &= (layout.face_at(flat) == expected) | (np.abs(across) < 1)
     return flat[keep], points[keep], along[keep], across[keep]
 
 

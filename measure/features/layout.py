@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from skimage.draw import polygon2mask
+from skimage.measure import points_in_poly
 
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
@@ -143,19 +143,16 @@ class Layout:
         shading = None if face == BACKGROUND else self.shadings[face]
         return np.ones(points.shape[:-1]) if shading is None else shading(points)
 
-    def labels(self) -> np.ndarray:
-        """Which face each pixel belongs to, int, shape (height, width); not to be written to."""
-        return _labels(self)
-
-
-@lru_cache(maxsize=1)  # asked for edge by edge
-def _labels(layout: Layout) -> np.ndarray:
-    shape = layout.optics.shape
-    found = np.full(shape, BACKGROUND, np.int32)
-    for index, face in enumerate(layout.faces):
-        found[polygon2mask(shape, layout.optics.recorded(face)[:, ::-1])] = index
-    found.flags.writeable = False
-    return found
+    def face_at(self, pixels: np.ndarray) -> np.ndarray:
+        """Which face each of some pixels (flat indices, (P,)) belongs to, int, (P,)."""
+        points = np.stack(np.divmod(pixels, self.optics.shape[1])[::-1], 1).astype(float)
+        found = np.full(len(points), BACKGROUND)
+        for index, face in enumerate(self.faces):
+            corners = self.optics.recorded(face)
+            near = np.flatnonzero(((points >= corners.min(0)) & (points <= corners.max(0))).all(1))
+            if near.size:
+                found[near[points_in_poly(points[near], corners)]] = index
+        return found
 
 
 @lru_cache(maxsize=64)

@@ -13,6 +13,7 @@ from measure.photo.rounding import before_rounding
 from scenes import Noise
 
 _GROUPS, _LEAST = 16, 30  # groups of patches of like level, and how many patches make one
+_CHUNK = 2**16  # pixels looked at at a time
 _FEW = 20  # patches that are too few to tell the noise
 _CLEAR = 5.0  # standard errors from which the noise depends on the level
 _FALLING = 0.8  # ratio of standard deviations, at the brightest and the darkest level, that no sensor makes
@@ -120,11 +121,14 @@ def _rounding(flat: np.ndarray) -> tuple[float, int | None]:
     low, high = float(flat.min()), float(flat.max())
     if low < 0 or high > 65535:
         return 0.0, None
-    whole = flat.astype(np.uint16)
-    if not (flat == whole).all():
-        return 0.0, None
-    used = np.flatnonzero(np.bincount(whole))
-    step = float(np.gcd.reduce(np.diff(used), initial=0)) or 1.0
+    used = np.zeros(2**16, bool)
+    for at in range(0, flat.size, _CHUNK):
+        part = flat[at : at + _CHUNK]
+        whole = part.astype(np.uint16)
+        if not (part == whole).all():
+            return 0.0, None
+        used[whole] = True
+    step = float(np.gcd.reduce(np.diff(np.flatnonzero(used)), initial=0)) or 1.0
     return step, next(bits for bits in (8, 10, 12, 14, 16) if high < 2**bits)
 
 

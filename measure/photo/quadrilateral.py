@@ -197,7 +197,7 @@ def _told(shape: Shape, state: str, p: float, name: str, threshold: float, layou
 
 def _grown(levels: np.ndarray, found: _Found, seen: Recording) -> _Found:
     """With the covariance that correlated noise makes."""
-    whole = grown_covariance(levels, found.corners, found.layout, seen, found.estimator, found.threshold)
+    whole = grown_covariance(levels, found.layout, seen, found.estimator, found.threshold)
     if not np.isfinite(whole).all():
         return replace(found, covariance=found.covariance * max(float(seen.correlation.kernel.sum()), 1.0))
     change = np.sqrt(np.diag(whole) / np.diag(found.covariance))

@@ -88,9 +88,11 @@ def test_corners_that_were_not_measured_are_left_out(seen):
     assert np.isnan(less.residuals[0][0]).all()
 
 
-def test_boards_side_by_side_determine_no_focal_length():
+@pytest.mark.parametrize("seed", range(12))
+def test_boards_side_by_side_determine_no_focal_length(seed):
+    """OpenCV begins with one below 0 in every fifth of them."""
     level = [np.array([0, 0, 0.1 * i, -100.0 + 5 * i, -62.0, 420.0 + 10 * i]) for i in range(4)]
-    found = measure.calibrate_camera(boards(level, np.random.default_rng(7)), 25.0, SHAPE, model="none")
+    found = measure.calibrate_camera(boards(level, np.random.default_rng(seed)), 25.0, SHAPE, model="none")
     assert found.status == "ill_conditioned"
 
 
