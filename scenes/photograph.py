@@ -111,7 +111,8 @@ def _one_channel(path: Path, light: np.ndarray, channel: str | None) -> tuple[np
         return _channel(light, channel), channel
     if (light[..., 0] == light[..., 1]).all() and (light[..., 1] == light[..., 2]).all():
         return light[..., 1], "grey"
-    clear = {name: _contrast_to_noise(_channel(light, name)) for name in CHANNELS}
+    some = _sample(light)
+    clear = {name: _contrast_to_noise(_channel(some, name)) for name in CHANNELS}
     best = max(clear, key=clear.get)
     return _channel(light, best), f"{best} (of {', '.join(CHANNELS)} the one with the most contrast over noise)"
 
@@ -122,10 +123,15 @@ def _channel(light: np.ndarray, name: str) -> np.ndarray:
     return sum(np.float32(w) * light[..., 2 - k] for k, w in enumerate(_LUMINANCE))
 
 
+def _sample(light: np.ndarray) -> np.ndarray:
+    """About `_SEEN` pixels of an image (height, width, channels): bands of 64 rows, one under the other."""
+    apart = 64 * max(light.shape[0] * light.shape[1] // _SEEN, 1)
+    return np.concatenate([light[k : k + 64] for k in range(0, len(light), apart)])
+
+
 def _contrast_to_noise(levels: np.ndarray) -> float:
     """Spread of the smoothed levels over the middle size of what second differences leave."""
-    rows = max(levels.size // _SEEN, 1)
-    image = np.concatenate([levels[k : k + 64] for k in range(0, len(levels), 64 * rows)]).astype(np.float32)
+    image = levels.astype(np.float32)
     mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
     noise = float(np.sqrt(np.mean(np.clip(np.abs(cv2.filter2D(image, -1, mask)), 0, None) ** 2 * _still(image, mask))))
     return float(np.ptp(np.percentile(cv2.GaussianBlur(image, (0, 0), 2), [2, 98]))) / max(noise, 1e-6)

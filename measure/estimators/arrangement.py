@@ -255,12 +255,13 @@ class ArrangementEstimator:
         """The likelihood and its derivatives at a state."""
         precision, before = self.prior, mean - self.parameters(state)
         expected, weight, gain, jacobian = self.expected(state)
-        away, weighted = used - expected, jacobian * (gain * weight)[:, None]
+        root, away = np.sqrt(weight), used - expected
+        weighted = jacobian * (gain * root)[:, None]
         return Point(
             state, mean, expected, weight, gain, jacobian,
             told=gain * weight * away,
-            fisher=weighted.T @ (jacobian * gain[:, None]) + precision,
-            score=away @ weighted + precision @ before,
+            fisher=weighted.T @ weighted + precision,
+            score=(root * away) @ weighted + precision @ before,
             cost=float(away @ (weight * away) + before @ precision @ before),
         )  # fmt: skip
 

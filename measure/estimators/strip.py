@@ -6,12 +6,14 @@ import numpy as np
 
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
-from measure.features.calipers import Caliper, distance_to_segment
+from measure.features.calipers import Caliper
 from measure.features.layout import Layout
+from planner.imaging.segments import distance_to_segment, pixels_along
 
 NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
 SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the blur
 LEAST_BLUR = 0.3  # px: a sharper edge is not resolved by the pixels
+_MARGIN = 2.0  # px that a lens may make a strip wider in its recording
 HALF_WIDTH = 16.0  # px to each side; wider hardly helps, since the levels are then known well enough
 
 
@@ -88,14 +90,14 @@ def pixels_beside(caliper: Caliper, half_width: float) -> tuple[np.ndarray, ...]
 
     With them their ideal coordinates (P, 2), px, and those in the caliper (along, across).
     """
-    height, width = caliper.optics.shape
-    used = caliper.optics.recorded(caliper.at(caliper.positions[[0, -1]], np.zeros(2)))
-    low = np.maximum(np.floor(used.min(0) - half_width - 1), 0).astype(int)
-    high = np.minimum(np.ceil(used.max(0) + half_width + 2), [width, height]).astype(int)
-    y, x = (part.ravel() for part in np.mgrid[low[1] : high[1], low[0] : high[0]])
+    shape = caliper.optics.shape
+    ends = caliper.positions[[0, -1]]
+    used = caliper.optics.recorded(caliper.at(np.linspace(*ends, 17), np.zeros(17)))
+    bow = distance_to_segment(used, used[0], used[-1]).max()
+    y, x = pixels_along(used[0], used[-1], half_width + bow + _MARGIN, shape)
     points = caliper.optics.ideal(np.stack([x, y], 1).astype(float))
     along, across = caliper.coordinates(points)
     near = (
         (np.abs(across) <= half_width) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
     )
-    return (y * width + x)[near], points[near], along[near], across[near]
+    return (y * shape[1] + x)[near], points[near], along[near], across[near]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from scipy import sparse
 from scipy.ndimage import gaussian_filter1d
 
 from measure.features.layout import Layout
+from measure.once import once
 
 SEARCH = 5.0  # px to each side
 _TURN = 2.0  # degrees to each side
@@ -31,7 +30,7 @@ def align(images: np.ndarray, layout: Layout) -> np.ndarray:
     return candidates[score.argmax(0)]
 
 
-@lru_cache(maxsize=16)
+@once
 def _profiles(layout: Layout) -> tuple[sparse.csr_array, np.ndarray]:
     """Matrix (pieces * places, pixels) that averages the image along pieces of the edges at places across them.
 

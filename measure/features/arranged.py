@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -17,6 +17,7 @@ from measure.features.layout import Layout
 from measure.features.linearity import is_reliable
 from measure.features.locating import FURTHEST, locate, moved
 from measure.goodness import WORST, p_value
+from measure.once import once
 from planner.imaging.sensor import full_scale
 
 _BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
@@ -96,14 +97,14 @@ def _seen(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> lis
     ]
 
 
-@lru_cache(maxsize=64)
+@once
 def _unclipped(tool: ArrangementEstimator) -> ArrangementEstimator:
     """For images that go beyond the sensor's scale: they were not recorded by it, and nothing was cut off."""
     noise = tool.noise
     return replace(tool, noise=noise.model_copy(update={"bits": None, "sigma": float(np.sqrt(noise.variance))}))
 
 
-@lru_cache(maxsize=64)
+@once
 def _stilled(tool: ArrangementEstimator, still: frozenset[int]) -> ArrangementEstimator:
     return replace(tool, still=still)
 
@@ -222,7 +223,7 @@ def _whole(tool, found: Found, reliable: bool) -> np.ndarray:
     return np.array([status.worst(*row) for row in each])
 
 
-@lru_cache(maxsize=64)
+@once
 def _expected_reliable(tool: ArrangementEstimator) -> bool:
     return is_reliable(tool, tool.reference)
 

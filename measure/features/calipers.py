@@ -10,6 +10,7 @@ from measure import status
 from measure.features.layout import Layout
 from measure.features.optics import Optics
 from planner.features.locator import MIN_USABLE
+from planner.imaging.segments import distance_to_segment
 
 MIN_POSITIONS = 3
 
@@ -136,10 +137,3 @@ def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:
     if not towards.any():
         return clear
     return float(np.max(clear / np.maximum(sine[towards], 1e-12)))
-
-
-def distance_to_segment(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
-    """Distance of points (..., 2) from a segment, px."""
-    along = stop - start
-    fraction = np.clip((points - start) @ along / max(float(along @ along), np.finfo(float).tiny), 0, 1)
-    return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from measure import status
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 from measure.estimators.stack import Found
 from measure.features.layout import Layout
+from measure.once import once
 from planner.features.locator import MIN_USABLE
 
 SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it
@@ -34,7 +33,7 @@ def seen_edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tupl
     return middle, state.astype(str)
 
 
-@lru_cache(maxsize=64)
+@once
 def asked(tool: ArrangementEstimator) -> np.ndarray:
     """Required edges that must be seen, bool (E,): all but those which the light says are too faint.
 

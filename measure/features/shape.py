@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
 from functools import lru_cache
+from weakref import finalize
 
 import numpy as np
 
@@ -21,13 +23,22 @@ from measure.goodness import WORST
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
+_KEPT = 64  # estimators
+_TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
-@lru_cache(maxsize=64)
 def prepared(layout: Layout, name: str, threshold: float) -> Estimator | ArrangementEstimator:
-    """The estimator of a layout, made once."""
-    return estimator(layout, name, threshold)
+    """The estimator of a layout, made once; the last `_KEPT` are kept, each no longer than its layout."""
+    key = id(layout), name, threshold
+    tool = _TOOLS.pop(key, None)
+    if tool is None:
+        tool = estimator(layout, name, threshold)
+        finalize(layout, _TOOLS.pop, key, None).atexit = False
+    _TOOLS[key] = tool
+    if len(_TOOLS) > _KEPT:
+        _TOOLS.popitem(last=False)
+    return tool
 
 
 @lru_cache(maxsize=256)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from measure import status
 from measure.boards.chessboard import measured
@@ -25,6 +28,8 @@ from scenes.arrays import picture
 from scenes.photograph import Photograph
 
 _MOST = 1000
+_WORKERS = min(os.cpu_count() or 1, 4)  # threads that measure shapes
+_BLAS = ThreadpoolController()  # which keep to one each for their matrices
 _STRAIGHT = (QUADRILATERAL, TAG)
 
 
@@ -97,7 +102,7 @@ def photograph(
     estimator: str = "arrangement",
     lens: Lens | None = None,
 ) -> Shapes:
-    """Find shapes in a photograph and measure them.
+    """Find shapes in a photograph and measure them, some at a time where there are several processors.
 
     Parameters
     ----------
@@ -138,7 +143,9 @@ def photograph(
         told = "a quadrilateral, circle, ellipse, tag or chessboard" if kinds is None else f"a {' or a '.join(kinds)}"
         where = "" if box is None else " in the box"
         raise InvalidInput(f"image must show {told}{where}, got none that stands out")
-    return Shapes(tuple(_measured(photo, one, estimator, lens) for one in chosen[:most]), candidates)
+    with _BLAS.limit(limits=1), ThreadPoolExecutor(_WORKERS) as pool:
+        found = tuple(pool.map(lambda one: _measured(photo, one, estimator, lens), chosen[:most]))
+    return Shapes(found, candidates)
 
 
 def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | None) -> Found:

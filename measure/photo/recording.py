@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
 
 from measure import status
-from measure.features.calipers import distance_to_segment
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import Correlation, correlation
 from measure.photo.noise_curve import NoiseCurve, curve_of, scale_of
 from measure.photo.patches import SIDE, Patches, smooth_patches
+from planner.imaging.segments import distance_to_segment
 from scenes.photograph import Photograph
 
 _BLURRED = 3.0  # px beside an edge
+_ONE_AT_A_TIME = Lock()
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,14 @@ def recording(photo: Photograph, corners: np.ndarray | None = None) -> Recording
     return Recording(curve, found, compressed, patches)
 
 
-@lru_cache(maxsize=1)  # several shapes of one photograph are measured one after the other
 def _whole(photo: Photograph) -> tuple[Patches, NoiseCurve, bool]:
-    """Smooth patches, noise against level, and whether it was compressed."""
+    """Smooth patches, noise against level, and whether it was compressed; once for all shapes and their threads."""
+    with _ONE_AT_A_TIME:
+        return _told(photo)
+
+
+@lru_cache(maxsize=1)
+def _told(photo: Photograph) -> tuple[Patches, NoiseCurve, bool]:
     scale = scale_of(photo.levels, photo.full)
     patches = smooth_patches(photo.levels, scale.limits, scale.step)
     compressed = photo.compressed or is_compressed(photo.levels, scale.step)

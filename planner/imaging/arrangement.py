@@ -17,6 +17,7 @@ from planner.imaging.appearance import face_signal, is_plain
 from planner.imaging.lens import recorded, signed_confusion
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import depth, facing, project_ideal
+from planner.imaging.segments import distance_to_segment, pixels_along
 from scenes import Camera, Edge, Solid
 
 BACKGROUND = 0  # the region outside everything
@@ -308,13 +309,10 @@ def near_pixels(
     wanted = np.zeros(shape, bool)
     pairs = arrangement.required[arrangement.required[:, 0] >= 0] if pairs is None else pairs
     for start, stop in _segments(arrangement, pairs):
-        low = np.floor(np.minimum(start, stop) - reach)
-        high = np.ceil(np.maximum(start, stop) + reach) + 1
-        if not np.isfinite([low, high]).all():
-            continue
-        (left, top), (right, bottom) = (np.clip(v, 0, shape[::-1]).astype(int) for v in (low, high))
-        y, x = np.mgrid[top:bottom, left:right]
-        wanted[top:bottom, left:right] |= _distance(np.stack([x, y], -1), start, stop) <= reach
+        if np.isfinite([start, stop]).all():
+            y, x = pixels_along(start, stop, reach, shape)
+            near = distance_to_segment(np.stack([x, y], -1), start, stop) <= reach
+            wanted[y[near], x[near]] = True
     return np.nonzero(wanted)
 
 
@@ -325,7 +323,7 @@ def near_vertices(arrangement: Arrangement, reach: float) -> np.ndarray:
     for piece in arrangement.pieces:
         start, stop = arrangement.vertices[piece]
         points = start + np.linspace(0, 1, 33)[:, None] * (stop - start)
-        near = (_distance(points, *arrangement.vertices[pair]).min() <= reach for pair in required)
+        near = (distance_to_segment(points, *arrangement.vertices[pair]).min() <= reach for pair in required)
         if any(near):
             found |= set(piece.tolist())
     return np.array(sorted(found), int)
@@ -339,10 +337,3 @@ def _segments(arrangement: Arrangement, pairs: np.ndarray) -> list[tuple[np.ndar
         start, stop = arrangement.vertices[[a, b]]
         found += list(pairwise(arrangement.recorded(start + t * (stop - start))))
     return found
-
-
-def _distance(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
-    """Distance of points (..., 2) from a segment, px."""
-    along = stop - start
-    fraction = np.clip((points - start) @ along / max(float(along @ along), np.finfo(float).tiny), 0, 1)
-    return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)

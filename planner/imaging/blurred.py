@@ -202,7 +202,7 @@ class BlurredModel:
         rise = scatter.by_piece(product, self.nodes.weight[:, None] * traced.tangent[:, ::-1] * [-1, 1])
         parts = zip(self.basis, covered, self.slopes, (self._signs @ rise).swapaxes(0, 1), strict=True)
         return np.concatenate(
-            [basis * part + variance * np.einsum("bip,ip->bp", slope, to) for basis, part, slope, to in parts]
+            [basis * part + variance * (slope[:, 0] * to[0] + slope[:, 1] * to[1]) for basis, part, slope, to in parts]
         )
 
     @cached_property

@@ -9,6 +9,7 @@ from scipy.sparse import csc_array
 from scipy.special import ndtr
 
 REACH = 5.0  # standard deviations of the blur at which a kernel ends: 3e-7 of a step is cut off
+_PIXEL = 1.001  # px: half a pixel, a node's distance from its own, and a little, lest 0.6 px are where a window grows
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Kernels:
     @classmethod
     def around(cls, place: np.ndarray, blur: np.ndarray, least: float) -> Kernels:
         """Of nodes (n, 2) with blurs (n,), px; windows are wide enough for a blur of ``least``."""
-        reach = int(np.ceil(REACH * float(blur.max(initial=least)) + 1))
+        reach = int(REACH * float(blur.max(initial=least)) + _PIXEL)
         place = np.nan_to_num(place, nan=-1e6, posinf=1e6, neginf=-1e6)
         first = np.rint(np.clip(place, -1e6, 1e6)).astype(np.int32) - np.int32(reach)
         kernels = []

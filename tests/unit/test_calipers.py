@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from measure import status
-from measure.features.calipers import Caliper, distance_to_segment, edge_calipers, trim
+from measure.features.calipers import Caliper, edge_calipers, trim
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 
@@ -95,9 +95,3 @@ def test_frame(rng):
     assert caliper.blur(along) == 0.7
     blurred = replace(caliper, defocus=np.array([1.0, -3.0]))
     assert blurred.blur(np.array([0.0, 5.0, 10.0])) == pytest.approx(np.sqrt(0.49 + np.array([1.0, 1.0, 9.0]) / 4))
-
-
-@pytest.mark.parametrize(("point", "away"), [((5, 3), 3.0), ((-3, -4), 5.0), ((13, 4), 5.0), ((0, 0), 0.0)])
-def test_distance_to_a_segment(point, away):
-    assert distance_to_segment(np.array([point], float), np.zeros(2), np.array([10.0, 0])) == pytest.approx([away])
-    assert distance_to_segment(np.array([[3.0, 4.0]]), np.zeros(2), np.zeros(2)) == pytest.approx([5.0])

@@ -40,7 +40,8 @@ def write(path: Path, image: np.ndarray, found: measure.Shapes) -> None:
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise InvalidInput(f"--output must end in .png, .pdf, .svg, got {str(path)!r}")
     try:
-        figure(image, found).savefig(path, dpi=_DPI)
+        quick = {"pil_kwargs": {"compress_level": 1}} if path.suffix.lower() == ".png" else {}
+        figure(image, found).savefig(path, dpi=_DPI, **quick)
     except OSError as error:
         raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None
 
@@ -50,13 +51,12 @@ def figure(image: np.ndarray, found: measure.Shapes) -> Figure:
     scale = min(_WIDTH / image.shape[1], _TALLEST / image.shape[0])
     residual, corner = _factors(found, scale)
     lines = _lines(found, residual, corner)
-    height = max(image.shape[0] * scale, 40)
-    total = height + _LINE * (len(lines) + 0.6)
-    shown = Figure(figsize=(_WIDTH / _DPI, total / _DPI), facecolor="white")
-    width = image.shape[1] * scale / _WIDTH
-    axes = shown.add_axes(((1 - width) / 2, 1 - height / total, width, height / total))
-    axes.imshow(_grey(image, scale), cmap="gray", vmin=0, vmax=255, aspect="auto",
-                extent=(-0.5, image.shape[1] - 0.5, image.shape[0] - 0.5, -0.5))  # fmt: skip
+    grey = _grey(image, scale)
+    height, width = grey.shape
+    total, left = height + round(_LINE * (len(lines) + 0.6)), (_WIDTH - width) // 2
+    shown = Figure(figsize=(_WIDTH / _DPI, total / _DPI), dpi=_DPI, facecolor="white")
+    shown.figimage(cv2.cvtColor(grey, cv2.COLOR_GRAY2RGBA), left, total - height, zorder=-1)
+    axes = shown.add_axes((left / _WIDTH, 1 - height / total, width / _WIDTH, height / total))
     axes.set_axis_off()
     for one in found.candidates:
         _outlined(axes, one.outline, "white", 0.8, ":")
