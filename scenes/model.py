@@ -11,9 +11,12 @@ _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')  # by some file system
 
 
 class Model(BaseModel):
-    """Frozen, without unknown keys, without NaN or infinity."""
+    """Frozen, without unknown keys, without NaN or infinity.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    What a key means is said below it, for readers and for `scenes.reference`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def _file_name(name: str) -> str:

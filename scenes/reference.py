@@ -7,10 +7,13 @@ writes ``docs/scene-format.md`` and ``docs/scene.schema.json`` anew.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import json
 import re
 import sys
+import textwrap
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -74,12 +77,31 @@ def _documented() -> dict[str, Any]:
     found = Scene.model_json_schema()
     found["title"] = "Scene"
     found["required"] = [key for key in found["required"] if key != "name"]
-    for model in found["$defs"].values():
+    known = {"": Scene, **_models()}
+    for name, model in {"": found, **found["$defs"]}.items():
         _plain(model)
-    _plain(found)
+        for key, meaning in (_meanings(known[name]) if name in known else {}).items():
+            model["properties"][key]["description"] = meaning
     camera = found["$defs"]["Camera"]
     camera["required"] = [key for key in camera.get("required", ()) if key not in _FOLLOWING]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+
+
+def _meanings(model: type[Model]) -> dict[str, str]:
+    """What the strings below a model's keys say of them; of its bases' too."""
+    found = {}
+    for each in reversed(model.__mro__):
+        if issubclass(each, Model):
+            parsed = ast.parse(textwrap.dedent(inspect.getsource(each)))
+            written = next(part for part in parsed.body if isinstance(part, ast.ClassDef))
+            for key, below in pairwise(written.body):
+                if (
+                    isinstance(key, ast.AnnAssign)
+                    and isinstance(below, ast.Expr)
+                    and isinstance(below.value, ast.Constant)
+                ):
+                    found[key.target.id] = inspect.cleandoc(below.value.value)
+    return {field.alias or name: found[name] for name, field in model.model_fields.items() if name in found}
 
 
 def _plain(model: dict[str, Any]) -> None:

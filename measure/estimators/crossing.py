@@ -147,11 +147,11 @@ def gaussian_rows(places: np.ndarray, scale: float, shape: tuple[int, int], weig
     ``weigh(gauss, dx, dy)``, arrays (M, k, k), makes other kernels of the Gaussian and the pixels' distances, px.
     """
     radius = int(np.ceil(_TRUNCATE * scale))
-    nearest = np.rint(places).astype(int)
-    grid = np.arange(-radius, radius + 1)
+    nearest = np.rint(places).astype(np.int32)
+    grid = np.arange(-radius, radius + 1, dtype=np.int32)
     dx = (nearest - places)[:, 0, None, None] + grid
     dy = (nearest - places)[:, 1, None, None] + grid[:, None]
-    gauss = np.exp(-(dx**2 + dy**2) / (2 * scale**2)) / (2 * np.pi * scale**2)
+    gauss = np.exp(-(dx**2) / (2 * scale**2)) / (2 * np.pi * scale**2) * np.exp(-(dy**2) / (2 * scale**2))
     values = gauss / gauss.sum((1, 2), keepdims=True) if weigh is None else weigh(gauss, dx, dy)
     columns = (nearest[:, 1, None, None] + grid[:, None]) * shape[1] + nearest[:, 0, None, None] + grid
     starts = np.arange(len(places) + 1) * grid.size**2

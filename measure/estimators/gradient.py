@@ -45,7 +45,10 @@ def second_derivative(
 
     def derive(gauss: np.ndarray, dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
         across = dx * normals[:, 0, None, None] + dy * normals[:, 1, None, None]
-        values = gauss * (across**2 / scale**2 - 1) / scale**2
-        return values - gauss * (values.sum((1, 2)) / gauss.sum((1, 2)))[:, None, None]
+        across *= across
+        mean = np.einsum("nij,nij->n", gauss, across) / gauss.sum((1, 2))
+        across -= mean[:, None, None]
+        across *= gauss
+        return across / scale**4
 
     return gaussian_rows(places, scale, shape, derive)
