@@ -75,15 +75,15 @@ class Hidden:
         return {
             "camera.distance": camera.distance, "camera.roll_deg": camera.roll_deg, "camera.exposure": camera.exposure,
             "noise.dark_level": noise.dark_level, "camera.blur_px": camera.blur_px,
-            "camera.lens.distortion[0]": camera.lens.coefficients[0],
+            "camera.focal_px": camera.focal_px, "camera.lens.distortion[0]": camera.lens.coefficients[0],
             "aim.right": float(at @ axes.right), "aim.down": float(at @ axes.down),
             **dict(zip(("sensor.polar", "sensor.azimuth"), self.truth.sensor, strict=True)),
             **dict(zip(("light.polar", "light.azimuth"), self.truth.lights[0], strict=True)),
             "noise.sigma": noise.sigma, "noise.gain": noise.gain,
         }  # fmt: skip
 
-    def fit(self, photographs: list[np.ndarray], lens: bool = False) -> Fit:
-        return measure.fit(self.known, photographs, self.sensor, self.light, free=("k1",) if lens else ())
+    def fit(self, photographs: list[np.ndarray], free: tuple[str, ...] = ()) -> Fit:
+        return measure.fit(self.known, photographs, self.sensor, self.light, free=free)
 
 
 def _smaller(base: Scene) -> dict[str, float]:
@@ -175,7 +175,8 @@ def fits(
     count: Annotated[int, typer.Option(help="Hidden scenes.")] = 100,
     seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1,
     first: Annotated[int, typer.Option(help="Number of the first, to continue.")] = 0,
-    lens: Annotated[bool, typer.Option(help="Hide and free k1, too.")] = False,
+    free: Annotated[list[str], typer.Option(help="Free focal or k1, too; k1 is hidden then.")] = [],  # noqa: B006
+    shots: Annotated[int, typer.Option(help="Photographs of each pose.")] = 1,
     curves: Annotated[int, typer.Option(help="So many of them also spoilt by JPEG and the like.")] = 10,
     repeated: Annotated[int, typer.Option(help="So many of them beside repeated shots.")] = 25,
 ) -> None:
@@ -185,10 +186,9 @@ def fits(
     squares, freedom = 0.0, 0
     for number in range(first, first + count):
         rng = np.random.default_rng([seed, number])
-        hidden = Hidden.drawn(rng, lens)
+        hidden = Hidden.drawn(rng, "k1" in free)
         clean = render.image(hidden.truth)
-        photograph = render.expose(clean, hidden.truth.scene.noise, rng, 1)[0]
-        found = hidden.fit([photograph], lens)
+        found = hidden.fit(list(render.expose(clean, hidden.truth.scene.noise, rng, shots)), tuple(free))
         statuses.append(found.status)
         each = pulls(hidden, found)
         worst = max(each, key=lambda name: abs(each[name]))
