@@ -16,6 +16,7 @@ from measure.fitting.photograph import Pixels, Shots, grouped
 from measure.fitting.result import HELD, Fit
 from measure.fitting.sides import flatter_side
 from measure.fitting.start import aligned_difference, near, shows_something
+from measure.fitting.unmodelled import directions
 from measure.goodness import WORST
 from measure.photo.noise import noise_sigma
 from measure.photo.tone_curve import tone_curve
@@ -185,7 +186,9 @@ def _goodness(values: np.ndarray, noise: Noise, told: Curve | None, final) -> fl
     (problem, white, variance), freedom = final, np.inf if told is None else told.freedom
     sigma, expected = np.sqrt(variance), problem.expected(values, noise)
     rest = (problem.observed() - expected) / sigma
-    return p_value(parts(rest, expected / sigma, expected, problem.pixels, white, covariance_of(white)), freedom)
+    whole, beside = covariance_of(white), tuple(each / sigma[:, None] for each in directions(problem, values, noise))
+    found = parts(rest, expected / sigma, expected, problem.pixels, white, whole, beside)
+    return p_value(found, freedom)
 
 
 def _result(parameters, shots, values, noise, told, errors, final, p, known) -> Fit:

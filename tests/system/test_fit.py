@@ -13,7 +13,7 @@ import render
 import scenes
 from scenes.photograph import Photograph
 from tests.proofs import affine_fits
-from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt
+from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt, unfit
 from validation import picture_file
 from validation.cli.application import app
 
@@ -63,6 +63,13 @@ def test_a_rendered_photograph_gives_its_scene_back(shot):
 def test_what_the_model_does_not_know_is_a_misfit(shot, how):
     hidden, _, photograph = shot
     assert hidden.fit([spoilt(photograph, how)]).status == "misfit"
+
+
+@pytest.mark.parametrize("how", ["motion", "lens"])
+def test_what_the_camera_did_besides_is_a_misfit(small, how, rng):
+    """Motion of 3 px along one direction; k1 of 0.3, which is not free."""
+    hidden, _, _ = small
+    assert unfit(hidden, planner.image(hidden.truth), how, rng)[0] == "misfit"
 
 
 def test_standard_errors_are_those_of_repeated_fits(small):
