@@ -3,7 +3,8 @@
     python -m tests.benchmarks.photograph [NAME ...]
 
 Makes the pictures (2592 x 1944 px) and runs the whole command for each, a process of its own, with ``--json`` and with
-an overlay (``-o``) beside: processor time (user and system), wall time, the largest resident memory, and the statuses.
+an overlay (``-o``) beside: processor time (user and system), wall time, the largest resident memory, and the statuses;
+before these the library alone, once it is loaded.
 The limit is 2 s on a core that does nothing else, and 500 MiB; NAME picks pictures by the beginnings of their names.
 """
 
@@ -124,6 +125,24 @@ def cost(photo: Path, *options: str) -> Cost:
     return Cost(used.ru_utime + used.ru_stime, wall, used.ru_maxrss / 1024, process.returncode, said)
 
 
+_ALONE = """
+import sys, time
+from pathlib import Path
+import measure
+from scenes.photograph import read
+begun = time.process_time()
+measure.photograph(read(Path(sys.argv[1])))
+print(time.process_time() - begun)
+"""
+
+
+def alone(photo: Path) -> float:
+    """Processor time of reading and measuring a photograph by the library, once that is loaded, s."""
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    command = [sys.executable, "-c", _ALONE, str(photo)]
+    return float(subprocess.run(command, capture_output=True, check=True, env={**os.environ, **threads}).stdout)
+
+
 def _statuses(told: bytes) -> tuple[str, ...]:
     """Of each shape in a command's JSON; nothing where there is none."""
     shapes = json.loads(told)["found"] if told.strip() else []
@@ -139,6 +158,7 @@ def main(names: list[str]) -> None:
             make, ending = PICTURES[name]
             photo = Path(directory) / f"{name}.{ending}"
             cv2.imwrite(str(photo), np.clip(np.rint(make()), 0, 255).astype(np.uint8))
+            print(f"{name:<16}{'library':<8}{alone(photo):12.2f}", flush=True)
             for way, options in (("--json", ()), ("-o", ("-o", str(photo.with_suffix(".o.png"))))):
                 one = cost(photo, *options)
                 said = ", ".join(one.said) or f"none, exit status {one.code}"
