@@ -8,12 +8,15 @@ from typing import Any, Literal
 import numpy as np
 
 from measure.fitting.goodness import p_value, parts
+from measure.fitting.information import are_alone, are_told, covariance_of
 from measure.fitting.likelihood import Problem, most_likely
 from measure.fitting.noise import Curve, by_neighbours, by_repetition, curve
 from measure.fitting.parameters import OPTIONS, Parameters
 from measure.fitting.photograph import Pixels, Shots, grouped
 from measure.fitting.result import HELD, Fit
+from measure.fitting.sides import flatter_side
 from measure.fitting.start import aligned_difference, near, shows_something
+from measure.fitting.unmodelled import directions
 from measure.goodness import WORST
 from measure.photo.noise import noise_sigma
 from measure.photo.tone_curve import tone_curve
@@ -24,8 +27,6 @@ from scenes.photograph import Photograph
 
 _ROUNDS = 2  # of weights and noise
 _GROSS = 50.0  # noise variances: a mean squared residual of more is no part that the scene knows
-_HARMLESS = 0.3  # standard errors that a value may move with what is held
-_SINGULAR = 1e-10  # of the information's largest eigenvalue, parameters scaled alike
 
 
 def fit(
@@ -129,16 +130,24 @@ def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, esti
     which, told = np.arange(values.size), None
     while True:
         values, noise, told, final = _solved(parameters, shots, values, noise, which, estimated)
-        kept = _told(parameters, which, final[2])
+        kept = are_told(parameters, which, final[1])
         if kept.all():
             break
         values[which[~kept]] = parameters.start()[which[~kept]]
         which = which[kept]
-    return _result(parameters, shots, values, noise, told, which, final, known)
+    p = _goodness(values, noise, told, final)
+    problem, white, variance = final
+    at = values if p < WORST else flatter_side(problem, values, noise, which, white, variance)
+    if at is not values:  # what that side does not tell is held where it is
+        white = problem.jacobian(at, noise, which) / np.sqrt(variance)[:, None]
+        kept = are_told(parameters, which, white)
+        which, white = which[kept], white[:, kept]
+    alone = which[are_alone(problem, at, noise, which, white, variance)]
+    return _result(parameters, shots, values, noise, told, (which, covariance_of(white), alone), final, p, known)
 
 
 def _solved(parameters, shots, values, noise, which, estimated):
-    """Values, noise, its curve, and (problem, covariance, whitened Jacobian, variance) of the free parameters."""
+    """Values, noise, its curve, and (problem, whitened Jacobian, variance) of the free parameters."""
     told = None
     for _ in range(_ROUNDS):
         pixels = tuple(Pixels.around(parameters.pictures_at(values, k)) for k in range(len(shots)))
@@ -153,7 +162,7 @@ def _solved(parameters, shots, values, noise, which, estimated):
             break
     variance = problem.variance(values, noise)
     white = problem.jacobian(values, noise, which) / np.sqrt(variance)[:, None]
-    return values, noise, told, (problem, _covariance(white), white, variance)
+    return values, noise, told, (problem, white, variance)
 
 
 def _curve(problem: Problem, values: np.ndarray, noise: Noise) -> Curve:
@@ -172,54 +181,25 @@ def _curve(problem: Problem, values: np.ndarray, noise: Noise) -> Curve:
     return curve(signal, variance, np.concatenate([np.full(each[0].size, each[2]) for each in found]))
 
 
-def _covariance(white: np.ndarray) -> np.ndarray:
-    """Inverse Fisher information; infinite variances where it is singular."""
-    fisher = white.T @ white
-    told = np.diag(fisher)
-    if not (told > 0).all():
-        return np.diag(np.where(told > 0, 1.0, np.inf))
-    scale = 1 / np.sqrt(told)
-    values, vectors = np.linalg.eigh(fisher * scale[:, None] * scale)
-    values = np.maximum(values, _SINGULAR * values[-1])
-    return (vectors / values) @ vectors.T * scale[:, None] * scale
+def _goodness(values: np.ndarray, noise: Noise, told: Curve | None, final) -> float:
+    """How likely residuals as large as these are."""
+    (problem, white, variance), freedom = final, np.inf if told is None else told.freedom
+    sigma, expected = np.sqrt(variance), problem.expected(values, noise)
+    rest = (problem.observed() - expected) / sigma
+    whole, beside = covariance_of(white), tuple(each / sigma[:, None] for each in directions(problem, values, noise))
+    found = parts(rest, expected / sigma, expected, problem.pixels, white, whole, beside)
+    return p_value(found, freedom)
 
 
-def _told(parameters: Parameters, which: np.ndarray, white: np.ndarray) -> np.ndarray:
-    """Which of the parameters are told by the photographs, bool (f,).
-
-    The one of the largest standard error is held, where that is beyond what a linear model bears, until there is none.
-    """
-    known, kept = np.array([parameters.free[i].known for i in which]), np.ones(which.size, bool)
-    while kept.any():
-        ratio = np.where(kept, 0.0, -1.0)
-        ratio[kept] = np.sqrt(np.diag(_covariance(white[:, kept]))) / known[kept]
-        if ratio.max() <= 1:
-            break
-        kept[np.argmax(ratio)] = False
-    return kept
-
-
-def _alone(problem: Problem, values: np.ndarray, noise: Noise, which: np.ndarray, final) -> np.ndarray:
-    """Which of the free parameters hardly move with what is held, which may be anything within reason, bool (f,)."""
-    _, covariance, white, variance = final
-    held = np.setdiff1d(np.arange(values.size), which)
-    beside = problem.jacobian(values, noise, held) / np.sqrt(variance)[:, None]
-    moved = covariance @ (white.T @ beside) * [problem.parameters.free[i].known for i in held]
-    return (np.abs(moved) < _HARMLESS * np.sqrt(np.diag(covariance))[:, None]).all(1)
-
-
-def _result(parameters, shots, values, noise, told, which, final, known) -> Fit:
-    problem, covariance, white, variance = final
+def _result(parameters, shots, values, noise, told, errors, final, p, known) -> Fit:
+    (which, covariance, alone), (problem, white, variance) = errors, final
     sigma = np.sqrt(variance)
     expected = problem.expected(values, noise)
     rest = (problem.observed() - expected) / sigma
-    freedom = np.inf if told is None else told.freedom
-    p = p_value(parts(rest, expected / sigma, expected, problem.pixels, white, covariance), freedom)
-    tone = tone_curve(white * sigma[:, None], expected, rest * sigma, 1 / sigma, which.size).status(known)
+    tone = tone_curve(white * sigma[:, None], expected, rest * sigma, 1 / sigma, white.shape[1]).status(known)
     whole = np.zeros((values.size, values.size))
     whole[np.ix_(which, which)] = covariance
-    told_alone = which[_alone(problem, values, noise, which, final)]
-    statuses = tuple(OK if i in told_alone else HELD for i in range(values.size))
+    statuses = tuple(OK if i in alone else HELD for i in range(values.size))
     start, (values, whole) = parameters.start(), parameters.settled(values, whole)
     scene, pictures = _scene(parameters, values, noise)
     names, units = parameters.names, tuple(each.unit for each in parameters.free)

@@ -1,4 +1,4 @@
-"""Is what a fit leaves of photographs their noise? Asked of edges, of what is smooth, and of a camera's curve."""
+"""Is what a fit leaves of photographs their noise? Asked of edges, of what is smooth, and of a camera's habits."""
 
 from __future__ import annotations
 
@@ -38,9 +38,11 @@ def p_value(parts: list[Part], noise_freedom: float) -> float:
 
 def parts(
     white: np.ndarray, model: np.ndarray, level: np.ndarray, pixels: tuple[Pixels, ...],
-    jacobian: np.ndarray, covariance: np.ndarray,
+    jacobian: np.ndarray, covariance: np.ndarray, beside: tuple[np.ndarray, ...] = (),
 ) -> list[Part]:  # fmt: skip
     """Whitened residuals (P,) at edges, their sums over blocks of 4 x 4 px, and what a curved response would leave.
+
+    So much for what is not known; ``beside`` says what a camera may do besides.
 
     Parameters
     ----------
@@ -50,6 +52,8 @@ def parts(
         Expected level.
     jacobian : ndarray, shape (P, f)
         Whitened too; with the ``covariance`` (f, f) of the parameters it says what the fit takes out of the squares.
+    beside : tuple of ndarray, shape (P, d)
+        Whitened derivatives by what is not free: score tests.
     """
     edges, rows = [], []
     for k, part in enumerate(pixels):
@@ -60,19 +64,26 @@ def parts(
     return [
         _part(white[edge], jacobian[edge], covariance),
         _part(blocks[:, 0], blocks[:, 1:], covariance),
-        _curved(white, model, level, jacobian, covariance),
+        _score(white, _curved(model, level), jacobian, covariance),
+        *(_score(white, each, jacobian, covariance) for each in beside),
     ]
 
 
-def _curved(white, model, level, jacobian, covariance) -> Part:
-    """Score test of gamma: the residual along the derivative of level^gamma, at right angles to all parameters."""
+def _curved(model: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """The derivative of level^gamma by gamma, (P, 1)."""
     share = np.maximum(level, 1e-9) / max(float(level.max()), 1e-9)
-    along = np.maximum(model, 0.0) * np.log(np.maximum(share, 1e-9))
+    return (np.maximum(model, 0.0) * np.log(np.maximum(share, 1e-9)))[:, None]
+
+
+def _score(white: np.ndarray, along: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray) -> Part:
+    """Score test: the residual along derivatives (P, d), at right angles to all parameters."""
     across = along - jacobian @ (covariance @ (jacobian.T @ along))
-    size = float(across @ across)
-    if size <= _TOLD * float(along @ along):
-        return Part(0.0, 0.0)
-    return Part(float(across @ white) ** 2 / size, 1.0)
+    told = (across**2).sum(0) > _TOLD * (along**2).sum(0)
+    across = across[:, told] / np.sqrt((across[:, told] ** 2).sum(0))
+    sizes, vectors = np.linalg.eigh(across.T @ across)
+    kept = sizes > _TOLD
+    score = (across @ vectors[:, kept] / np.sqrt(sizes[kept])).T @ white
+    return Part(float(score @ score), float(score.size))
 
 
 def _part(residual: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray) -> Part:

@@ -95,11 +95,19 @@ def seen_coarsely(pictures: Pictures, shrink: int, smooth: float) -> Pictures:
 
 
 def most_likely(
-    problem: Problem, start: np.ndarray, noise: Noise, which: np.ndarray, variance: np.ndarray | float
+    problem: Problem,
+    start: np.ndarray,
+    noise: Noise,
+    which: np.ndarray,
+    variance: np.ndarray | float,
+    nearly: bool = False,
 ) -> np.ndarray:
-    """Values (q,) of least weighted squares; only the parameters ``which`` move, within their bounds."""
+    """Values (q,) of least weighted squares; only the parameters ``which`` move, within their bounds.
+
+    ``nearly`` ends the search sooner, as it does of smoothed images.
+    """
     observed, sigma = problem.observed(), np.sqrt(variance)
-    settled, most = (_NEARLY, _FEW) if problem.smooth else (_SETTLED, _EVALUATIONS)
+    settled, most = (_NEARLY, _FEW) if nearly or problem.smooth else (_SETTLED, _EVALUATIONS)
     free = [problem.parameters.free[i] for i in which]
     low, high = (np.array([getattr(each, side) for each in free]) for side in ("low", "high"))
     inner = 1e-6 * np.where(np.isfinite(high - low), high - low, 1.0)

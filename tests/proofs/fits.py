@@ -19,7 +19,8 @@ from planner.imaging.projection import frame
 from scenes import Block, Picture, Pose, Scene
 
 _SHOTS = 200  # of a hidden scene, whose measured variance is set beside what the fitted scene predicts
-_CURVES = ("jpeg", "gamma")
+_SPOILT = ("jpeg", "gamma", "motion", "lens")  # what the model does not know, or was not told
+_STREAK, _BENT = 3, 0.3  # px; k1, which is not freed
 POSE = ("camera.distance", "camera.roll_deg", "aim.right", "aim.down", "sensor.polar", "sensor.azimuth")
 
 
@@ -74,15 +75,15 @@ class Hidden:
         return {
             "camera.distance": camera.distance, "camera.roll_deg": camera.roll_deg, "camera.exposure": camera.exposure,
             "noise.dark_level": noise.dark_level, "camera.blur_px": camera.blur_px,
-            "camera.lens.distortion[0]": camera.lens.coefficients[0],
+            "camera.focal_px": camera.focal_px, "camera.lens.distortion[0]": camera.lens.coefficients[0],
             "aim.right": float(at @ axes.right), "aim.down": float(at @ axes.down),
             **dict(zip(("sensor.polar", "sensor.azimuth"), self.truth.sensor, strict=True)),
             **dict(zip(("light.polar", "light.azimuth"), self.truth.lights[0], strict=True)),
             "noise.sigma": noise.sigma, "noise.gain": noise.gain,
         }  # fmt: skip
 
-    def fit(self, photographs: list[np.ndarray], lens: bool = False) -> Fit:
-        return measure.fit(self.known, photographs, self.sensor, self.light, free=("k1",) if lens else ())
+    def fit(self, photographs: list[np.ndarray], free: tuple[str, ...] = ()) -> Fit:
+        return measure.fit(self.known, photographs, self.sensor, self.light, free=free)
 
 
 def _smaller(base: Scene) -> dict[str, float]:
@@ -113,15 +114,23 @@ def joint(hidden: Hidden, found: Fit, scale: float = 1.0) -> tuple[float, int]:
     return float(pull @ np.linalg.solve(correlation, pull)), len(index)
 
 
-def predicted_beside_measured(hidden: Hidden, clean: np.ndarray, found: Fit, seed: int) -> float | None:
-    """Variance of repeated shots over what the fitted scene predicts; None where that says it is not ok."""
+def predicted_beside_measured(hidden: Hidden, clean: np.ndarray, found: Fit, seed: int) -> tuple[float, float] | None:
+    """Variance of repeated shots over what the fitted scene predicts; None where that says it is not ok.
+
+    By the closed form (`planner.predict`), and by propagation through the fitted scene's own picture: the fit's errors
+    are in both, the closed form's in the first alone.
+    """
     picture = found.pictures[0]
     told = planner.predict(picture)
     if told.status != "ok":
         return None
     shots = render.expose(clean, hidden.truth.scene.noise, np.random.default_rng(seed), _SHOTS)
     values = measure.distance(shots, picture).value_px
-    return float(values.var(ddof=1) / told.variance_px2) if np.isfinite(values).all() else None
+    if not np.isfinite(values).all():
+        return None
+    variance = values.var(ddof=1)
+    propagated = measure.propagate(planner.image(picture), picture).variance_px2
+    return float(variance / told.variance_px2), float(variance / propagated)
 
 
 def spoilt(photograph: np.ndarray, how: str) -> np.ndarray:
@@ -130,6 +139,20 @@ def spoilt(photograph: np.ndarray, how: str) -> np.ndarray:
         return np.rint(255 * (photograph / 255) ** 0.7)
     data = cv2.imencode(".jpg", photograph.astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
     return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE).astype(float)
+
+
+def unfit(hidden: Hidden, clean: np.ndarray, how: str, rng: np.random.Generator) -> tuple[str, float]:
+    """What a fit says of a photograph that the model does not know so, and the largest pull of what it tells."""
+    scene = hidden.truth.scene
+    if how == "lens":
+        lens = scene.camera.lens.model_copy(update={"distortion": (_BENT, 0.0, 0.0, 0.0, 0.0)})
+        bent = scene.model_copy(update={"camera": scene.camera.model_copy(update={"lens": lens})})
+        clean = planner.image(hidden.truth.with_scene(bent))
+    elif how == "motion":
+        clean = cv2.blur(clean, (_STREAK, 1))
+    photograph = render.expose(clean, scene.noise, rng, 1)[0]
+    found = hidden.fit([spoilt(photograph, how) if how in ("jpeg", "gamma") else photograph])
+    return found.status, max(map(abs, pulls(hidden, found).values()), default=0.0)
 
 
 def table(rows: list[dict[str, float]]) -> tuple[list[str], float]:
@@ -152,20 +175,20 @@ def fits(
     count: Annotated[int, typer.Option(help="Hidden scenes.")] = 100,
     seed: Annotated[int, typer.Option(help="Root of all random numbers.")] = 1,
     first: Annotated[int, typer.Option(help="Number of the first, to continue.")] = 0,
-    lens: Annotated[bool, typer.Option(help="Hide and free k1, too.")] = False,
-    curves: Annotated[int, typer.Option(help="So many of them also through JPEG and gamma.")] = 10,
+    free: Annotated[list[str], typer.Option(help="Free focal or k1, too; k1 is hidden then.")] = [],  # noqa: B006
+    shots: Annotated[int, typer.Option(help="Photographs of each pose.")] = 1,
+    curves: Annotated[int, typer.Option(help="So many of them also spoilt by JPEG and the like.")] = 10,
     repeated: Annotated[int, typer.Option(help="So many of them beside repeated shots.")] = 25,
 ) -> None:
-    """Pulls of all parameters, predictions beside repeated shots, and what JPEG and gamma are called."""
-    rows, ratios, called, lost = [], [], {how: [] for how in _CURVES}, 0
+    """Pulls of all parameters, predictions beside repeated shots, and what the model does not know."""
+    rows, ratios, called, lost = [], [], {how: [] for how in _SPOILT}, 0
     statuses: list[str] = []
     squares, freedom = 0.0, 0
     for number in range(first, first + count):
         rng = np.random.default_rng([seed, number])
-        hidden = Hidden.drawn(rng, lens)
+        hidden = Hidden.drawn(rng, "k1" in free)
         clean = render.image(hidden.truth)
-        photograph = render.expose(clean, hidden.truth.scene.noise, rng, 1)[0]
-        found = hidden.fit([photograph], lens)
+        found = hidden.fit(list(render.expose(clean, hidden.truth.scene.noise, rng, shots)), tuple(free))
         statuses.append(found.status)
         each = pulls(hidden, found)
         worst = max(each, key=lambda name: abs(each[name]))
@@ -177,8 +200,8 @@ def fits(
         if number - first < repeated:
             ratios.append(predicted_beside_measured(hidden, clean, found, number))
         if number - first < curves:
-            for how in _CURVES:
-                called[how].append(hidden.fit([spoilt(photograph, how)], lens).status)
+            for how in _SPOILT:
+                called[how].append(unfit(hidden, clean, how, rng))
     lines, within = table(rows)
     print("\n".join(lines))
     print(f"within 3 standard errors: {within:.4f} of all pulls; {lost} parameters held")
@@ -193,14 +216,18 @@ def fits(
           f"{chance[1]:.3f})")  # fmt: skip
     print("statuses:", {status: statuses.count(status) for status in sorted(set(statuses))})
     told = np.array([ratio for ratio in ratios if ratio is not None])
-    if told.size:
-        low, high = chi2.ppf([0.025, 0.975], _SHOTS - 1) / (_SHOTS - 1)
-        freedom = told.size * (_SHOTS - 1)
+    low, high = chi2.ppf([0.025, 0.975], _SHOTS - 1) / (_SHOTS - 1)
+    for name, each in zip(("closed form", "propagated"), told.T, strict=False):
+        freedom = each.size * (_SHOTS - 1)
         pooled = chi2.ppf([0.025, 0.975], freedom) / freedom
-        inside = ((told >= low) & (told <= high)).sum()
+        inside = ((each >= low) & (each <= high)).sum()
         print(
-            f"repeated shots: measured / predicted variance {told.mean():.3f} (95 % of chance alone {pooled[0]:.3f} to "
-            f"{pooled[1]:.3f}), {inside} of {told.size} in [{low:.3f}, {high:.3f}], {len(ratios) - told.size} not ok"
+            f"repeated shots, {name}: measured / predicted variance {each.mean():.3f} (95 % of chance alone "
+            f"{pooled[0]:.3f} to {pooled[1]:.3f}), {inside} of {each.size} in [{low:.3f}, {high:.3f}], "
+            f"{len(ratios) - each.size} not ok"
         )
     for how, each in called.items():
-        print(f"{how}: {each.count('misfit')} of {len(each)} misfit")
+        said = [status for status, _ in each]
+        largest = ", ".join(f"{pull:.1f}" for status, pull in each if status != "misfit")
+        counted = {status: said.count(status) for status in sorted(set(said))}
+        print(f"{how}: {counted}; largest pulls of those that are no misfit: {largest or 'none'}")
