@@ -40,6 +40,9 @@ def fit(
 ) -> Fit:
     """Fit a scene to photographs of it, by maximum likelihood with the image model.
 
+    What the photographs do not tell is held where the scene has it; where it is likeliest, if the scene's value is
+    none that they can have been taken with.
+
     Free are the camera's six degrees of freedom (pose, distance, roll, aim), every free light's pose, exposure, level
     of darkness, blur and noise; photographs of several poses share all but the poses. A light's distance is held: it
     is nearly the same as its brightness.
@@ -126,23 +129,33 @@ def _difference(picture: Picture, shots: Shots, noise: Noise) -> float:
 def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, estimated: bool, known: bool) -> Fit:
     if not all(shows_something(each, noise) for each in shots):
         return _nothing(parameters, shots)
-    values = near(parameters, shots, noise)
-    which, told = np.arange(values.size), None
+    begin = near(parameters, shots, noise)
+    found = _with_held(parameters, shots, begin, noise, estimated, known, parameters.start())
+    if found.status != MISFIT or HELD not in found.statuses:
+        return found
+    other = _with_held(parameters, shots, begin, noise, estimated, known, None)
+    return max(found, other, key=lambda each: each.p_value)
+
+
+def _with_held(parameters, shots, values, noise, estimated, known, at: np.ndarray | None) -> Fit:
+    """With what is not told held where ``at`` (q,) has it, or where it is likeliest beside the rest."""
+    values, which, told = values.copy(), np.arange(values.size), None
     while True:
         values, noise, told, final = _solved(parameters, shots, values, noise, which, estimated)
         kept = are_told(parameters, which, final[1])
         if kept.all():
             break
-        values[which[~kept]] = parameters.start()[which[~kept]]
+        if at is not None:
+            values[which[~kept]] = at[which[~kept]]
         which = which[kept]
     p = _goodness(values, noise, told, final)
     problem, white, variance = final
-    at = values if p < WORST else flatter_side(problem, values, noise, which, white, variance)
-    if at is not values:  # what that side does not tell is held where it is
-        white = problem.jacobian(at, noise, which) / np.sqrt(variance)[:, None]
+    flat = values if p < WORST else flatter_side(problem, values, noise, which, white, variance)
+    if flat is not values:  # what that side does not tell is held where it is
+        white = problem.jacobian(flat, noise, which) / np.sqrt(variance)[:, None]
         kept = are_told(parameters, which, white)
         which, white = which[kept], white[:, kept]
-    alone = which[are_alone(problem, at, noise, which, white, variance)]
+    alone = which[are_alone(problem, flat, noise, which, white, variance)]
     return _result(parameters, shots, values, noise, told, (which, covariance_of(white), alone), final, p, known)
 
 

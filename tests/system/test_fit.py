@@ -185,10 +185,15 @@ def test_files_that_do_not_tell_their_tone_curve_are_not_taken_for_light(shot):
     assert hidden.fit([Photograph(photograph, 255.0, tone_known=False)]).status in ("ok", "tone_unknown")
 
 
-@pytest.mark.parametrize(("number", "held"), [(0, {"camera.exposure", "light.polar", "light.azimuth"}), (11, set())])
-def test_photographs_that_another_maker_drew(number, held):
-    """Two lit faces tell no light and no exposure, three do; what goes with what is held is not told either."""
-    rng = np.random.default_rng([1, number])
+@pytest.mark.parametrize(("number", "lit"), [((1, 0), 2), ((1, 11), 3), ((2, 3), 2), ((3, 17), 2)])
+def test_photographs_that_another_maker_drew(number, lit):
+    """Two lit faces tell no light and no exposure, three do; what goes with what is held is not told either.
+
+    The third one's dark face passed for one that light grazes, 360 standard errors off; the fourth was a misfit, for
+    the light was held where the search began, which lights a face that is dark.
+    """
+    held = {"camera.exposure", "light.polar", "light.azimuth"} if lit == 2 else set()
+    rng = np.random.default_rng(number)
     scene, true = affine_fits.hidden(rng)
     found = affine_fits.fitted(scene, true, rng)
     assert {name for name, said in zip(found.names, found.statuses, strict=True) if said != "ok"} == held
