@@ -9,11 +9,13 @@ import numpy as np
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
 from planner.imaging.pictures import Pictures
+from planner.imaging.projection import facing, light_position
 from planner.imaging.sensor import recorded
 from planner.imaging.whole import signal_at
 from scenes import Noise
 
 _EVALUATIONS, _FEW = 30, 12  # of sharp and of coarse images
+_BESIDE = 0.5  # degrees
 _SETTLED, _NEARLY = 1e-6, 1e-3  # relative changes at which the search ends, of sharp and of coarse images
 
 
@@ -57,6 +59,23 @@ class Problem:
         return np.concatenate(
             [p.of(s.coarse(self.shrink, self.smooth)) for p, s in zip(self.pixels, self.shots, strict=True)]
         )
+
+    def beside(self, values: np.ndarray, which: np.ndarray) -> list[np.ndarray]:
+        """Values (q,) with each light's angles a little away, where some face is lit by that that was not, or dark."""
+        angles = [i for i in which if self.parameters.free[i].kind == "light"]
+        there = [values + away * np.eye(values.size)[i] for i in angles for away in (-_BESIDE, _BESIDE)]
+        lit = [self._lit(each) for each in (values, *there)]
+        return there if any(np.not_equal(each, lit[0]).any() for each in lit) else []
+
+    def _lit(self, values: np.ndarray) -> np.ndarray:
+        """Which faces each light of each pose shines upon, one after the other."""
+        scene = self.parameters.scene_at(values)
+        poses = (pose for k in range(len(self.shots)) for pose in self.parameters.poses_at(values, k)[1])
+        lights = scene.lights * len(self.shots)
+        return np.concatenate([np.empty(0, bool)] + [
+            facing(scene.solid, light_position(scene.camera, light, pose))
+            for light, pose in zip(lights, poses, strict=True)
+        ])  # fmt: skip
 
     def expected(self, values: np.ndarray, noise: Noise) -> np.ndarray:
         return np.concatenate([self.levels(values, noise, k) for k in range(len(self.shots))])
@@ -104,7 +123,8 @@ def most_likely(
 ) -> np.ndarray:
     """Values (q,) of least weighted squares; only the parameters ``which`` move, within their bounds.
 
-    ``nearly`` ends the search sooner, as it does of smoothed images.
+    Where light just grazes a face the squares have a kink, and least ones on both of its sides: where the search ends
+    near one it begins anew beside it. ``nearly`` ends the search sooner, as it does of smoothed images.
     """
     observed, sigma = problem.observed(), np.sqrt(variance)
     settled, most = (_NEARLY, _FEW) if nearly or problem.smooth else (_SETTLED, _EVALUATIONS)
@@ -119,10 +139,16 @@ def most_likely(
 
     from scipy.optimize import least_squares  # slow to load, and rarely needed
 
-    found = least_squares(
-        lambda part: (problem.expected(full(part), noise) - observed) / sigma,
-        np.clip(start[which], low + inner, high - inner),
-        lambda part: problem.jacobian(full(part), noise, which) / np.reshape(sigma, (-1, 1)),
-        bounds=(low, high), x_scale="jac", max_nfev=most, xtol=settled, ftol=settled, gtol=None,
-    )  # fmt: skip
-    return full(found.x)
+    def searched(values: np.ndarray):
+        return least_squares(
+            lambda part: (problem.expected(full(part), noise) - observed) / sigma,
+            np.clip(values[which], low + inner, high - inner),
+            lambda part: problem.jacobian(full(part), noise, which) / np.reshape(sigma, (-1, 1)),
+            bounds=(low, high), x_scale="jac", max_nfev=most, xtol=settled, ftol=settled, gtol=None,
+        )  # fmt: skip
+
+    best = searched(start)
+    if not problem.smooth and not nearly:
+        around = problem.beside(full(best.x), which)
+        best = min((best, *(searched(each) for each in around)), key=lambda found: found.cost)
+    return full(best.x)

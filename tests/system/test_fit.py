@@ -11,6 +11,7 @@ import measure
 import planner
 import render
 import scenes
+from measure.fitting.likelihood import Problem
 from scenes.photograph import Photograph
 from tests.proofs import affine_fits
 from tests.proofs.fits import Hidden, joint, predicted_beside_measured, pulls, spoilt, unfit
@@ -217,4 +218,22 @@ def test_light_behind_a_face_is_not_told_better_than_it_is(monkeypatch):
     assert (found.status, set(found.statuses)) == ("ok", {"ok"})
     assert max(map(abs, pulls(hidden, found).values())) < 3
     monkeypatch.setattr(fit_module, "flatter_side", lambda problem, values, *rest: values)
+    monkeypatch.setattr(Problem, "beside", lambda problem, values, which: [])
     assert abs(pulls(hidden, hidden.fit([photograph]))["light.azimuth"]) > 10
+
+
+def test_a_dark_face_passes_for_one_that_light_grazes_but_for_its_flatter_side(monkeypatch):
+    rng = np.random.default_rng((2, 3))
+    scene, true = affine_fits.hidden(rng)
+    monkeypatch.setattr(fit_module, "flatter_side", lambda problem, values, *rest: values)
+    assert abs(affine_fits.pulls(affine_fits.fitted(scene, true, rng), true)["light.azimuth"]) > 100
+
+
+def test_the_search_does_not_end_where_light_grazes_a_face(monkeypatch):
+    """Least squares on both sides of the kink: those of the lit side are 17 more, and 4 standard errors off."""
+    hidden = Hidden.drawn(np.random.default_rng([5, 17]))
+    clean = planner.image(hidden.truth)
+    (photograph,) = render.expose(clean, hidden.truth.scene.noise, np.random.default_rng(1), 1)
+    assert max(map(abs, pulls(hidden, hidden.fit([photograph])).values())) < 3
+    monkeypatch.setattr(Problem, "beside", lambda problem, values, which: [])
+    assert abs(pulls(hidden, hidden.fit([photograph]))["light.azimuth"]) > 4
