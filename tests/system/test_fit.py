@@ -178,9 +178,9 @@ def test_a_mesh_stays_where_it_is(tmp_path, rng):
     assert written.camera.distance == found.value("camera.distance")
 
 
-def test_files_that_do_not_tell_their_tone_curve_are_not_taken_for_light(shot):
+def test_files_that_do_not_tell_their_tone_curve_are_not_taken_for_light(small):
     """Of the power 0.85, which the fit explains: told by the picture, or said to be unknown."""
-    hidden, _, photograph = shot
+    hidden, (photograph, *_), _ = small
     coded = np.rint(255 * (photograph / 255) ** 0.85)
     assert hidden.fit([Photograph(coded, 255.0, tone_known=False)]).status in ("tone_unknown", "misfit")
     assert hidden.fit([Photograph(photograph, 255.0, tone_known=False)]).status in ("ok", "tone_unknown")
