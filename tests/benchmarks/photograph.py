@@ -64,7 +64,7 @@ def _draw(levels: np.ndarray, corners: np.ndarray, blur: float) -> None:
             away = cv2.pointPolygonTest(outline, (first + _TILE / 2).tolist(), True)
             if abs(away) < _TILE + 9 * blur:
                 here = _within(corners - first, _TILE + 9 * blur)
-                part[:] = polygon_image(here, part.shape, blur, DARK + STEP, DARK) if len(here) else DARK
+                part[:] = polygon_image(here, part.shape, blur, STEP, DARK) if len(here) else DARK
             elif away > 0:
                 part[:] = DARK + STEP
 
