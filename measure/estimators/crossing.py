@@ -14,6 +14,7 @@ from scipy import sparse
 from measure.features.lines import trapezoid, trend_along
 from measure.features.points import EachPoint, EdgePoints, UnitNoise
 from planner.features.locator import MIN_CONTRAST
+from planner.imaging.segments import numbered
 
 STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends
@@ -160,12 +161,7 @@ def gaussian_rows(places: np.ndarray, scale: float, shape: tuple[int, int], weig
 
 def reached(kernel: sparse.csr_array, *others: np.ndarray) -> tuple[np.ndarray, sparse.csr_array]:
     """The pixels (P,) that rows (m, H W) and flat indices reach, in order, and the rows at these alone, (m, P)."""
-    seen = np.zeros(kernel.shape[1], bool)
-    for indices in (kernel.indices, *others):
-        seen[indices] = True
-    pixels = np.flatnonzero(seen)
-    place = np.empty(seen.size, np.int32)
-    place[pixels] = np.arange(pixels.size)
+    pixels, place = numbered(kernel.shape[1], kernel.indices, *others)
     return pixels, sparse.csr_array((kernel.data, place[kernel.indices], kernel.indptr), (kernel.shape[0], pixels.size))
 
 

@@ -204,15 +204,13 @@ class PointEstimator:
         count = response.shape[0]
         keep = points.valid[0, :count]
         if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
-            return sparse.csr_array(np.full((2, 1), np.nan)) @ _row(self.pixels, clean.size)
+            pixels = np.tile(self.pixels, 2)
+            return sparse.csr_array(
+                (np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)), (2, clean.size)
+            )
         weights = np.broadcast_to(points.weights, points.along.shape)[0, :count][keep]
         lines = _level_and_slope(points.along[0, :count][keep], weights)
         return sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
-
-
-def _row(pixels: np.ndarray, size: int) -> sparse.csr_array:
-    """1 at some of an image's pixels, (1, H W)."""
-    return sparse.csr_array((np.ones(pixels.size), pixels, [0, pixels.size]), (1, size))
 
 
 def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -20,13 +20,13 @@ from measure.goodness import WORST, p_value
 from measure.once import once
 from planner.imaging.sensor import full_scale
 
-_BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
+BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
 
 Part = tuple[np.ndarray, np.ndarray, ArrangementEstimator]
 """Numbers of some images, (m,), those images, and the tool that measures them."""
 
 
-@_BLAS.wrap(limits=1)
+@BLAS.wrap(limits=1)
 def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
     """Lines and corners in images (n, height, width)."""
     if not _is_shown(tool, layout):
@@ -40,7 +40,7 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
     return gather([shape for _, shape in parts], source, rows)
 
 
-@_BLAS.wrap(limits=1)
+@BLAS.wrap(limits=1)
 def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
     """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
     probability = np.full(len(images), np.nan)
@@ -182,7 +182,7 @@ def _probabilities(found: Found) -> np.ndarray:
     return p_value(found.squares / scale, freedom)
 
 
-@_BLAS.wrap(limits=1)
+@BLAS.wrap(limits=1)
 def line_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the lines (displacement, rotation) by the pixels at the very solution of a noise-free image.
 

@@ -199,8 +199,8 @@ def _goodness(values: np.ndarray, noise: Noise, told: Curve | None, final) -> fl
     (problem, white, variance), freedom = final, np.inf if told is None else told.freedom
     sigma, expected = np.sqrt(variance), problem.expected(values, noise)
     rest = (problem.observed() - expected) / sigma
-    whole, beside = covariance_of(white), tuple(each / sigma[:, None] for each in directions(problem, values, noise))
-    found = parts(rest, expected / sigma, expected, problem.pixels, white, whole, beside)
+    beside = tuple(each / sigma[:, None] for each in directions(problem, values, noise, expected))
+    found = parts(rest, expected / sigma, expected, problem.pixels, white, covariance_of(white), beside)
     return p_value(found, freedom)
 
 

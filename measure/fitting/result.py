@@ -28,8 +28,9 @@ class Fit:
         Inverse Fisher information: variances, not standard errors; 0 for what is held, on whose value rests that of
         what goes with it.
     statuses : tuple of str
-        "ok", or "ill_conditioned": the photographs do not tell it, and it is held at its start, or where it was
-        found if that is a bound (a light just behind a dark face), or it goes with something that is.
+        "ok", or "ill_conditioned": the photographs do not tell it, and it is held at its start, or where it is
+        likeliest if its start leaves a misfit or that is a bound (a light just behind a dark face), or it goes with
+        something that is held.
     status : str
         "ok"; "misfit" where the photographs are not what the model says, and neither values nor standard errors are to
         be trusted, a tone curve that was not undone among that; "ill_conditioned" where something is held;

@@ -9,9 +9,8 @@ from measure.fitting.parameters import OPTIONS, Parameters
 from scenes import Noise
 
 
-def directions(problem: Problem, values: np.ndarray, noise: Noise) -> tuple[np.ndarray, ...]:
-    """Derivatives (P, d) of grey levels by what is not free: k1 where it is not, and motion along two axes."""
-    expected = problem.expected(values, noise)
+def directions(problem: Problem, values: np.ndarray, noise: Noise, expected: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Derivatives (P, d) of expected levels (P,) by what is not free: k1 where it is not, and motion along two axes."""
     bent = _by_distortion(problem, values, noise)
     return (*bent, _by_motion(problem, expected))
 

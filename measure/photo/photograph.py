@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from measure import status
 from measure.boards.chessboard import measured
+from measure.features.arranged import BLAS
 from measure.find.candidate import CHESSBOARD, CIRCLE, ELLIPSE, QUADRILATERAL, TAG, Candidate
 from measure.find.choose import find_in, nearest
 from measure.find.search import check_kinds, find
@@ -28,8 +28,7 @@ from scenes.arrays import picture
 from scenes.photograph import Photograph
 
 _MOST = 1000
-_WORKERS = min(os.cpu_count() or 1, 4)  # threads that measure shapes
-_BLAS = ThreadpoolController()  # which keep to one each for their matrices
+_WORKERS = min(os.cpu_count() or 1, 4)  # threads that measure shapes, each with one for its matrices
 _STRAIGHT = (QUADRILATERAL, TAG)
 
 
@@ -143,7 +142,7 @@ def photograph(
         told = "a quadrilateral, circle, ellipse, tag or chessboard" if kinds is None else f"a {' or a '.join(kinds)}"
         where = "" if box is None else " in the box"
         raise InvalidInput(f"image must show {told}{where}, got none that stands out")
-    with _BLAS.limit(limits=1), ThreadPoolExecutor(_WORKERS) as pool:
+    with BLAS.limit(limits=1), ThreadPoolExecutor(_WORKERS) as pool:
         found = tuple(pool.map(lambda one: _measured(photo, one, estimator, lens), chosen[:most]))
     return Shapes(found, candidates)
 

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.special import ndtr
 
+from planner.imaging.segments import numbered
+
 REACH = 5.0  # standard deviations of the blur at which a kernel ends: 3e-7 of a step is cut off
 _PIXEL = 1.001  # px: half a pixel, a node's distance from its own, and a little, lest 0.6 px are where a window grows
 
@@ -84,11 +86,8 @@ class Scatter:
     def of_nodes(self, which: slice) -> tuple[np.ndarray, Scatter]:
         """Of some nodes alone: the pixels that they reach, (p,), and the sums at these, all as of one piece."""
         slot = self.slot[which]
-        reached = np.zeros(self.size + 1, bool)
-        reached[slot] = True
-        pixels = np.flatnonzero(reached[:-1])
-        place = np.full(self.size + 1, pixels.size, np.int32)
-        place[pixels] = np.arange(pixels.size)
+        used, place = numbered(self.size + 1, slot)
+        pixels = used[used < self.size]  # that there is none comes last, so its number stays theirs
         return pixels, Scatter(place.take(slot), np.zeros(len(slot), int), 1, pixels.size)
 
     def at_all(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:

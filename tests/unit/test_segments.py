@@ -34,3 +34,12 @@ def test_a_slanting_segment_costs_what_an_upright_one_does():
     across = pixels_along(np.array([100.0, 100]), np.array([900.0, 900]), 5.0, (1000, 1000))[0].size
     upright = pixels_along(np.array([100.0, 100]), np.array([100.0, 1231.4]), 5.0, (1300, 300))[0].size
     assert across < 1.2 * upright
+
+
+@pytest.mark.parametrize("far", [1e6, 1e12, 1e25, 1e300])
+def test_ends_however_far_away(far):
+    """A segment far from the image has no pixel; one through it has those of its line."""
+    assert pixels_along(np.array([far, far]), np.array([2 * far, 1.5 * far]), 3.0, (50, 70))[0].size == 0
+    assert pixels_along(np.array([-far, -far]), np.array([-2 * far, -3.0]), 2.0, (50, 70))[0].size == 0
+    rows, columns = pixels_along(np.array([20.0, 10.0]), np.array([20.0, far]), 1.0, (50, 70))
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (9, 49, 19, 21)
