@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features.layout import Layout, layout_of
 from measure.features.locating import locate
@@ -16,7 +15,7 @@ from planner import predict
 from planner.imaging.arrangement import near_pixels, near_vertices
 from planner.imaging.blurred import BlurredModel, State
 from planner.models.bound import REACH, Information, fisher, known
-from scenes import InvalidInput, Noise, Picture, Scene
+from scenes import InvalidInput, Noise, Picture, Scene, status
 from scenes.arrays import picture as one_picture
 
 

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from measure import status
 from measure.estimators.registry import best_estimator
 from measure.measurement import Measurement, _check_method, checked_image, of_first
 from measure.quantities import Found, find
 from planner.forecast import unit_of
-from scenes import Picture, Quantity, Scene
+from scenes import Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
 

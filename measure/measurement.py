@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from measure import status
 from measure.quantities import Found, find
 from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
-from scenes import InvalidInput, Picture, Scene
+from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
 from scenes.results import Shown, finite, value
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
@@ -19,7 +18,7 @@ from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
 from planner.models.bias import MOST
 from planner.models.texture import TextureErrors, texture_errors
-from scenes import Picture, Scene, Side
+from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
 
 

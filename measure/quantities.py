@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from measure import status
 from measure.features.corners import intersect
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout, layout_of
@@ -18,7 +17,7 @@ from planner.features.measurand import Measurands, dense, measurands
 from planner.features.seen import Seen
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
-from scenes import Corner, Picture, Quantity
+from scenes import Corner, Picture, Quantity, status
 
 
 @dataclass(frozen=True)

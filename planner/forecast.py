@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from planner.models.errors import Errors
-from planner.ranks import WORST_FIRST, quantity_ranks
+from planner.ranks import quantity_ranks
 from scenes import Quantity, Scene, Tolerance
 from scenes.results import finite, value
+from scenes.status import WORST_FIRST
 
 
 @dataclass(frozen=True)

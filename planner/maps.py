@@ -12,11 +12,12 @@ from planner.imaging.pictures import Pictures
 from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import cluttered
 from planner.prediction import minimised
-from planner.ranks import WORST_FIRST, quantity_ranks
+from planner.ranks import quantity_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Objective
 from planner.search.poses import as_array, by_light
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Scene, several
+from scenes.status import WORST_FIRST
 
 _CHUNK = 4096  # directions at a time, which bounds the memory
 

@@ -17,11 +17,12 @@ from planner.models import DEFAULT_MODEL, ModelName, variance_model
 from planner.models.bias import bias, cluttered
 from planner.models.errors import Errors
 from planner.models.texture import texture_errors
-from planner.ranks import WORST_FIRST, edge_ranks
+from planner.ranks import edge_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.features import place_of
 from scenes.results import Shown
+from scenes.status import WORST_FIRST
 from scenes.units import in_unit
 
 __all__ = ["DEFAULT_OBJECTIVE", "EdgePrediction", "Objective", "Prediction", "minimised", "predict", "variances"]

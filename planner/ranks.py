@@ -7,10 +7,13 @@ import numpy as np
 from planner.features.locator import MIN_CONTRAST, MIN_USABLE
 from planner.features.seen import unit_normals
 from planner.models.errors import Errors
-from scenes import Corner
+from scenes import Corner, status
+from scenes.status import WORST_FIRST
 
-WORST_FIRST = ("not_visible", "short", "low_contrast", "ill_conditioned", "clutter", "ok")
-_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = range(len(WORST_FIRST))
+_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = map(
+    WORST_FIRST.index,
+    (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.CLUTTER, status.OK),
+)
 _MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 

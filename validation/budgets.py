@@ -15,6 +15,7 @@ from planner.uncertainty.monte_carlo import monte_carlo as drawn_until_stable
 from planner.uncertainty.risks import Limits, global_risks, nonconforming_probability
 from planner.uncertainty.validation import validate
 from scenes import InvalidInput, Picture, Tolerance
+from scenes.status import is_trusted
 from validation.chain import Chain
 
 _SHOWN = 3  # sources that are named as worth an improvement
@@ -40,7 +41,7 @@ def budget_of(picture: Picture, p: float = 0.95, *, rendered: bool = False) -> S
     for quantity, value, state in zip(picture.scene.quantities, found.value, found.status, strict=True):
         if not np.isfinite(value):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state} in the rendered picture")
-    return budget(picture, variances=np.diag(found.covariance), biases=found.bias, p=p)
+    return budget(picture, variances=np.diag(found.covariance), biases=found.bias, statuses=tuple(found.status), p=p)
 
 
 def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 5.0) -> list[dict[str, Any]]:
@@ -98,13 +99,13 @@ def simulated_gauge(found: SceneBudget, m: int, seed: int, repeats: int = 50) ->
 
 
 def capability(found: SceneBudget, m: int, seed: int = 1) -> dict[str, Any] | None:
-    """U against the tolerance of the m-th measurand; None without one.
+    """U against the tolerance of the m-th measurand; None without one, or where the value is not trusted.
 
     Global risks need the spread of the manufacture, ``uncertainty.process_sd`` (lengths).
     """
     told, each = found.prediction.measurands[m], found.measurands[m]
     zone: Tolerance | None = told.tolerance
-    if zone is None:
+    if zone is None or not is_trusted(found.statuses[m]):
         return None
     limits, width = Limits.of(told.nominal, zone), zone.plus + zone.minus
     facts: dict[str, Any] = {
@@ -135,16 +136,17 @@ def facts(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
 
 
 def _measurand(found: SceneBudget, m: int, reach: float | None, seed: int) -> dict[str, Any]:
-    each, kind = found.measurands[m], found.picture.scene.quantities[m].kind
+    each, kind, status = found.measurands[m], found.picture.scene.quantities[m].kind, found.statuses[m]
     from validation.report.budget_table import sentence
 
     return {
         "name": each.name, "kind": kind, "unit": each.unit, "value": each.value, "u": each.u, "U": each.U, "k": each.k,
+        "status": status, "signed": is_trusted(status),
         "dof": each.dof if np.isfinite(each.dof) else None, "repeatability": each.repeatability,
         "accuracy": each.accuracy, "contributions": each.as_rows(), "capability": capability(found, m, seed),
         "improve": [asdict(one) for one in improvements(each)[:_SHOWN]],
         "reach": None if reach is None else [asdict(needed(each, reach, row.source)) for row in each.contributions],
-        "sentence": sentence(each, kind),
+        "sentence": sentence(each, kind, status),
     }  # fmt: skip
 
 

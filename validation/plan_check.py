@@ -11,9 +11,8 @@ import numpy as np
 import measure
 import planner
 import render
-from measure import status
 from render import Quality
-from scenes import InvalidInput, Pose, Scene, Setting, several
+from scenes import InvalidInput, Pose, Scene, Setting, several, status
 
 ESTIMATOR = "gradient"  # whose closed form the calibrated model is
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place

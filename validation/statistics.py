@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
+
+from scenes.status import OK, counted, is_trusted
 
 LEVEL = 0.01  # of false alarm, of a whole verdict
 SHARES = {"rows": 0.45, "pooled": 0.45, "bias": 0.10}  # of that level, by test
@@ -85,7 +88,7 @@ class Bias:
     Attributes
     ----------
     rows : int
-        Rows of status ``ok`` judged.
+        Rows judged.
     allowance : float
         What a mean error may differ from the predicted one, in predicted sigmas of one image.
     largest : float
@@ -115,21 +118,23 @@ class Verdict:
     Attributes
     ----------
     agrees : bool
-        Whether none of the tests contradicts the predictions and at least half of all rows were measured.
+        Whether none of the tests contradicts the predictions, a row is proven, and at least half of all were measured.
     rows, inside : int
-        Rows judged; rows whose own 95 % interval of the variance ratio holds 1.
+        Rows judged, which are those proven where it agrees; rows whose own 95 % interval of the variance ratio holds 1.
     smallest_p, limit : float
         Smallest p-value of a row's variance, and the level each row is held to (Sidak).
     text : str
         One line; begins with "agree" or "contradict".
     not_measured : int
         Rows without a variance, or with more than `STRAY` of their images lost; they are not judged, but counted.
+    not_proven : dict
+        Number of measured rows by status, of those that are not trusted; they are not judged, but counted.
     pooled : Pooled or None
         None without a row.
     bias : Bias or None
-        None if no mean errors were given, or no row is ``ok``.
+        None if no mean errors were given.
     reasons : tuple of str
-        What contradicts: some of ``rows``, ``pooled``, ``bias``, ``not measured``.
+        What contradicts: some of ``rows``, ``pooled``, ``bias``, ``not measured``, ``not proven``.
     """
 
     agrees: bool
@@ -139,6 +144,7 @@ class Verdict:
     limit: float
     text: str
     not_measured: int
+    not_proven: dict[str, int]
     pooled: Pooled | None
     bias: Bias | None
     reasons: tuple[str, ...]
@@ -153,7 +159,7 @@ def verdict(
     bias_px: ArrayLike | None = None,
     predicted_bias_px: ArrayLike = 0.0,
     sigma_px: ArrayLike | None = None,
-    ok: ArrayLike = True,
+    status: ArrayLike = OK,
     independent: ArrayLike = 1.0,
 ) -> Verdict:
     """Judge all rows together: a table of true predictions is contradicted with probability ``level`` at most.
@@ -177,8 +183,8 @@ def verdict(
     bias_px, predicted_bias_px, sigma_px : array_like
         Measured and predicted mean error and predicted standard deviation (not variance) of one image, px. Without the
         first nothing is said of biases.
-    ok : array_like of bool
-        Whether the row's status is ``ok``; only such rows have promised to be without bias.
+    status : array_like of str
+        Of each row; what is not trusted (`scenes.status`) promises nothing: neither agreement nor contradiction.
     independent : array_like
         For how many independent rows each counts when they are pooled: less than 1 for quantities measured in the same
         images (their number over the sum of their squared correlations).
@@ -193,18 +199,21 @@ def verdict(
     ('bias',)
     >>> verdict([1.0, float("nan"), float("nan")], [1000, 0, 0]).reasons
     ('not measured',)
+    >>> verdict([1.0, 1.3], [1000, 1000], status=["ok", "clutter"]).text.split("; ")[:2]
+    ['agree: measured is as predicted', '1 of 2 rows proven, 1 not: clutter 1']
     """
-    ratios, counts, lost, ok, shares = np.broadcast_arrays(np.asarray(ratios, float), counts, lost, ok, independent)
-    judged = np.isfinite(ratios) & (counts >= 2) & (lost <= STRAY * (counts + lost))
-    rows, missing = int(judged.sum()), int((~judged).sum())
+    ratios, counts, lost, shares = np.broadcast_arrays(np.asarray(ratios, float), counts, lost, independent)
+    status = np.broadcast_to(np.asarray(status, object), ratios.shape)
+    measured = np.isfinite(ratios) & (counts >= 2) & (lost <= STRAY * (counts + lost))
+    judged = measured & is_trusted(status)
+    rows, missing, doubts = int(judged.sum()), int((~measured).sum()), Counter(status[measured & ~judged].tolist())
     if not rows:
-        text = f"contradict: none of {ratios.size} rows could be measured, so nothing is shown."
-        return Verdict(False, 0, 0, float("nan"), level, text, missing, None, None, ("not measured",))
+        return _nothing(ratios.size, missing, dict(doubts), level)
     away = np.full(ratios.shape, np.nan)
     if bias_px is not None:
         with np.errstate(all="ignore"):  # what is not finite then is not judged
             away[:] = np.subtract(bias_px, predicted_bias_px, dtype=float) / np.asarray(sigma_px, float)
-    promised = judged & ok & np.isfinite(away)
+    promised = judged & np.isfinite(away)
     levels = _levels(level, promised.any())
     p_values, limit = _p_values(ratios[judged], counts[judged]), sidak(levels["rows"], rows)
     smallest = float(p_values.min())
@@ -214,12 +223,24 @@ def verdict(
         "rows": smallest < limit,
         "pooled": pooled.p_value < pooled.limit,
         "bias": bias is not None and bias.smallest_p < bias.limit,
-        "not measured": missing > rows,
+        "not measured": missing > measured.sum(),
     }
     reasons = tuple(name for name, wrong in broken.items() if wrong)
     inside = int((p_values >= 0.05).sum())  # as much as 1 lying in the 95 % interval
-    found = Verdict(not reasons, rows, inside, smallest, limit, "", missing, pooled, bias, reasons)
+    found = Verdict(not reasons, rows, inside, smallest, limit, "", missing, dict(doubts), pooled, bias, reasons)
     return replace(found, text=_text(found, level))
+
+
+def _nothing(rows: int, missing: int, doubts: dict[str, int], level: float) -> Verdict:
+    """Where no row can be judged."""
+    why = f"proven: {_listed(doubts)}" if doubts else "measured"
+    text = f"contradict: none of {rows} rows could be {why}, so nothing is shown."
+    reasons = ("not proven",) if doubts else ("not measured",)
+    return Verdict(False, 0, 0, float("nan"), level, text, missing, doubts, None, None, reasons)
+
+
+def _listed(doubts: dict[str, int]) -> str:
+    return counted(Counter(doubts).elements())
 
 
 def _levels(level: float, with_bias: bool) -> dict[str, float]:
@@ -285,7 +306,9 @@ _WRONG = {"rows": "a row's variance", "pooled": "the pooled variance", "bias": "
 def _text(found: Verdict, level: float) -> str:
     """One line: the outcome, then the figures of each test."""
     low, high = found.pooled.interval
-    parts = [
+    word, measured = "proven" if found.agrees else "judged", found.rows + sum(found.not_proven.values())
+    parts = [f"{found.rows} of {measured} rows {word}, {measured - found.rows} not: {_listed(found.not_proven)}"]
+    parts = parts * bool(found.not_proven) + [
         f"{found.inside} of {found.rows} rows inside their 95 % interval, smallest p-value {found.smallest_p:.2g} "
         f"against {found.limit:.2g}",
         f"pooled ratio {found.pooled.ratio:.3f} [{low:.3f}, {high:.3f}], p-value {found.pooled.p_value:.2g} against "
@@ -297,7 +320,7 @@ def _text(found: Verdict, level: float) -> str:
             f"p-value {found.bias.smallest_p:.2g} against {found.bias.limit:.2g}"
         )
     if found.not_measured:
-        parts.append(f"{found.not_measured} of {found.rows + found.not_measured} rows not measured")
+        parts.append(f"{found.not_measured} of {measured + found.not_measured} rows not measured")
     return f"{'; '.join([_outcome(found), *parts])} (false alarm at most {level:.2g} for all)."
 
 

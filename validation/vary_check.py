@@ -11,9 +11,9 @@ from scipy import stats
 import measure
 import planner
 import render
-from measure import status
 from planner import Chosen, Varied
 from render import Quality
+from scenes import status
 from validation.plan_check import ESTIMATOR
 from validation.statistics import STRAY, ratio_interval
 
@@ -139,7 +139,7 @@ def _scatter(found: planner.Plan, chosen: Chosen, images: int, quality: Quality,
         n=images,
         failed=images - values.size,
         interval=ratio_interval(measured, values.size),
-        status=status.worst(*known.status),
+        status=str(known.status[worst]),
     )
 
 
@@ -162,8 +162,11 @@ def judged(fixed: Scatter, best: Scatter, *, same: bool = False) -> VaryCheck:
     freedoms = [row.n - row.failed - 1 for row in (fixed, best)]
     ends = tuple(float(gain / stats.f.ppf(p, *freedoms)) for p in (0.975, 0.025))
     p_value = float(min(1.0, 2 * min(law(gain / predicted, *freedoms) for law in (stats.f.cdf, stats.f.sf))))
+    doubtful = [row.status for row in (fixed, best) if not status.is_trusted(row.status)]
     if p_value < LEVEL:
         said = "contradict: the measured gain is not the predicted one"
+    elif doubtful:
+        said = f"contradict: the gain is not proven, for the values are not: {status.counted(doubtful)}"
     elif same:
         said = "agree: nothing is gained, both plans are one"
     else:

@@ -13,6 +13,7 @@ import planner
 import render
 from render import Quality
 from scenes import Picture, Pose
+from scenes.status import counted, is_trusted
 from validation import statistics
 from validation.batch.measurands import independent
 from validation.plan_check import ESTIMATOR
@@ -44,7 +45,7 @@ class CheckedQuantity:
     bias, predicted_bias : float
         Mean less the object's value, and what the plan says of it.
     judged : bool
-        Whether the verdict is about it: none of the pictures that it is taken from is ``clutter`` in it.
+        Whether the verdict is about it: its status is trusted.
     """
 
     pictures: int
@@ -162,7 +163,6 @@ def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[Checked
     weighted, jointly = both.weighted(stack), both.least_squares(stack)
     with np.errstate(invalid="ignore"):
         propagated = np.where(both.used, both.weights**2 * np.stack(covariances), 0.0).sum(0)
-    states = np.array([[each.status for each in view.prediction.measurands] for view in chosen.views])
     for m, forecast in enumerate(chosen.views[0].prediction.measurands):
         if not both.used[:, m].any():
             continue
@@ -178,7 +178,7 @@ def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[Checked
             **dict(zip(("ratio_least_squares", "interval_least_squares"),
                        _ratio(own, both.covariance_least_squares[m, m]), strict=True)),
             bias=float(weighted[known, m].mean() - forecast.value_object) if n else None,
-            predicted_bias=float(both.bias[m]), judged=bool((states[both.used[:, m], m] == "ok").all()),
+            predicted_bias=float(both.bias[m]), judged=is_trusted(both.status[m]),
         ), weighted[:, m]  # fmt: skip
 
 
@@ -193,17 +193,18 @@ def _ratio(values: np.ndarray, predicted: float) -> tuple[float | None, tuple[fl
 def judge(told: list[tuple[CheckedQuantity, np.ndarray]], seconds: float) -> ViewsCheck:
     """The verdict about the rows that are to be judged; each comes with its combined values (images,)."""
     rows = tuple(row for row, _ in told)
-    judged = [(row, values) for row, values in told if row.judged]
-    if not judged:
-        return ViewsCheck(rows, None, "all that is measured is clutter", seconds)
+    if not any(row.judged for row in rows):
+        return ViewsCheck(
+            rows, None, f"nothing that is measured is proven ({counted(r.status for r in rows)})", seconds
+        )
     verdict = statistics.verdict(
-        [np.nan if row.ratio is None else row.ratio for row, _ in judged],
-        [row.n for row, _ in judged],
-        lost=[row.failed for row, _ in judged],
-        bias_px=[np.nan if row.bias is None else row.bias for row, _ in judged],
-        predicted_bias_px=[row.predicted_bias for row, _ in judged],
-        sigma_px=[row.predicted**0.5 for row, _ in judged],
-        ok=[row.status == "ok" for row, _ in judged],
-        independent=independent([values for _, values in judged]),
+        [np.nan if row.ratio is None else row.ratio for row in rows],
+        [row.n for row in rows],
+        lost=[row.failed for row in rows],
+        bias_px=[np.nan if row.bias is None else row.bias for row in rows],
+        predicted_bias_px=[row.predicted_bias for row in rows],
+        sigma_px=[row.predicted**0.5 for row in rows],
+        status=[row.status for row in rows],
+        independent=independent([values for row, values in told if row.judged]),
     )
     return ViewsCheck(rows, verdict, "", seconds)

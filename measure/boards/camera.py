@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
-from measure import status
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.parameters import Model, read_model
 from measure.photo.lens import Lens
+from scenes import status
 from scenes.covariance import Covariance
 from scenes.errors import InvalidInput
 

@@ -9,12 +9,12 @@ import numpy as np
 from scipy import sparse
 from scipy.special import chdtrc
 
-from measure import status
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
 from measure.boards.fitting import Crossings, crossing_rows, fit_crossings
 from measure.boards.windows import steps, windows
 from measure.photo.noise import noise_sigma
+from scenes import status
 from scenes.arrays import BRIGHTEST, picture
 from scenes.errors import InvalidInput
 
@@ -42,7 +42,7 @@ class Board:
         Of each corner, px^2. Different corners are independent: the noise is white, and no pixel serves two of them.
         Where the status is ``misfit`` it is enlarged by the residuals' chi-square over its degrees of freedom.
     status : tuple of str, n
-        Of `measure.status`.
+        Of `scenes.status`.
     p_value : ndarray, shape (n,)
         Goodness of fit: how often the noise alone would leave at least so much; NaN where not measured.
     noise : float

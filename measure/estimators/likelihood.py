@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure import status
 from measure.estimators.estimate import Estimate, noisy
 from measure.features.calipers import Caliper
 from measure.features.optics import Optics
+from scenes import status
 
 MIN_CONTRAST_SIGMAS = 4.0  # contrast over its own standard error below which there is no edge to be seen
 

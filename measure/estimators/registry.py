@@ -9,7 +9,6 @@ from functools import cached_property, partial
 import numpy as np
 from scipy import sparse
 
-from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.crossing import CrossingLocator
@@ -25,7 +24,7 @@ from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
 from planner.features.locator import CLEARANCE, edge_blur, reach
 from planner.imaging.appearance import is_plain
-from scenes import InvalidInput, Noise, Scene
+from scenes import InvalidInput, Noise, Scene, status
 
 ESTIMATORS = ("canny", "gradient", "isophote", "strip", "arrangement")
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement

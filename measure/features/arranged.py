@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from measure import status
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 from measure.estimators.stack import Found, find
 from measure.features.contrasts import SEEN, asked, contrasts, seen_edges
@@ -19,6 +18,7 @@ from measure.features.locating import FURTHEST, locate, moved
 from measure.goodness import WORST, p_value
 from measure.once import once
 from planner.imaging.sensor import full_scale
+from scenes import status
 
 BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure import status
 from measure.features.layout import Layout
 from measure.features.optics import Optics
 from planner.features.locator import MIN_USABLE
 from planner.imaging.segments import distance_to_segment
+from scenes import status
 
 MIN_POSITIONS = 3
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from measure import status
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from scenes.arrays import finite, numbers
 
 _STEPS = 12

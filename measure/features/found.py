@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure import status
+from scenes import status
 
 _TEXTS = ("status", "whole", "edge_status", "counted")
 MIN_SINE = 0.02  # of the angle between the lines of a corner: about a degree

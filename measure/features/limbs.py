@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from measure import status
 from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
 from measure.features.tools import RimTool, held
@@ -18,7 +17,7 @@ from planner.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_end
 from planner.features.locator import MIN_CONTRAST, edge_blur
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
-from scenes import Curved, Picture
+from scenes import Curved, Picture, status
 
 _SPACING = 2.0  # smoothing scales between places
 _MOST = 64  # times the planner's places

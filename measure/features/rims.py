@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from measure import status
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
@@ -25,7 +24,7 @@ from planner.features.seen import plane_axes
 from planner.imaging.lens import image_centre
 from planner.imaging.pictures import Pictures
 from planner.imaging.projection import project_ideal
-from scenes import Circle, Curved, Picture
+from scenes import Circle, Curved, Picture, status
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places

@@ -9,7 +9,6 @@ from weakref import finalize
 
 import numpy as np
 
-from measure import status
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
 from measure.estimators.registry import CAPTURE, estimator
@@ -19,6 +18,7 @@ from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.found import MIN_SINE, Shape, gather, nothing
 from measure.features.layout import Layout
 from measure.goodness import WORST
+from scenes import status
 
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from measure import status
 from measure.estimators.ellipse import EllipseFit, Seen, free_parameters, is_ellipse, likeliest_ellipse
 from measure.estimators.gradient import gradient_along
 from measure.features.blurred_ellipse import curvature, outline, relative, to_symmetric
@@ -12,7 +11,7 @@ from measure.features.calipers import MIN_POSITIONS
 from measure.features.conic import UNITS, Ellipse, no_ellipse
 from measure.features.optics import Optics
 from planner.features.locator import MIN_CONTRAST, edge_blur
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from scenes.arrays import finite, grey_levels
 
 _MIN_FOUND = 0.5  # part of the outline on which there must be edge points

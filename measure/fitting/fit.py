@@ -20,10 +20,10 @@ from measure.fitting.unmodelled import directions
 from measure.goodness import WORST
 from measure.photo.noise import noise_sigma
 from measure.photo.tone_curve import tone_curve
-from measure.status import LOW_CONTRAST, MISFIT, OK, worst
 from planner.imaging.whole import check_drawable
 from scenes import InvalidInput, Noise, Picture, Scene, Setting, several
 from scenes.photograph import Photograph
+from scenes.status import LOW_CONTRAST, MISFIT, OK, worst
 
 _ROUNDS = 2  # of weights and noise
 _GROSS = 50.0  # noise variances: a mean squared residual of more is no part that the scene knows

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from measure import status
 from measure.estimators.ellipse import EllipseFit
 from measure.features.conic import UNITS
 from measure.features.layout import polygon_layout
@@ -18,6 +17,7 @@ from measure.photo.edge_points import ellipse_by_points
 from measure.photo.recording import Recording, recording
 from measure.photo.residuals import around, ellipse_blur
 from measure.photo.tone_curve import UNTOLD, ToneCurve, tone_curve
+from scenes import status
 from scenes.photograph import Photograph
 
 _SAME = 3.0  # standard deviations up to which the axes count as equal

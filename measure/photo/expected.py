@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from measure import status
 from measure.features.found import Shape
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
@@ -17,6 +16,7 @@ from measure.photo.noise_curve import NoiseCurve
 from measure.photo.profiles import edge_sigma
 from measure.photo.recording import Recording
 from measure.photo.uneven import MOST, orders, shaded
+from scenes import status
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from measure import status
 from measure.boards.chessboard import measured
 from measure.features.arranged import BLAS
 from measure.find.candidate import CHESSBOARD, CIRCLE, ELLIPSE, QUADRILATERAL, TAG, Candidate
@@ -23,7 +22,7 @@ from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_qu
 from measure.photo.recording import recording
 from measure.photo.residuals import Residuals, of_ellipse, of_sides
 from measure.photo.tags import plain
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from scenes.arrays import picture
 from scenes.photograph import Photograph
 
@@ -41,7 +40,7 @@ class Found:
     kind : str
         As of `Candidate`; a "circle" is an ellipse whose axes are equal within three sigma.
     status : str
-        Of `measure.status`: what is not of its `MEASURED` has no values.
+        Of `scenes.status`: what is not of its `MEASURED` has no values.
     corners : ndarray, shape (4, 2), or None
         (x, y), px, of a quadrilateral or a tag's black square (in the tag's own order); without distortion if a lens
         was given. Of a chessboard all inner corners (n, 2), row by row, NaN where one is not measured.

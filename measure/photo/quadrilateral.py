@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from measure import status
 from measure.estimators.registry import SYNONYMS
 from measure.features.found import Shape
 from measure.features.layout import Layout
@@ -21,7 +20,7 @@ from measure.photo.lens import Lens, straight_corners
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.profiles import refined
 from measure.photo.recording import Recording, recording
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from scenes.arrays import finite, picture
 from scenes.photograph import Photograph
 

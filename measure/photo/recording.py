@@ -8,12 +8,12 @@ from threading import Lock
 
 import numpy as np
 
-from measure import status
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import Correlation, correlation
 from measure.photo.noise_curve import NoiseCurve, curve_of, scale_of
 from measure.photo.patches import SIDE, Patches, smooth_patches
 from planner.imaging.segments import distance_to_segment
+from scenes import status
 from scenes.photograph import Photograph
 
 _BLURRED = 3.0  # px beside an edge

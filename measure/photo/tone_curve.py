@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erfc
 
-from measure import status
 from measure.goodness import WORST
+from scenes import status
 
 _CODED = 1.2  # b of sRGB and its like: a file that does not say what it is holds either light or this
 _CLEAR = 12.0  # by how much the one's chi-square must exceed the other's

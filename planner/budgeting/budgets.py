@@ -21,7 +21,7 @@ from planner.uncertainty.budget import budget as combined
 from planner.uncertainty.groups import Group
 from planner.uncertainty.groups import Source as EngineInput
 from planner.uncertainty.ufloats import as_ufloats
-from scenes import InvalidInput, Picture, Scene
+from scenes import InvalidInput, Picture, Scene, status
 from scenes.results import Shown, value
 
 CALIBRATION = "camera calibration"
@@ -43,6 +43,8 @@ class SceneBudget(Shown):
         Of each measurand, what is added beside.
     measurands : tuple of Budget
         In the scene's unit, or degrees.
+    statuses : tuple of str
+        Of the values: only what `scenes.status.is_trusted` has a U that may be signed.
     """
 
     picture: Picture
@@ -51,6 +53,7 @@ class SceneBudget(Shown):
     sensitivities: np.ndarray
     terms: list[list[Term]]
     measurands: tuple[Budget, ...]
+    statuses: tuple[str, ...]
 
     def __iter__(self) -> Iterator[Budget]:
         return iter(self.measurands)
@@ -63,7 +66,12 @@ class SceneBudget(Shown):
         return [{"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
 
     def _line(self) -> str:
-        return "; ".join(f"{each.name} {value(each.value, each.U, each.unit)}, k = {each.k:.2f}" for each in self)
+        return "; ".join(
+            f"{each.name} {value(each.value, each.U, each.unit)}, k = {each.k:.2f}"
+            if status.is_trusted(state)
+            else f"{each.name} not signed: {status.doubt(state)}"
+            for each, state in zip(self, self.statuses, strict=True)
+        )
 
     def ufloats(self) -> dict[str, Any]:
         """Values as numbers of the `uncertainties` package by name; they share the station's inputs and temperature.
@@ -90,6 +98,7 @@ def budget(
     *,
     variances: np.ndarray | None = None,
     biases: np.ndarray | None = None,
+    statuses: tuple[str, ...] | None = None,
     biased: bool | None = None,
     p: float = 0.95,
 ) -> SceneBudget:
@@ -105,6 +114,8 @@ def budget(
         models do: ``calibrated`` of the classic locators, ``bound``, at which ``arrangement`` stands.
     biases : ndarray, shape (M,), optional
         Of the values without noise, measured in a noise-free picture, in place of the predicted ones.
+    statuses : tuple of str, optional
+        Of the values in that picture, in place of the predicted ones.
     biased : bool, optional
         Whether straight edges are found by the classic locators, whose bias the planner predicts; by default where
         `measure.best_estimator` is one of them.
@@ -134,21 +145,17 @@ def budget(
     biased = not is_plain(picture.scene) if biased is None else biased
     given = sources(picture.scene)
     slopes = sensitivities(features, given, biased=biased)
-    noise = _noise(prediction, picture, biased=biased) if variances is None else variances
+    told = prediction if biased else predict(picture, model="bound")  # by the estimator that is meant
+    noise = np.array([each.variance_object for each in told.measurands]) if variances is None else variances
     beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased)
     inputs, budgets = shared_inputs(picture.scene, given), []
     for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
-        told = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
-        told |= {row.name: row.sensitivity for row in rows}
+        by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
+        by_name |= {row.name: row.sensitivity for row in rows}
         whole = (*inputs, *(row.as_input for row in rows))
-        budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
-    return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
-
-
-def _noise(prediction: Prediction, picture: Picture, *, biased: bool) -> np.ndarray:
-    """Variances of the values (M,) by pixel noise, by the estimator that is meant."""
-    told = prediction if biased else predict(picture, model="bound")
-    return np.array([each.variance_object for each in told.measurands])
+        budgets.append(combined(each.name, each.unit, each.value_object, whole, by_name, p))
+    statuses = statuses or tuple(each.status for each in told.measurands)
+    return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets), statuses)
 
 
 def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:

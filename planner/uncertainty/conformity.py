@@ -6,12 +6,15 @@ import math
 from typing import Literal
 
 from scenes import InvalidInput, Tolerance
+from scenes.status import OK, is_trusted
 
 COVERAGE = 2.0  # k: the expanded uncertainty U = k sigma covers about 95 % of a normal distribution
 Decision = Literal["pass", "fail", "undecided"]
 
 
-def decide(value: float, sigma: float, nominal: float, tolerance: Tolerance, k: float = COVERAGE) -> Decision:
+def decide(
+    value: float, sigma: float, nominal: float, tolerance: Tolerance, k: float = COVERAGE, status: str = OK
+) -> Decision:
     """Whether conformity is proved, disproved, or neither.
 
     Parameters
@@ -23,6 +26,8 @@ def decide(value: float, sigma: float, nominal: float, tolerance: Tolerance, k: 
         Of the same unit, as `nominal`.
     k : float
         Coverage factor, at least 0.
+    status : str
+        Of the value (`scenes.status`); what is not trusted is undecided.
 
     Returns
     -------
@@ -34,10 +39,12 @@ def decide(value: float, sigma: float, nominal: float, tolerance: Tolerance, k: 
     >>> zone = Tolerance(plus=0.02, minus=0.02)
     >>> [decide(value, 0.004, 10.0, zone) for value in (10.011, 10.013, 10.027, 10.029)]
     ['pass', 'undecided', 'undecided', 'fail']
+    >>> decide(10.0, 0.004, 10.0, zone, status="clutter")
+    'undecided'
     """
     if not k >= 0:
         raise InvalidInput(f"k must be at least 0, got {k}")
-    if not (math.isfinite(value) and math.isfinite(sigma)):
+    if not (is_trusted(status) and math.isfinite(value) and math.isfinite(sigma)):
         return "undecided"
     inside = min(value - (nominal - tolerance.minus), nominal + tolerance.plus - value)
     if inside >= k * sigma:

@@ -14,10 +14,10 @@ import numpy as np
 from rich.console import Console
 
 import measure
-from measure import status
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
+from scenes import status
 from tests.benchmarks.estimators import aligned_table
 from tests.galsim_images import box, box_corners, corner_bound, ellipse, ellipse_bound
 from tests.oracle import polygon_image

@@ -70,7 +70,8 @@ def test_validate_judges_each(tmp_path):
     found = validation.run(scene, 60, seed=3, out=tmp_path, workers=1)
     document = found.to_json()
     assert document["verdict"].startswith("agree")
-    assert document["judgement"]["rows"] == 10
+    assert (document["judgement"]["rows"], document["judgement"]["not_proven"]) == (9, {"clutter": 1})
+    assert "9 of 10 rows proven, 1 not: clutter 1" in document["verdict"]
     for setting in document["settings"]:
         assert [each["name"] for each in setting["measurands"]] == NAMES
         for each in setting["measurands"]:

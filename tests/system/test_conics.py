@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import measure
-from measure import status
 from measure.features.optics import Optics
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from tests.oracle import polygon_image
 
 SHAPE = (100, 110)

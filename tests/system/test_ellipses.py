@@ -5,9 +5,9 @@ import pytest
 from scipy.stats import chi2
 
 import measure
-from measure import status
 from measure.features.blurred_ellipse import curvature, ellipse_image, from_symmetric, outline, to_symmetric
 from measure.features.optics import Optics
+from scenes import status
 from tests.benchmarks.independent import ellipses
 from tests.galsim_images import box, ellipse
 

@@ -5,13 +5,12 @@ import pytest
 
 import measure
 import render
-from measure import status
 from measure.estimators.registry import ESTIMATORS
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.lines import fit_lines
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
-from scenes import Picture
+from scenes import Picture, status
 from tests.benchmarks.estimators import SHAPE, random_block, rectangle, trial, worst_bias
 from tests.oracle import polygon_image, shaded_image
 

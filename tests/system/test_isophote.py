@@ -7,11 +7,10 @@ from scipy.stats import chi2
 from skimage.measure import find_contours
 
 import measure
-from measure import status
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import prepared
-from scenes import Picture
+from scenes import Picture, status
 from tests.benchmarks.independent import rectangle
 from tests.galsim_images import box, box_corners
 from tests.oracle import block_image, polygon_image

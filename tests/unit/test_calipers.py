@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure import status
 from measure.features.calipers import Caliper, edge_calipers, trim
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
+from scenes import status
 
 OPTICS = Optics((120, 130), 0.7, 1.0, 1.0, 3.0)
 CORNERS = np.array([[22.3, 18.6], [108.1, 25.2], [101.7, 99.4], [17.2, 92.9]])

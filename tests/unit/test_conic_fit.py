@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from measure import fit_ellipse, status
+from measure import fit_ellipse
 from measure.features.conic import _distances, _start
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 
 
 def curve(parameters, t):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import measure
-from measure import status
 from measure.features.optics import Optics
 from measure.find import ellipse
+from scenes import status
 from tests.oracle import polygon_image
 
 TRUE = np.array([40.3, 35.7, 14.0, 14.0, 0.0])

@@ -14,6 +14,7 @@ import scenes
 from planner.imaging.pictures import Pictures
 from planner.models import variance_model
 from scenes import InvalidInput, Pose
+from scenes.status import MEANINGS
 from validation.batch.work import Chunk, Clean, Found, Packed
 from validation.explore import answers, best, effects, preview, prove, save, session, sphere
 from validation.explore.gate import COOKIE, gate
@@ -88,7 +89,7 @@ def test_refused_and_not_measurable(task1):
     assert dark.limiting is None
     row = answers.to_message(dark)["measurands"][0]
     assert row["sigma"] is None
-    assert row["why"] == answers.WHY[row["status"]]
+    assert row["why"] == MEANINGS[row["status"]]
 
 
 def test_a_glance_at_a_block_is_a_close_look(task1):

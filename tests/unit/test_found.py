@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from measure import status
 from measure.features.found import gather, nothing
+from scenes import status
 
 
 def test_nothing():

@@ -5,7 +5,6 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import measure
-from measure import status
 from measure.estimators.thinning import Thinned
 from measure.features.corners import intersect, line_equations
 from measure.features.layout import layout_of
@@ -13,7 +12,7 @@ from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from measure.features.shape import prepared
 from planner.imaging.projection import project
-from scenes import InvalidInput, Noise, Picture
+from scenes import InvalidInput, Noise, Picture, status
 from tests.oracle import polygon_image
 
 SENSOR = (30, 135)

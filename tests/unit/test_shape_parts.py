@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import scenes
-from measure import status
 from measure.features.arranged import _nothing, line_rows
 from measure.features.layout import layout_of
 from measure.features.shape import _end_errors
-from scenes import Picture, Pose
+from scenes import Picture, Pose, status
 
 
 def test_errors_at_both_ends(rng):

@@ -85,11 +85,11 @@ def test_a_relevant_bias_is_contradicted_and_an_irrelevant_one_is_not(rng):
 
 
 def test_a_bias_of_one_row_in_16_is_seen_if_that_row_is_ok():
-    errors, ok = np.zeros(16), np.ones(16, bool)
-    errors[5], ok[5] = 0.6, False
+    errors, status = np.zeros(16), ["ok"] * 16
+    errors[5], status[5] = 0.6, "clutter"
     known = {"bias_px": errors, "sigma_px": np.ones(16)}
     assert verdict(np.ones(16), np.full(16, 1000), **known).reasons == ("bias",)
-    assert verdict(np.ones(16), np.full(16, 1000), **known, ok=ok).agrees
+    assert verdict(np.ones(16), np.full(16, 1000), **known, status=status).agrees
 
 
 def test_a_small_run_is_not_blamed_for_what_it_cannot_show():

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 import measure
-from measure import status
 from measure.photo.tone_curve import UNTOLD, ToneCurve, together
-from scenes import photograph, tone
+from scenes import photograph, status, tone
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure import status as statuses
+from scenes import status as statuses
 from validation import statistics
 
 STATUSES = tuple(sorted(statuses.ALL))

@@ -152,8 +152,8 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
         return self._size == len(self)
 
     def column(self, name: str) -> np.ndarray:
-        """A number of all measurands of all settings, NaN where there is none; ``ok`` as bool."""
-        return self._records["status"] == STATUSES.index("ok") if name == "ok" else self._records[name]
+        """A number of all measurands of all settings, NaN where there is none; ``status`` as text."""
+        return np.array(STATUSES, object)[self._records["status"]] if name == "status" else self._records[name]
 
 
 def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:

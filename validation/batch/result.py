@@ -11,7 +11,7 @@ import numpy as np
 
 import planner
 import scenes
-from scenes import InvalidInput, pairs
+from scenes import InvalidInput, pairs, status
 from scenes.results import Shown, poses
 from validation import statistics
 from validation.batch.campaign import Campaign
@@ -135,7 +135,7 @@ def _verdict(rows: Rows, refused: int, truth: bool) -> Verdict:
     measured = rows.measured
     if measured.are_single:
         return _judge(rows.judged(), refused, truth)
-    names = ("ratio", "n", "failed", "bias", "predicted_bias", "ok", "independent")
+    names = ("ratio", "n", "failed", "bias", "predicted_bias", "status", "independent")
     found = {name: measured.column(name) for name in names}
     return _judge({**found, "propagated": measured.column("predicted")}, refused, truth)
 
@@ -156,7 +156,7 @@ def _judge(found: dict[str, np.ndarray], refused: int = 0, truth: bool = True) -
         bias_px=column("bias", np.nan) if truth else None,
         predicted_bias_px=column("predicted_bias", 0.0),
         sigma_px=np.sqrt(column("propagated", np.inf)),
-        ok=column("ok", 0) > 0,
+        status=np.concatenate([found["status"], np.full(refused, status.NOT_VISIBLE, object)]),
         independent=column("independent", 1.0),
     )
 

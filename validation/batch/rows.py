@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from scenes import pairs
+from scenes.status import is_trusted
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.found import STATUSES, Found, ratios, row_status
@@ -188,12 +189,19 @@ class Rows(Sequence[Row]):
             return self._records["judged"][name][chosen, place]
 
         found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
-        stray = numbers("stray") <= statistics.STRAY * found["n"]
         return {
             **found, "ratio": ratios(found["empirical"], found["propagated"]),
             "predicted_bias": self._records["predicted_bias"][chosen],
-            "ok": stray & (numbers("clean") == STATUSES.index("ok")), "independent": np.ones(chosen.size),
+            "status": self._statuses(numbers), "independent": np.ones(chosen.size),
         }  # fmt: skip
+
+    def _statuses(self, numbers: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Of one method's rows: `row_status`, asked only where images are lost from a picture that is ``ok``."""
+        found = np.array(STATUSES, object)[numbers("clean")]
+        lost = is_trusted(found) & (numbers("stray") > statistics.STRAY * numbers("n"))
+        for row in np.flatnonzero(lost):
+            found[row] = row_status(found[row], self._failures[numbers("failures")[row]], int(numbers("n")[row]))
+        return found
 
     @property
     def others(self) -> list[str]:

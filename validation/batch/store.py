@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from measure import status as statuses
 from scenes import InvalidInput
+from scenes import status as statuses
 from scenes.errors import describe, one_line
 from validation.batch import facts
 from validation.batch.campaign import Campaign

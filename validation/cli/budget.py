@@ -118,12 +118,12 @@ def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
     from validation.report import budget_table
 
     terminal = console()
-    for each, quantity in zip(found, found.picture.scene.quantities, strict=True):
+    for each, quantity, status in zip(found, found.picture.scene.quantities, found.statuses, strict=True):
         terminal.print(budget_table.table(each))
         terminal.print(f" {budget_table.summary(each)}", highlight=False)
         for line in _further(found, each, drawn, reach):
             terminal.print(f" {line}", highlight=False)
-        terminal.print(f" {budget_table.sentence(each, quantity.kind)}\n", style="bold", highlight=False)
+        terminal.print(f" {budget_table.sentence(each, quantity.kind, status)}\n", style="bold", highlight=False)
     for line in budget_table.TERMS:
         terminal.print(f" {line}", highlight=False)
     if shown:

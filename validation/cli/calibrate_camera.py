@@ -57,8 +57,8 @@ def calibrate_camera_command(
     check_file("--output", output, ".toml")
     check_file("--residuals", residuals, ".png")
     import measure
-    from measure import status
     from measure.boards.parameters import read_model
+    from scenes import status
     from validation.boards import read_boards
     from validation.report import camera_table
 

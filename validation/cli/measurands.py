@@ -32,7 +32,7 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
             "sigma_image": float(sigma_image[k]) if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(value, spread, nominal, zone),
+            "decision": zone and decide(value, spread, nominal, zone, status=str(found.status[k])),
             "status": str(found.status[k]),
         })  # fmt: skip
     return rows
@@ -60,7 +60,10 @@ def table(rows: list[dict[str, Any]]) -> Table:
     return shown
 
 
-_CAPTION = "pass, fail: by more than the expanded uncertainty of 2 sigma within or beyond the tolerance (ISO 14253-1)."
+_CAPTION = (
+    "pass, fail: by more than the expanded uncertainty of 2 sigma within or beyond the tolerance (ISO 14253-1); only a "
+    "value whose status is ok is decided."
+)
 
 
 def digits(sigma: float | None) -> int:

@@ -12,6 +12,7 @@ import scenes
 import scenes.photograph
 from scenes import InvalidInput
 from scenes.photograph import Photograph
+from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
@@ -101,6 +102,8 @@ def measure_command(
     else:
         shown = console()
         shown.print(measurands.table(rows))
+        for line in legend(row["status"] for row in rows):
+            shown.print(f" {line}", highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)

@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 import scenes
+from scenes.status import is_trusted
 from validation.cli.common import progress
 from validation.report.terminal import console
 
@@ -32,14 +33,20 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
     table = Table(
         title=f"{scene.title or scene.name}: poses of the smallest worst U / T", title_justify="left", box=None
     )
-    for name in ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T"):
+    for name in ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T", "status"):
         table.add_column(name, no_wrap=True)
     for words, placed in (("U / T", found.best), ("noise alone", found.quiet)):
         for row in _rows(placed):
             ratio = "-" if row["ratio"] is None else f"{row['ratio']:.3f}"
             numbers = (f"{row[key]:.3g}" for key in ("repeatability", "u", "U"))
             table.add_row(
-                words, str(placed.sensor), scenes.shown(scenes.pairs(placed.light)), row["name"], *numbers, ratio
+                words,
+                str(placed.sensor),
+                scenes.shown(scenes.pairs(placed.light)),
+                row["name"],
+                *numbers,
+                ratio,
+                row["status"],
             )
     shown_on.print(table)
     shown_on.print(f"T: half of the tolerance zone. {_guarantee(found, step)}. {seconds:.1f} s.", highlight=False)
@@ -63,17 +70,17 @@ def _guarantee(found: CapabilityPlan, step: float) -> str:
 
 
 def _placed(placed: Placed) -> dict:
-    rows = _rows(placed)
     return {
         "sensor": list(placed.sensor),
         "light": scenes.pairs(placed.light),
-        "worst_ratio": max((row["ratio"] for row in rows if row["ratio"] is not None), default=None),
-        "measurands": rows,
+        "worst_ratio": max(placed.ratios, default=None) if all(map(is_trusted, placed.budget.statuses)) else None,
+        "measurands": _rows(placed),
     }
 
 
 def _rows(placed: Placed) -> list[dict]:
-    pairs = zip(placed.budget.measurands, placed.budget.prediction.measurands, strict=True)
+    found = placed.budget
+    rows = zip(found.measurands, found.prediction.measurands, found.statuses, strict=True)
     return [
         {
             "name": each.name,
@@ -82,7 +89,8 @@ def _rows(placed: Placed) -> list[dict]:
             "u": each.u,
             "U": each.U,
             "k": each.k,
-            "ratio": None if told.tolerance is None else each.U / told.tolerance.half,
+            "ratio": each.U / told.tolerance.half if told.tolerance is not None and is_trusted(status) else None,
+            "status": status,
         }
-        for each, told in pairs
+        for each, told, status in rows
     ]

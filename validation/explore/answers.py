@@ -14,16 +14,8 @@ from planner.imaging.pictures import Pictures
 from planner.models import variance_model
 from planner.prediction import feature_covariances, glanced
 from scenes import InvalidInput, Scene
+from scenes.status import MEANINGS
 from validation.explore.state import State
-
-WHY = {
-    "ok": "what is measured is right: its bias is below a quarter of sigma",
-    "clutter": "something near an edge moves it by more than a quarter of sigma, or is too near to tell",
-    "not_visible": "an edge or a rim that it needs is hidden or outside the image",
-    "low_contrast": "an edge that it needs hardly stands out of the noise",
-    "short": "too little of an edge that it needs is left in the image",
-    "ill_conditioned": "two edges that make a corner lie nearly along each other",
-}
 
 
 @dataclass(frozen=True)
@@ -124,7 +116,7 @@ def _forecast(each: planner.Forecast) -> dict[str, Any]:
         "tolerance": None if each.tolerance is None else each.tolerance.half,
         "bias": finite(each.bias_object),
         "status": each.status,
-        "why": WHY[each.status],
+        "why": MEANINGS[each.status],
     }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenes import Scene
+from scenes.status import doubt
 from validation.batch.campaign import Case
 from validation.batch.measurands import column
 from validation.batch.work import Clean, Found, Task, methods
@@ -76,7 +77,7 @@ class Proof:
 
     @property
     def agrees(self) -> bool:
-        """Whether 1 lies inside the interval."""
+        """Whether 1 lies inside the interval; what is not trusted (`doubt`) is not proven by it."""
         return self.interval[0] <= 1 <= self.interval[1]
 
 
@@ -110,6 +111,7 @@ def to_message(proof: Proof) -> dict[str, Any]:
     counts, edges = np.histogram(proof.values, bins=31) if len(proof.values) > 1 else (np.zeros(0, int), np.zeros(0))
     return {
         "name": proof.name, "unit": proof.unit, "n": proof.n, "failed": proof.failed, "status": proof.status,
+        "doubt": doubt(proof.status),
         "interval": [finite(end) for end in proof.interval], "agrees": proof.agrees, **numbers,
         "mean": finite(float(np.mean(proof.values))) if proof.values else None,
         "counts": counts.tolist(), "edges": edges.tolist(),

@@ -38,4 +38,4 @@ def cells(each: Budget) -> list[list[str]]:
 def note(found: SceneBudget, m: int) -> str:
     """Sum and sentence."""
     each, quantity = found.measurands[m], found.picture.scene.quantities[m]
-    return f"{summary(each)}. {sentence(each, quantity.kind)}."
+    return f"{summary(each)}. {sentence(each, quantity.kind, found.statuses[m])}."

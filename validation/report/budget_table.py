@@ -7,6 +7,7 @@ import math
 from rich.table import Table
 
 from planner.uncertainty.budget import Budget
+from scenes.status import doubt, is_trusted
 
 TERMS = (
     "u: standard uncertainty of a source; contribution = |sensitivity| u; share of u_c^2; A: from observations or the",
@@ -51,18 +52,20 @@ def summary(budget: Budget) -> str:
     )
 
 
-def sentence(budget: Budget, kind: str) -> str:
-    """What is signed: value and expanded uncertainty, to two digits of it.
+def sentence(budget: Budget, kind: str, status: str) -> str:
+    """What is signed: value and expanded uncertainty, to two digits of it; or that nothing is, and why.
 
     Parameters
     ----------
     budget : Budget
-    kind : str
+    kind, status : str
         Of the measurand.
     """
     places = decimals(budget.U)
     what = kind if budget.name == kind else f"{kind} {budget.name!r}"
     unit = budget.unit
+    if not is_trusted(status):
+        return f"The {what} is not signed: {doubt(status)}"
     return f"The {what} is {budget.value:.{places}f} {unit} +- {budget.U:.{places}f} {unit}, k = {budget.k:.1f}"
 
 

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
+from scenes.status import legend
 from validation.batch.result import Validation
 from validation.statistics import LEVEL
 
@@ -15,16 +16,6 @@ _LOCATORS = {
     "isophote": "where the smoothed image takes the mean of both sides' levels",
     "strip": "maximum likelihood along each edge",
     "arrangement": "maximum likelihood of all faces around the edges together",
-}
-_STATUSES = {
-    "clutter": "what lies around an edge biases the value",
-    "short": "too little of an edge is left",
-    "low_contrast": "too little of an edge stands out of the noise",
-    "sign_change": "the contrast changes sign along an edge",
-    "not_visible": "an edge is hidden or outside the image",
-    "ill_conditioned": "edges nearly parallel, or the image tells too little of what is near",
-    "ambiguous": "another solution explains the image as well",
-    "misfit": "the image is not what the model says",
 }
 
 
@@ -74,13 +65,8 @@ def unit_terms(statuses: Iterable[str], judged: bool) -> list[str]:
     return [
         "value: of the object itself. sigma: standard deviation of one picture's; compare it with your tolerance.",
         f"ratio: of variances, measured / propagated, with its 95 % interval; {which}. bias: mean less value.",
-        *status_terms(statuses),
+        *legend(statuses),
     ]
-
-
-def status_terms(found: Iterable[str]) -> list[str]:
-    """What each status but ``ok`` says, one line each."""
-    return [f"{name}: {_STATUSES[name]}." for name in dict.fromkeys(found) if name in _STATUSES]
 
 
 def correlation_terms() -> list[str]:
@@ -117,12 +103,13 @@ How to read this
   paper real   What the paper measured on photographs, five a setting, with thresholds of 12.0 and 10.0; N/A is "-".
   failed       Pictures without a value, one number a method: "0 0 0" is none by any of three.
   bias, rmse   Mean error, and sqrt(variance + bias^2). The predicted bias is that of the edge finder, without noise.
-  status       ok: value and sigma can be trusted. Others say why not; each that occurs is explained below its table.
+  status       ok: value and sigma can be relied on. Others say why not; each that occurs is explained below its table.
   *            1 lies outside the 95 % interval. One row of 20 has it by chance: count them, do not judge one.
   Sidak        With many rows a small p-value occurs by chance. The limit for the smallest of m rows is
                1 - (1 - a)^(1 / m). Three tests - each row's variance, all rows pooled, mean errors - have each an a;
                they add up to {100 * LEVEL:g} %, the chance of a false alarm (Bonferroni).
-  agree        No test found a difference. contradict: one did, or most rows could not be measured.
+  proven       Rows whose status is ok. Only they are judged: of the others too little is known to agree or contradict.
+  agree        No test found a difference. contradict: one did, most rows could not be measured, or none is proven.
 """
 
 
@@ -139,7 +126,7 @@ def next_line(found: Validation, scene: str | None, directory: Path) -> str:
     scene = shlex.quote(scene)
     if found.verdict.agrees:
         return f"{report}; `ice plan {scene}` looks for better places of sensor and light."
-    if "not measured" in found.verdict.reasons:
+    if {"not measured", "not proven"} & set(found.verdict.reasons):
         return f"{report}; `ice plan {scene}` proposes settings that can be measured."
     return f"{report}; `ice effects {scene} --check` tells whether an effect that was left out is why."
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scenes.status import legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
@@ -53,7 +54,7 @@ def ratios(found: Validation) -> Table:
         for row in rows
     ]  # fmt: skip
     terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
-    note = " ".join([*terms, *guide.status_terms(row.main.status for row in rows), which])
+    note = " ".join([*terms, *legend(row.main.status for row in rows), which])
     return Table("Measured over predicted variance, by setting", columns, lines, note, advice=_advice(found, "ratios"))
 
 

@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from scenes import shown
+from scenes.status import legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report import guide
@@ -100,7 +101,7 @@ def _ratios(found: Validation) -> list[Table | Text]:
         parts = [small_sigma(row.texture)] * uneven
         shifts = shift(row.main.predicted_bias), *errors(row.main)
         table.add_row(*cells[row.index], *each, str(row.main.n), failed(row), *parts, *shifts, row.main.status)
-    terms = guide.ratio_terms(main, 1 + len(others)) + guide.status_terms(row.main.status for row in rows)
+    terms = guide.ratio_terms(main, 1 + len(others)) + legend(row.main.status for row in rows)
     return [table, _lines([*terms, *(_PARTS if uneven else ()), which])]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import measure
 import planner
 import scenes
-from measure import status
+from scenes import status
 from scenes.load import BUNDLED
 from tests.hard.fuzzing.mutations import HOSTILE, keys, spoilt, stored
 from validation import picture_file

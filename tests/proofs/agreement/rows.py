@@ -13,8 +13,7 @@ from threadpoolctl import threadpool_limits
 import measure
 import planner
 import render
-from measure import status
-from scenes import InvalidInput
+from scenes import InvalidInput, status
 from tests.proofs.agreement.settings import Place
 from validation.batch.found import row_status
 from validation.plan_check import without_formula

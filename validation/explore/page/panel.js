@@ -88,7 +88,7 @@ export function proof(rows, state, where) {
     `${number(r.ratio)} [${number(r.interval[0])}, ${number(r.interval[1])}]`, `${r.failed}/${r.n}`], i === state.measurand ? "chosen" : "")));
   table.append(head, body);
   const said = each.ratio === null ? `It could not be measured (${each.status}).`
-    : `${each.name}: 1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${number(each.bias, 2)} ${each.unit}, predicted ${number(each.predicted_bias, 2)}.`;
+    : `${each.name}: ${each.doubt ? `not proven (${each.doubt}); ` : ""}1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${number(each.bias, 2)} ${each.unit}, predicted ${number(each.predicted_bias, 2)}.`;
   const canvas = element("canvas", "", "hist");
   const title = element("h2", "Measured beside predicted ");
   title.append(element("small", `at ${where}`));

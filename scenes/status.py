@@ -1,0 +1,99 @@
+"""What a prediction or a measurement says of itself: the list of statuses, what each means, and which may be relied on.
+
+Only those in `MEASURED` come with a value, and only what `is_trusted` may be decided upon, signed, or counted as shown.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+
+OK = "ok"
+TONE_UNKNOWN = "tone_unknown"
+CLUTTER = "clutter"
+MISFIT = "misfit"
+CORRELATED = "correlated"
+COMPRESSED = "compressed"
+AMBIGUOUS = "ambiguous"
+ILL_CONDITIONED = "ill_conditioned"
+LOW_CONTRAST = "low_contrast"
+SIGN_CHANGE = "sign_change"
+SHORT = "short"
+NOT_VISIBLE = "not_visible"
+
+# The worst first.
+MEANINGS = {
+    NOT_VISIBLE: "what it needs is hidden or outside the image",
+    SHORT: "too little of an edge is left in the image",
+    SIGN_CHANGE: "the contrast changes its sign along an edge",
+    LOW_CONTRAST: "too little of an edge stands out of the noise",
+    ILL_CONDITIONED: "edges that meet are nearly parallel, or the image says too little of what is near",
+    AMBIGUOUS: "another solution explains the image as well",
+    COMPRESSED: "compression (JPEG) has lost what is no noise: the variance is too small",
+    CORRELATED: "the noise of neighbouring pixels is not independent: the variance is not exact",
+    MISFIT: "the image is not what the model says within its noise: neither value nor variance can be relied on",
+    CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
+    TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
+    OK: "value and sigma can be relied on",
+}
+WORST_FIRST = tuple(MEANINGS)
+ALL = frozenset(MEANINGS)
+MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+
+
+def worst(*statuses: str) -> str:
+    """The most serious of several statuses.
+
+    >>> worst("ok", "clutter", "short")
+    'short'
+    """
+    return min(statuses, key=WORST_FIRST.index)
+
+
+def is_trusted(status: Any) -> Any:
+    """Whether a value may be decided upon, signed, and counted as shown; the one rule for all that do.
+
+    Parameters
+    ----------
+    status : str or ndarray of str
+
+    Returns
+    -------
+    bool or ndarray of bool
+
+    >>> is_trusted("ok"), is_trusted("clutter")
+    (True, False)
+    """
+    return status == OK
+
+
+def doubt(status: str) -> str:
+    """Why a value is not relied on, in a few words: what is wrong, and what is not known of it; empty where it is.
+
+    >>> doubt("clutter"), doubt("short")
+    ('clutter, bias unknown', 'short, no value')
+    """
+    if is_trusted(status):
+        return ""
+    if status in (CORRELATED, COMPRESSED):
+        return f"{status}, uncertainty unknown"
+    return f"{status}, {'bias unknown' if status in MEASURED else 'no value'}"
+
+
+def legend(statuses: Iterable[str]) -> list[str]:
+    """What each status that is not trusted means, one line each.
+
+    >>> legend(["ok", "short"])
+    ['short: too little of an edge is left in the image.']
+    """
+    return [f"{name}: {MEANINGS[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
+
+
+def counted(statuses: Iterable[str]) -> str:
+    """Statuses with their numbers, the most frequent first.
+
+    >>> counted(["clutter", "short", "clutter"])
+    'clutter 2, short 1'
+    """
+    return ", ".join(f"{name} {count}" for name, count in Counter(map(str, statuses)).most_common())
