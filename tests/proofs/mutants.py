@@ -1,10 +1,12 @@
 """``make mutants``: are the tests there that would notice a slip? A sample of them, each judged by the nearest tests.
 
-A mutant is one place of the code changed by one of cosmic-ray's operators: a sign, a comparison, a number, a condition.
-Each is made in a copy of the repository and tested there: first the examples of its own module and the tests that read
-the code, then the unit tests that call the changed function and others of the module, the quickest first
-(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what
-makes one of them fail. What survives is printed with its line: a test is missing, or the mutant is equivalent.
+A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
+or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
+examples of its own module and the tests that read the code, then the unit tests that call the changed function and
+others of the module, the quickest first (``tests.proofs.reach``), then the other test files that speak most of the
+names that the module defines. Killed is what makes one of them fail that passes on clean code: up to the one that
+killed they are run there, too, and what fails there is no kill. What survives is printed with its line: a test is
+missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -31,12 +33,10 @@ from typing import Any
 
 from tests.proofs.equivalent import is_equivalent
 from tests.proofs.reach import function, reached
+from tests.proofs.slips import SLIPS, places, slipped
 
 ROOT = Path(__file__).parents[2]
-SOURCES = (
-    "planner", "measure", "render", "validation/statistics.py", "validation/comparison.py",
-    "validation/cost/interval.py",
-)  # fmt: skip
+SOURCES = ("scenes", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
@@ -84,6 +84,8 @@ def mutants(root: Path = ROOT) -> list[Mutant]:
         for name, operator in operators.items():
             count = sum(len(list(operator.mutation_positions(node))) for node in nodes)
             found += [Mutant(file, name, place) for place in range(count)]
+        text = (root / file).read_text(encoding="utf-8")
+        found += [Mutant(file, slip, place) for slip in SLIPS for place in range(len(places(slip, text)))]
     return found
 
 
@@ -154,7 +156,10 @@ def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
     from cosmic_ray.plugins import get_operator
 
     before = (root / mutant.file).read_text(encoding="utf-8")
-    after = mutate_code(before, get_operator(mutant.operator)(), mutant.place)
+    if mutant.operator in SLIPS:
+        after = slipped(mutant.operator, before, mutant.place)
+    else:
+        after = mutate_code(before, get_operator(mutant.operator)(), mutant.place)
     if after is None or after == before:
         return "", ""
     pairs = zip(before.splitlines(), after.splitlines(), strict=False)
@@ -163,28 +168,38 @@ def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
 
 
 def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_first: bool = False) -> tuple[str, str]:
-    """ "killed", "survived" or "too slow", and the test that killed; ``root`` is a copy that nobody else uses."""
+    """ "killed", "survived", "too slow" or "no baseline", and the test that killed, or that fails on clean code, too.
+
+    ``root`` is a copy that nobody else uses.
+    """
     path = root / mutant.file
     before = path.read_text(encoding="utf-8")
     after, line = changed(mutant, root)
     asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
     asked += [] if is_first else nearest(mutant.file, root)
+    limit = _FIRST_S if is_first else _LIMIT_S
     path.write_text(after, encoding="utf-8")
     try:
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", mutant.file]
-        environment = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
-        run = subprocess.run(
-            [*command, *asked],
-            cwd=root, env=environment, capture_output=True, text=True,
-            preexec_fn=partial(_limited, _FIRST_S if is_first else _LIMIT_S),
-        )  # fmt: skip
+        code, by = _tested([mutant.file, *asked], root, limit)
     finally:
         path.write_text(before, encoding="utf-8")
-    if run.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
         return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
-    if run.returncode in (0, 5):
+    if code in (0, 5):
         return "survived", ""
-    return "killed", next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)), "")
+    last = next((n for n, test in enumerate(asked, 1) if by.startswith(test)), 0 if by else len(asked))
+    clean, wrong = _tested([mutant.file, *asked[:last]], root, 2 * limit)
+    return ("killed", by) if clean in (0, 5) else ("no baseline", wrong)
+
+
+def _tested(tests: list[str], root: Path, seconds: int) -> tuple[int, str]:
+    """Exit status of these tests in a copy, and the one that fails, if it has a name."""
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests],
+        cwd=root, env={**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
+        preexec_fn=partial(_limited, seconds),
+    )  # fmt: skip
+    return run.returncode, next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)), "")
 
 
 def _limited(seconds: int) -> None:
@@ -220,7 +235,7 @@ def main() -> None:
     tests = reached(asked.log.with_name("reach.json"), sorted((ROOT / UNIT).glob("test_*.py")))
     chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
     known = _known(asked.log)
-    tally = dict.fromkeys(("killed", "survived", "too slow", "equivalent", "same"), 0)
+    tally = dict.fromkeys(("killed", "survived", "too slow", "no baseline", "equivalent", "same"), 0)
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(asked.workers) as executor:
         free = copies(asked.workers, Path(folder))
 
@@ -245,7 +260,7 @@ def main() -> None:
 
         for outcome, line in executor.map(one, chosen):
             tally[outcome] += 1
-            if outcome in ("survived", "too slow"):
+            if outcome in ("survived", "too slow", "no baseline"):
                 print(f"{outcome}: {line}", flush=True)
     tried = sum(tally.values()) - tally["same"] - tally["equivalent"]
     print(
