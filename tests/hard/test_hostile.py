@@ -25,6 +25,7 @@ from scenes import InvalidInput, Noise
 from scenes.files import read_toml
 from scenes.load import BUNDLED
 from scenes.parts import mesh
+from tests import commands
 from validation import comparison, picture_file
 from validation.batch import campaign
 from validation.batch.stages import Stages
@@ -39,6 +40,9 @@ PICTURE = np.pad(np.full((80, 130), 180.0), ((80, 80), (60, 66)), constant_value
 
 
 def ice(*arguments, cwd=None, env=None, timeout=60):
+    """In a process of its own only where its environment is."""
+    if env is None:
+        return commands.ice(*arguments, cwd=cwd)
     command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=env, timeout=timeout)
 

@@ -13,8 +13,8 @@ import planner
 import scenes
 from planner.budgeting.plans import plan_capability
 from planner.uncertainty.improve import needed, scaled
+from tests.commands import ice
 from tests.proofs.stations import coverage
-from tests.system.test_cli import ice
 from validation import budgets
 from validation.chain import Chain
 from validation.report import budget_section

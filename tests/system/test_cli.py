@@ -1,21 +1,15 @@
 """The command line as a user meets it: exit status, one line for bad input, one document for --json."""
 
 import json
-import subprocess
-import sys
 
 import cv2
 import numpy as np
 import pytest
 
 from scenes.load import BUNDLED
+from tests.commands import ice
 
 pytestmark = pytest.mark.render
-
-
-def ice(*arguments, cwd=None):
-    command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import planner
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.system.test_cli import ice
+from tests.commands import ice
 from validation.report import export, plan_table
 
 pytestmark = pytest.mark.render

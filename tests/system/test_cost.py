@@ -1,24 +1,18 @@
 """Asking for an accuracy or a time, end to end on a small scene."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 import validation
+from tests.commands import ice
 from validation.batch import campaign
 from validation.cost import size
 from validation.cost.goal import reach
 from validation.cost.trial import trial
 
 pytestmark = pytest.mark.render
-
-
-def ice(*arguments):
-    command = [sys.executable, "-m", "validation.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
 def test_accuracy_asked_for_is_reached_in_every_setting(small_toml, tmp_path):

@@ -1,8 +1,6 @@
 """A photograph found, measured, said and drawn."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import cv2
@@ -13,6 +11,7 @@ import measure
 from measure.features.optics import Optics
 from measure.photo.edge_points import ellipse_by_points
 from scenes import InvalidInput
+from tests import commands
 from tests.photographs import _HOLES, _PLATE, _TAG, board, disc, ellipse, plate, tag
 from validation.report import overlay
 
@@ -140,8 +139,7 @@ def test_a_board_is_drawn_with_all_its_corners(tmp_path):
 
 
 def ice(*arguments):
-    command = [sys.executable, "-m", "validation.cli", "measure", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return commands.ice("measure", *arguments)
 
 
 def test_command(tmp_path):
