@@ -1,9 +1,11 @@
 """``ice new``, ``ice show`` and ``ice scenes``: from a part's file to a scene that runs."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 import measure
@@ -20,16 +22,24 @@ def ice(*arguments):
     return ICE.invoke(app, list(map(str, arguments)))
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a part and what `ice new` makes of it."""
+    folder = tmp_path_factory.mktemp("part")
+    bracket(24).export(folder / "part.stl")
+    done = ice("new", folder / "part.stl", "-o", folder / "part.toml")
+    assert done.exit_code == 0
+    return folder
+
+
 @pytest.fixture
-def part(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    bracket(24).export(tmp_path / "part.stl")
-    return tmp_path / "part.stl"
+def part(made, monkeypatch):
+    monkeypatch.chdir(made)
+    return Path("part.stl")
 
 
 def test_a_new_scene_runs(part):
     """Its task is seen, lit, sharp and in the picture; its field of view holds the part."""
-    assert ice("new", part).exit_code == 0
     scene = scenes.load("part.toml")
     assert scene.units == "mm"
     assert max(np.ptp(scene.solid.vertices, axis=0)) == pytest.approx(60)
@@ -66,15 +76,16 @@ def test_random_parts_from_a_file_to_a_measured_value(case, tmp_path):
 
 
 @pytest.mark.parametrize("units", ["inch", "m"])
-def test_a_new_scene_in_other_units(part, units):
-    assert ice("new", part, "--units", units, "-o", "other.toml").exit_code == 0
+def test_a_new_scene_in_other_units(units, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.box((60, 40, 12)).export("part.stl")
+    assert ice("new", "part.stl", "--units", units, "-o", "other.toml").exit_code == 0
     scene = scenes.load("other.toml")
     assert scene.units == units
     assert 60 < min(scene.camera.field_of_view) < 180
 
 
 def test_what_new_refuses(part):
-    ice("new", part)
     for arguments, line in [
         (("new", part), "--output must be a new file, got part.toml, which exists"),
         (("new", part, "--units", "ft", "-o", "x.toml"), "--units must be one of mm, cm, m, inch, got 'ft'"),
@@ -87,7 +98,6 @@ def test_what_new_refuses(part):
 
 def test_show_lists_and_draws(part):
     """Names, places and lengths are those that the part was made with."""
-    ice("new", part)
     result = ice("show", "part.toml", "--sensor", "40,210", "-o", "part.png", "--json")
     facts = json.loads(result.stdout)
     assert {edge["name"]: edge["length"] for edge in facts["edges"]}["e3"] == pytest.approx(60, abs=1e-5)

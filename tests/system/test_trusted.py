@@ -4,28 +4,28 @@ import numpy as np
 import pytest
 
 import planner
+import scenes
 from planner.search.trusted import DEAREST, trusted
-from tests.proofs.parts import make, scene_of
 from validation.report.plan_table import report
 
 
 @pytest.fixture(scope="module")
-def plate(tmp_path_factory):
-    """A plate with two holes; straight above its middle row the far side faces lie along the edges."""
-    return scene_of(make(np.random.default_rng(1), tmp_path_factory.mktemp("part"), 0))[0]
+def wedge():
+    """Straight above it the far side faces lie along the edges."""
+    return scenes.load("wedge")
 
 
 @pytest.fixture(scope="module")
-def found(plate):
-    return planner.plan(plate, step_deg=30, refined=False)
+def found(wedge):
+    return planner.plan(wedge, step_deg=45, refined=False)
 
 
-def test_what_is_set_aside_is_better_and_not_to_be_trusted(plate, found, capsys):
+def test_what_is_set_aside_is_better_and_not_to_be_trusted(wedge, found, capsys):
     assert found.prediction.status == "ok"
     assert found.set_aside
     for each in found.set_aside:
         assert each.variance < found.variance < DEAREST * each.variance
-        assert planner.predict(plate, each.sensor, each.light).status != "ok"
+        assert planner.predict(wedge, each.sensor, each.light).status != "ok"
     assert tuple(found.grid_sensor) == tuple(found.set_aside[0].sensor)
     from rich.console import Console
 
@@ -33,9 +33,9 @@ def test_what_is_set_aside_is_better_and_not_to_be_trusted(plate, found, capsys)
     assert "set aside" in capsys.readouterr().out
 
 
-def test_nothing_is_set_aside_for_what_costs_too_much(plate, found):
+def test_nothing_is_set_aside_for_what_costs_too_much(wedge, found):
     best = tuple(np.array(list(pose)) for pose in (found.grid_sensor, found.grid_light))
-    taken = trusted(plate, best, found.grid_variance / (2 * DEAREST), found.candidates, found.model)
+    taken = trusted(wedge, best, found.grid_variance / (2 * DEAREST), found.candidates, found.model)
     assert not taken.set_aside
     assert taken.untrusted > 0
     assert (taken.sensor == best[0]).all()
