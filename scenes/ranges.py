@@ -19,6 +19,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Length = Annotated[float, Field(ge=1e-12, le=1e12)]  # in the scene's unit
 Level = Annotated[float, Field(ge=1e-15, le=1e15)]  # grey levels
 Coordinate = Annotated[float, Field(ge=-1e12, le=1e12)]  # in the scene's unit
+Spread = Annotated[float, Field(ge=0, le=1e12)]  # a standard uncertainty, of any unit
 Darkness = Annotated[float, Field(ge=0, le=1e15)]  # grey levels
 Trace = Annotated[float, Field(ge=0, le=1e15), AfterValidator(_none_or_some)]  # grey levels
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 import time
@@ -16,6 +15,7 @@ from scenes import InvalidInput, Pose
 from validation.batch.stopped import CONTINUE, Interrupted
 from validation.cli import verbosity
 from validation.report.terminal import console
+from validation.strict_json import dumps
 
 if TYPE_CHECKING:
     from render import Tolerance
@@ -113,7 +113,7 @@ def parse_poses(option: str, text: str | None) -> Pose | tuple[Pose, ...] | None
 
 def say(facts: dict, as_json: bool, text: str) -> None:
     """Print a command's facts: as JSON, or the text."""
-    print(json.dumps(facts, indent=1) if as_json else text)
+    print(dumps(facts) if as_json else text)
 
 
 @contextmanager
@@ -164,4 +164,5 @@ class _JsonLine(logging.Formatter):
     """One JSON object a line: time (seconds since 1970), event, and the event's facts."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return json.dumps({"time": record.created, "event": record.getMessage(), **getattr(record, "facts", {})})
+        facts = getattr(record, "facts", {})
+        return dumps({"time": record.created, "event": record.getMessage(), **facts}, indent=None)

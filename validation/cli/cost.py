@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from validation.cli.common import Json, SceneName, Seed, check_seed, commands, p
 from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
+from validation.strict_json import dumps
 
 commands = commands()
 
@@ -39,7 +39,7 @@ def cost_command(
     with progress(f"{loaded.name}: cost", "parameters") as shown:
         found = sweep(loaded, seed, shown)
     directory.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(found.to_json(), indent=1)
+    text = dumps(found.to_json())
     (directory / "cost.json").write_text(text, encoding="utf-8")
     write_csv(found, directory)
     cost_figures.draw(found, directory)

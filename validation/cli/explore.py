@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import signal
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +11,7 @@ import typer
 
 import scenes
 from validation.batch.stopped import Interrupted
-from validation.cli.common import Json, SceneName, check_number, commands
+from validation.cli.common import Json, SceneName, check_number, commands, say
 
 commands = commands()
 
@@ -40,7 +40,8 @@ def explore_command(
     from validation.explore.session import Place
 
     def told(address: str) -> None:
-        print(json.dumps({"url": address}) if as_json else f"{loaded.name}: {address} (Ctrl-C ends)", flush=True)
+        say({"scene": loaded.name, "url": address}, as_json, f"{loaded.name}: {address} (Ctrl-C ends)")
+        sys.stdout.flush()  # whoever reads a pipe is to know it at once
         if open_it:
             import webbrowser
 

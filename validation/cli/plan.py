@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +11,7 @@ import typer
 
 import scenes
 from validation.cli import plan_json
-from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress
+from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress, say
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 
@@ -276,7 +275,7 @@ def _show(
 
     if as_json:
         varied = {"varied": vary_table.facts(found.varied, scatter)}
-        print(json.dumps(plan_json.facts(found, checked, safe, seconds, pictures) | varied, indent=1))
+        say(plan_json.facts(found, checked, safe, seconds, pictures) | varied, True, "")
         return
     from validation.report import plan_table
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -56,7 +55,7 @@ def show_command(scene: SceneName, sensor: Sensor = None, output: Picture = None
         draw(loaded, pose, output)
     facts = {**scene_table.facts(loaded), "sensor": list(pose), "picture": output and str(output)}
     if as_json:
-        print(json.dumps(facts, indent=1))
+        say(facts, True, "")
         return
     console().print(scene_table.report(loaded), highlight=False)
     if output is not None:

@@ -74,7 +74,7 @@ def lens_file(found: CameraCalibration) -> str:
 
 def covariance_file(found: CameraCalibration) -> str:
     """JSON as ``uncertainty.covariance`` reads it."""
-    return json.dumps(_covariance(found), indent=1) + "\n"
+    return dumps(_covariance(found)) + "\n"
 
 
 def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> str:

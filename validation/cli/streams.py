@@ -1,0 +1,19 @@
+"""Standard streams that anything can be printed to, whatever the caller has made of them."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def make_usable() -> None:
+    """A closed stream becomes one that swallows all; what a stream's encoding lacks is printed as its escape.
+
+    Whoever closes standard output wants nothing printed, and a file that is opened later must not take its place.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - as long as the process
+        elif mode == "w" and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
