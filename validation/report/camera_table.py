@@ -13,6 +13,7 @@ import scenes
 from measure.boards.camera import CameraCalibration
 from scenes import InvalidInput
 from validation.boards import Boards
+from validation.strict_json import dumps
 
 _STRONG = 0.9  # correlation that is told of
 

@@ -18,7 +18,7 @@ _DPI = 160
 def save(figure, path: Path) -> Path:
     """Write a figure to a file and forget it; the file's path.
 
-    Texts are shown as they are, for names and titles are the user's: only the powers along logarithmic axes are formulas.
+    Texts are shown as they are, for names and titles are the user's: only powers along logarithmic axes are formulas.
     """
     axes = [axis for each in figure.axes for axis in (each.xaxis, each.yaxis) if axis.get_scale() == "log"]
     powers = {label for axis in axes for label in axis.get_ticklabels(which="both")}
