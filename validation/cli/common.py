@@ -24,7 +24,7 @@ Report = Callable[[str, int, int], None]
 
 MOST_SEED = 2**63 - 1
 MOST_WORKERS = 1024
-_EVERY_S = 10.0  # between lines of progress where there is no terminal
+_EVERY_S, _SOON_S = 10.0, 3.0  # between lines of progress where there is no terminal
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene or a TOML file.")]
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
@@ -117,14 +117,19 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 
 @contextmanager
-def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
-    """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s."""
+def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterator[Report | None]:
+    """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s.
+
+    ``at_once`` says already that work begins, and then a line every 3 s: for what is silent for long.
+    """
     if verbosity.quiet():
         yield None
         return
     errors = console(stderr=True)
     if not errors.is_terminal:
-        yield _lines(title, unit)
+        if at_once:
+            print(f"{title} ...", file=sys.stderr, flush=True)
+        yield _lines(title, unit, _SOON_S if at_once else _EVERY_S)
         return
     from validation.cli.bar import bar
 
@@ -132,12 +137,12 @@ def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
         yield report
 
 
-def _lines(title: str, unit: str) -> Report:
+def _lines(title: str, unit: str, every_s: float) -> Report:
     told = time.monotonic()
 
     def report(_what: str, done: int, total: int) -> None:
         nonlocal told
-        if time.monotonic() - told >= _EVERY_S:
+        if time.monotonic() - told >= every_s:
             told = time.monotonic()
             print(f"{title}: {done} of {total} {unit}", file=sys.stderr, flush=True)
 
