@@ -129,7 +129,7 @@ def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterato
     if not errors.is_terminal:
         if at_once:
             print(f"{title} ...", file=sys.stderr, flush=True)
-        yield _lines(title, unit, _SOON_S if at_once else _EVERY_S)
+        yield _lines(title, unit, at_once)
         return
     from validation.cli.bar import bar
 
@@ -137,14 +137,15 @@ def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterato
         yield report
 
 
-def _lines(title: str, unit: str, every_s: float) -> Report:
-    told = time.monotonic()
+def _lines(title: str, unit: str, at_once: bool) -> Report:
+    told, every_s = time.monotonic(), _SOON_S if at_once else _EVERY_S
 
-    def report(_what: str, done: int, total: int) -> None:
+    def report(what: str, done: int, total: int) -> None:
         nonlocal told
         if time.monotonic() - told >= every_s:
             told = time.monotonic()
-            print(f"{title}: {done} of {total} {unit}", file=sys.stderr, flush=True)
+            named = f"{what}, " if at_once else ""
+            print(f"{title}: {named}{done} of {total} {unit}", file=sys.stderr, flush=True)
 
     return report
 

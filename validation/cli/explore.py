@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,8 @@ import typer
 
 import scenes
 from validation.batch.stopped import Interrupted
-from validation.cli.common import Json, SceneName, check_number, commands, say
+from validation.cli.common import Json, SceneName, check_number, commands
+from validation.strict_json import dumps
 
 commands = commands()
 
@@ -40,8 +40,8 @@ def explore_command(
     from validation.explore.session import Place
 
     def told(address: str) -> None:
-        say({"scene": loaded.name, "url": address}, as_json, f"{loaded.name}: {address} (Ctrl-C ends)")
-        sys.stdout.flush()  # whoever reads a pipe is to know it at once
+        facts = {"scene": loaded.name, "url": address}  # in one line and at once, for whoever reads a pipe
+        print(dumps(facts, indent=None) if as_json else f"{loaded.name}: {address} (Ctrl-C ends)", flush=True)
         if open_it:
             import webbrowser
 

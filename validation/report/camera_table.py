@@ -113,7 +113,7 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
 def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
     """The document of ``ice calibrate-camera --json``."""
     lens = found.lens
-    told = {
+    return {
         "status": found.status,
         "image": list(found.image_shape[::-1]),
         "units": units,
@@ -134,7 +134,6 @@ def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }
-    return _finite(told)
 
 
 def _board_facts(found: CameraCalibration, seen: Boards) -> list[dict[str, Any]]:
@@ -172,11 +171,3 @@ def _covariance(found: CameraCalibration) -> dict[str, Any]:
 
 def _inline(covariance: dict[str, Any]) -> str:
     return f"{{ names = {json.dumps(covariance['names'])}, matrix = {json.dumps(covariance['matrix'])} }}"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
