@@ -1,5 +1,9 @@
 """An image becomes edge points, lines, corners and a distance, each with its covariance and a status."""
 
+import ice_vision
+
+ice_vision.check("scenes", "planner")
+
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
 from measure.bounds import bound, image_bound

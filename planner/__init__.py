@@ -1,5 +1,9 @@
 """The analytic expert: from a scene and poses to the precision of the measurement, without an image."""
 
+import ice_vision
+
+ice_vision.check("scenes")
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

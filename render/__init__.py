@@ -1,5 +1,9 @@
 """A scene and a pose become an image: rendered without noise, then exposed with the sensor's noise."""
 
+import ice_vision
+
+ice_vision.check("scenes", "planner")
+
 from render.phenomena import Tolerance, choose, effects
 from render.phenomena.pose import shaken
 from render.renderer import Quality, image

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from scenes.errors import InvalidInput
 from scenes.files import read_json, read_toml
@@ -29,7 +29,7 @@ class Covariance(Model):
 
     names: tuple[Intrinsic, ...]
     """Of the parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3; fx alone stands for both focal lengths."""
-    matrix: tuple[tuple[float, ...], ...]
+    matrix: tuple[tuple[Annotated[float, Field(ge=-1e24, le=1e24)], ...], ...]
     """Their covariance, one row and column each."""
 
     @model_validator(mode="after")

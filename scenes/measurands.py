@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenes.model import Model, Title
-from scenes.ranges import Coordinate, Positive
+from scenes.ranges import Coordinate, Positive, Spread
 
 Kind = Literal["distance", "width", "offset", "angle", "diameter", "taper", "position"]
 _WANTED = {
@@ -91,9 +91,9 @@ AnyFeature = Annotated[
 class Tolerance(Model):
     """How far a value may lie above and below its nominal one, in the scene's unit or degrees."""
 
-    plus: Annotated[float, Field(ge=0)]
+    plus: Spread
     """Above the nominal value, the scene's unit or degrees."""
-    minus: Annotated[float, Field(ge=0)]
+    minus: Spread
     """Below it."""
 
     @model_validator(mode="after")

@@ -14,11 +14,22 @@ def _none_or_some(value: float) -> float:
     return value
 
 
+def _zero_or(least: float) -> AfterValidator:
+    def checked(value: float) -> float:
+        if 0 < value < least:  # as above
+            raise ValueError(f"number must be 0 or at least {least:g}, got {value:g}")
+        return value
+
+    return AfterValidator(checked)
+
+
 Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Length = Annotated[float, Field(ge=1e-12, le=1e12)]  # in the scene's unit
 Level = Annotated[float, Field(ge=1e-15, le=1e15)]  # grey levels
 Coordinate = Annotated[float, Field(ge=-1e12, le=1e12)]  # in the scene's unit
+Spread = Annotated[float, Field(ge=0, le=1e12), _zero_or(1e-30)]  # a standard uncertainty, of any unit
+Rounding = Annotated[float, Field(ge=0, le=1e12), _zero_or(1e-29)]  # a step; half of it is a Spread
 Darkness = Annotated[float, Field(ge=0, le=1e15)]  # grey levels
 Trace = Annotated[float, Field(ge=0, le=1e15), AfterValidator(_none_or_some)]  # grey levels
 

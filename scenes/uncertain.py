@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from scenes.errors import describe
 from scenes.model import Model
 from scenes.numbers import ROOTS, number_at
-from scenes.ranges import NotNegative, Positive
+from scenes.ranges import Coordinate, Spread
 
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine", "t"]
 PER_HALF_WIDTH = {"rectangular": 3**-0.5, "triangular": 6**-0.5, "arcsine": 2**-0.5}
@@ -26,15 +26,15 @@ class Uncertain(Model):
     (0.1732, 'normal')
     """
 
-    value: float | None = None
+    value: Coordinate | None = None
     """The number itself; 0 for a deviation."""
-    sd: NotNegative | None = None
+    sd: Spread | None = None
     """Standard uncertainty, of the number's unit."""
-    half_width: NotNegative | None = None
+    half_width: Spread | None = None
     """Largest deviation to either side, of the number's unit."""
     distribution: Distribution | None = None
     """normal with ``sd``, rectangular with ``half_width`` if left out."""
-    dof: Positive | None = None
+    dof: Annotated[float, Field(ge=0.01, le=1e12)] | None = None
     """Degrees of freedom of ``sd``; infinite if left out."""
     type: Literal["A", "B"] = "B"
     """A: evaluated from repeated observations; B: otherwise."""

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, ValidationInfo, model_validator
 
 from scenes.covariance import ORDER, Covariance, of_document
 from scenes.model import Model
-from scenes.ranges import NotNegative
+from scenes.ranges import Rounding, Spread
 from scenes.uncertain import Uncertain, UncertainNumber
 
 
@@ -62,11 +62,11 @@ class Uncertainty(Model):
     """Coefficient of linear thermal expansion of the part; give its value too [1/K]."""
     fixed_pattern: bool = True
     """Whether the fixed pattern that ``noise.prnu`` and ``noise.dsnu`` tell of counts."""
-    rounding: NotNegative = 0.0
+    rounding: Rounding = 0.0
     """Step to which lengths are rounded when they are reported [length]."""
-    rounding_deg: NotNegative = 0.0
+    rounding_deg: Rounding = 0.0
     """Step to which angles are rounded [degrees]."""
-    process_sd: NotNegative | None = None
+    process_sd: Spread | None = None
     """Standard deviation with which the manufacture scatters, for risks [length]."""
     covariance: Annotated[Covariance | None, BeforeValidator(_read, json_schema_input_type=str | Covariance | None)] = (
         None

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ice_vision
+
+ice_vision.check("scenes", "planner", "render", "measure")
+
 from importlib import import_module
 from typing import Any
 

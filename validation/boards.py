@@ -39,8 +39,9 @@ def read_boards(
     shape: tuple[int, int] | None = None,
     noise: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    size: tuple[str, tuple[int, int]] | None = None,
 ) -> Boards:
-    """Measure the board in each photograph.
+    """Measure the board in each photograph; ``size`` is what asks for an image of that height and width, px, and these.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def read_boards(
     """
     if not FEWEST_BOARDS <= len(files) <= MOST_FILES:
         raise InvalidInput(f"BOARD must be {FEWEST_BOARDS} to {MOST_FILES} photographs, got {len(files)}")
-    found, left_out, size = {}, [], None
+    found, left_out = {}, []
     for i, path in enumerate(files):
         try:
             image = image_file.read(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
 _FOCAL_MM = (4, 6, 8, 12, 16, 25, 35, 50, 75, 100)
 _FILLS = 0.7  # of the field of view's height, by the part's diagonal
 _NEAR, _FAR = 8.0, 20.0  # focal lengths between lens and part
+_TASKS = 4  # distances that are tried
 _TRIED = 24  # settings of least variance, of which the first that is not cluttered is taken
 _SENSORS = list(itertools.product((20, 35, 50), range(0, 360, 30)))
 _LIGHTS = list(itertools.product((25, 45, 60), range(0, 360, 60)))
@@ -66,7 +68,7 @@ light = {light}
 """
 
 
-def written(part: Path, path: Path, units: str) -> Scene:
+def written(part: Path, path: Path, units: str, report: Callable[[str, int, int], None] = lambda *_: None) -> Scene:
     """Write a scene of a mesh file and load it.
 
     Parameters
@@ -77,6 +79,8 @@ def written(part: Path, path: Path, units: str) -> Scene:
         The scene's file.
     units : str
         Of the part's numbers, and then of the scene.
+    report : callable
+        Called with what is done, how many steps are done, and of how many.
 
     Raises
     ------
@@ -85,6 +89,7 @@ def written(part: Path, path: Path, units: str) -> Scene:
     """
     if units not in scenes.UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(scenes.UNITS)}, got {units!r}")
+    report("reading", 0, _TASKS + 1)
     solid = mesh.read(part)
     low, high = solid.vertices.min(0), solid.vertices.max(0)
     diagonal = in_unit(float(np.linalg.norm(high - low)), units, "mm")
@@ -103,7 +108,8 @@ def written(part: Path, path: Path, units: str) -> Scene:
     if not tasks:
         raise InvalidInput(f"PART must have two corners of sharp edges, got none in {part}")
     text, best = "", (True, np.inf)
-    for start, end in tasks[:4]:
+    for step, (start, end) in enumerate(tasks[:_TASKS], 1):
+        report("looking from everywhere", step, _TASKS + 1)
         made = _TEXT.format(**values, start=start, end=end, sensor="[30.0, 30.0]", light="[30.0, 90.0]")
         scene = _loaded(made, path)
         found, poses = _setting(scene)
@@ -118,12 +124,14 @@ def written(part: Path, path: Path, units: str) -> Scene:
 def _setting(scene: Scene) -> tuple[tuple[bool, float], dict[str, list[float]]]:
     """How good the best setting of a coarse grid is (not ``ok``, variance), and its poses."""
     variance = planner.variances(scene, np.array(_SENSORS)[:, None], np.array(_LIGHTS)[None], objective="image")
-    rows = []
+    first = None
     for sensor, light in zip(*np.unravel_index(variance.ravel().argsort()[:_TRIED], variance.shape), strict=True):
         poses = {"sensor": list(map(float, _SENSORS[sensor])), "light": list(map(float, _LIGHTS[light]))}
         clear = np.isfinite(variance[sensor, light]) and planner.predict(scene, *poses.values()).status == "ok"
-        rows.append(((not clear, float(variance[sensor, light])), poses))
-    return min(rows, key=lambda row: row[0])
+        if clear:
+            return (False, float(variance[sensor, light])), poses
+        first = first or ((True, float(variance[sensor, light])), poses)
+    return first
 
 
 def _loaded(text: str, path: Path) -> Scene:

@@ -116,6 +116,22 @@ def _altered(material: Material, factors: dict[str, float]) -> Material:
     return material.model_copy(update=found)
 
 
+def check_robust(scene: Scene, tolerances: Tolerances) -> None:
+    """See that a plan of a scene can be made robust.
+
+    Raises
+    ------
+    InvalidInput
+        If no tolerance is given, or the scene has other than one light that is free.
+    """
+    if tolerances == Tolerances():
+        raise InvalidInput("tolerances must be given for at least one input, got none")
+    if len(scene.lights) != 1 or not scene.free:
+        raise InvalidInput(
+            f"tolerances must be left out but for one light that is free, got {len(scene.lights)} lights"
+        )
+
+
 def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None = None) -> Robust:
     """Minimum of the worst case, from the plan's clearly different candidates downhill.
 
@@ -124,14 +140,9 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
     Raises
     ------
     InvalidInput
-        If no tolerance is given.
+        As `check_robust`, or if nothing can always measure.
     """
-    if tolerances == Tolerances():
-        raise InvalidInput("tolerances must be given for at least one input, got none")
-    if len(plan.scene.lights) != 1 or not plan.scene.free:
-        raise InvalidInput(
-            f"tolerances must be left out but for one light that is free, got {len(plan.scene.lights)} lights"
-        )
+    check_robust(plan.scene, tolerances)
     names, aim = tolerances.of_the_scene, Aim.of(plan.scene.quantities, plan.objective, plan.over)
     corners = [dict(zip(names, signs, strict=True)) for signs in product((-1, 1), repeat=len(names))]
     worlds = [altered(plan.scene, {n: 1 + sign * getattr(tolerances, n) for n, sign in c.items()}) for c in corners]

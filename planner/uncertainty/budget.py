@@ -213,7 +213,7 @@ def coverage_factor(p: float, dof: float = math.inf) -> float:
         raise InvalidInput(f"dof must be at least 1, got {dof}")
     if math.isinf(dof):
         return float(stats.norm.ppf((1 + p) / 2))
-    return float(stats.t.ppf((1 + p) / 2, math.floor(dof * (1 + 1e-9))))  # a sum that rounds to 8.999... is 9
+    return float(stats.t.ppf((1 + p) / 2, float(math.floor(dof * (1 + 1e-9)))))  # a sum that rounds to 8.999... is 9
 
 
 def _check(sources: tuple[Source, ...], sensitivities: dict[str, float], value: float, p: float) -> None:

@@ -1,45 +1,103 @@
-"""docs/json.md tells of every key that a command prints, and of none that it does not."""
+"""Every command prints strict JSON, and docs/json.md tells of every key of it, and of none that it does not print."""
 
 import json
+import os
+import signal
 
+import cv2
+import numpy as np
 import pytest
+import trimesh
 
+from measure import calibration
 from scenes.load import BUNDLED
+from tests.boards import SMALL, poses
 from tests.docs.pages import DOCS, keys, told
 from tests.docs.shell import ice
+from tests.hard.fuzzing.doors import Room
+from validation.cli.commands import COMMANDS
+from validation.explore import server
 
 pytestmark = pytest.mark.render
 
-OPEN = ("failures", "parameters", "correlation", "classic_verdicts", "seconds", "paper_real", "global", "guarded")
+OPEN = (
+    "failures", "parameters", "correlation", "classic_verdicts", "seconds", "paper_real", "global", "guarded",
+    "omitted", "quality", "status", "left_out[]", "lights[]", "circles[]", "cylinders[]", "surfaces[]",
+)  # fmt: skip
 POSES = ("--sensor", "30,135", "--light", "15,315")
+ASKED = {  # the least work of each command; by the heading of docs/json.md where that has further words
+    "validate": ("short.toml", "--renders", "60", "--workers", "1", "--out", "run"),
+    "plan": ("small.toml", "--step", "15", "--check", "2"),
+    "plan --views": ("small.toml", "--step", "30", "--views", "2", "--no-check"),
+    "plan --objective capability": ("calibrated_rig", "--objective", "capability", "--step", "45"),
+    "render": ("small.toml", *POSES, "-o", "b.png"),
+    "measure": ("a.png", "small.toml", *POSES),
+    "measure without a scene": ("a.png", "--mtf", "m.png"),
+    "fit": ("small.toml", "a.png", *POSES),
+    "predict": ("small.toml",),
+    "new": ("box.stl",),
+    "show": ("small.toml",),
+    "scenes": (),
+    "effects": ("small.toml",),
+    "calibrate": ("small.toml", "--images", "10"),
+    "calibrate-camera": ("0.png", "1.png", "2.png", "--square", "25", "--model", "k1,k2,p1,p2"),
+    "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005"),
+    "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
+    "explore": ("small.toml",),
+    "hard": ("--area", "reflectance"),
+    "report": ("finished",),
+    "compare": ("finished", "changed.json"),
+}
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Task1 with its first setting only, and a picture of it."""
+    """Scenes of one setting (task1, and it at 64 x 60 px), a picture, boards, a part, a run, and its result changed."""
     made = tmp_path_factory.mktemp("json")
     head, _, settings = (BUNDLED / "task1.toml").read_text().partition("[[settings]]")
     (made / "short.toml").write_text(head + "[[settings]]" + settings.partition("[[settings]]")[0])
-    ice("render", "task1", *POSES, "-o", "a.png", "--noise-seed", "1", cwd=made)
+    room, rng = Room(made), np.random.default_rng(11)
+    ice("render", room.scene.name, *POSES, "-o", "a.png", "--noise-seed", "1", cwd=made)
+    for i, pose in enumerate(poses(SMALL, 3, rng, 420.0)):
+        image = SMALL.image(pose, 2) + rng.normal(0, 2, SMALL.size[::-1])
+        cv2.imwrite(str(made / f"{i}.png"), np.clip(np.rint(image), 0, 255).astype(np.uint8))
+    trimesh.creation.box((30, 20, 10)).export(made / "box.stl")
+    room.run.rename(made / "finished")
+    result = json.loads((made / "finished/result.json").read_text())
+    result["settings"][0]["empirical"] *= 100
+    (made / "changed.json").write_text(json.dumps(result))
     return made
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("validate", "short.toml", "--renders", "60", "--workers", "1", "--out", "run"),
-        ("plan", "task1", "--step", "10", "--check", "2"),
-        ("measure", "a.png", "task1", *POSES),
-        ("budget", "calibrated_rig", "--monte-carlo", "--reach", "0.005"),
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_keys_are_those_of_the_page(folder, arguments):
-    every, some = told(DOCS / "json.md", f"ice {arguments[0]}")
-    document = json.loads(ice(*arguments, "--json", "-q", cwd=folder).out)
-    there = {key for key in keys(document) if not any(part in OPEN for part in key.split(".")[:-1])}
+def document(name, folder, page=DOCS / "json.md"):
+    """What a command prints, strictly read, and the keys that the page tells of: all, and those of some cases only."""
+    done = ice(name.split()[0], *ASKED[name], "--json", cwd=folder)
+    assert done.status in (0, 1, 130), done.err
+    return json.loads(done.out, parse_constant=lambda word: pytest.fail(word)), *told(page, f"ice {name}")
+
+
+def test_every_command_is_asked():
+    assert {name.split()[0] for name in ASKED} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_keys_are_those_of_the_page(name, folder, monkeypatch):
+    monkeypatch.setattr(server, "serve", _served)
+    monkeypatch.setattr(calibration, "ESTIMATORS", ("gradient",))  # all take 14 s: test_calibrate_tells_of_all
+    found, every, some = document(name, folder)
+    _compare(found, every, some)
+
+
+def test_calibrate_tells_of_all(folder):
+    found, *told_of = document("calibrate", folder)
+    _compare(found, *told_of)
+    assert [curve["name"] for curve in found["curves"]] == list(calibration.ESTIMATORS)
+
+
+def _compare(found, every, some):
+    there = {key for key in keys(found) if not any(part in OPEN for part in key.split(".")[:-1])}
     assert there - every == set(), "not told"
-    missing = {key for key in every - some - there if _reached(key, document)}
+    missing = {key for key in every - some - there if _reached(key, found)}
     assert missing == set(), "told, but not there"
 
 
@@ -53,11 +111,18 @@ def _reached(key, document):
     return True
 
 
+async def _served(place, host, port, token, told, stop):
+    """As `serve`, of a page that somebody ends at once."""
+    told("http://127.0.0.1:1/")
+    os.kill(os.getpid(), signal.SIGINT)
+    await stop.wait()
+
+
 def test_a_wrong_page_is_noticed(folder, tmp_path):
     """Negative control: a key more and a key less in the page."""
     page = tmp_path / "json.md"
     page.write_text((DOCS / "json.md").read_text().replace("| `file`, `measurands` |", "| `file`, `nothing` |"))
-    every, some = told(page, "ice measure")
-    there = set(keys(json.loads(ice("measure", "a.png", "task1", *POSES, "--json", cwd=folder).out)))
+    found, every, some = document("measure", folder, page)
+    there = set(keys(found))
     assert there - every == {"measurands"}
     assert every - some - there == {"nothing"}

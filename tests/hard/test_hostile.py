@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -442,6 +443,36 @@ def test_compare_of_unequal_numbers_of_images(finished, tmp_path):
     standard = np.sqrt(row["empirical"] * (1 / 20 + 1.5 / 2000))
     freedom = standard**4 / (row["empirical"] ** 2 * (1 / 20**2 / 19 + (1.5 / 2000) ** 2 / 1999))
     assert changes["mean"] == pytest.approx(2 * stats.t(freedom).sf(row["empirical"] ** 0.5 / standard), rel=1e-9)
+
+
+# Numbers
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("sensor_deg = 1e300", "uncertainty.sensor_deg.sd must be at most 1e+12, got 1e+300"),
+        ("part_tilt_deg = {half_width = 1e300}", "uncertainty.part_tilt_deg.half_width must be at most 1e+12"),
+        ("process_sd = 5e-324", "uncertainty.process_sd: number must be 0 or at least 1e-30, got 4.94066e-324"),
+        ("rounding = 1e300", "uncertainty.rounding must be at most 1e+12"),
+        ("light_deg = {sd = 1, dof = 1e300}", "uncertainty.light_deg.dof must be at most 1e+12"),
+        (
+            'covariance = {names = ["k1"], matrix = [[1e300]]}',
+            "uncertainty.covariance.matrix[0][0] must be at most 1e+24",
+        ),
+    ],
+)
+def test_absurd_uncertainties_are_refused_in_one_line(line, told, tmp_path):
+    text = (BUNDLED / "task1.toml").read_text()
+    (tmp_path / "scene.toml").write_text(text + f"\n[uncertainty]\n{line}\n")
+    with pytest.raises(InvalidInput, match=re.escape(told)):
+        scenes.load(tmp_path / "scene.toml")
+
+
+def test_degrees_of_freedom_beyond_whole_numbers_are_as_infinitely_many():
+    from planner.uncertainty import coverage_factor
+
+    assert coverage_factor(0.95, 1e30) == pytest.approx(coverage_factor(0.95), rel=1e-9)
 
 
 # Arguments

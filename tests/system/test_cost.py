@@ -5,12 +5,14 @@ import json
 import numpy as np
 import pytest
 
+import render
 import validation
 from tests.commands import ice
 from validation.batch import campaign
-from validation.cost import size
+from validation.cost import locators, sampling, size, watch
 from validation.cost.goal import reach
 from validation.cost.trial import trial
+from validation.cost.watch import Watch
 
 pytestmark = pytest.mark.render
 
@@ -69,3 +71,19 @@ def test_a_larger_image_tells_relatively_more(task1, monkeypatch):
     found = size.size_parameter(case, "scalar_rgb", 1)
     _, small, large = (row[-1] for row in found.rows)
     assert small / large == pytest.approx(2**1.5, rel=0.1)
+
+
+def test_few_pictures_are_in_memory_and_the_fewest_taken_when_time_is_over(task1, monkeypatch):
+    """Of `ice cost`: as for 25 pictures of task1 at once, and no time."""
+    case, counts = campaign.Campaign.of(task1).case(0), []
+    image = render.image(task1, case.setting.sensor, case.setting.light, variant="scalar_rgb")
+    monkeypatch.setattr(watch, "AT_ONCE", 25 * image.size)
+    exposed = render.expose
+    monkeypatch.setattr(render, "expose", lambda *how: counts.append(how[3]) or exposed(*how))
+    found = sampling.images_parameter(case, image, 1, Watch(0.0))
+    assert [row[0] for row in found.rows] == [10, 20, 40, 80]
+    assert (max(counts), sum(counts)) == (25, 825)
+    counts.clear()
+    found = locators.estimators_parameter([case], [image], 1, Watch(0.0))
+    assert (max(counts), sum(counts)) == (25, 25)
+    assert found.note.startswith("25 images of 1 settings")

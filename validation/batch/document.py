@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from validation.batch.measurands import JudgedMeasurand
 from validation.batch.rows import Row
+from validation.strict_json import dumps, plain
 
 if TYPE_CHECKING:
     from validation.batch.result import Validation
@@ -20,12 +19,12 @@ _LONG = ("settings", "refused")  # the lists that grow with the run
 def document(found: Validation) -> dict[str, Any]:
     """All of it; numbers that are not finite become null."""
     lists = {name: list(items) for name, items in _lists(found).items()}
-    return {name: lists.get(name, value) for name, value in _frame(found).items()}
+    return plain({name: lists.get(name, value) for name, value in _frame(found).items()})
 
 
 def pieces(found: Validation, more: dict[str, Any] | None = None) -> Iterator[str]:
     """The same, and perhaps more keys, as JSON with an indent of 1."""
-    rest = json.dumps(_frame(found) | (more or {}), indent=1)
+    rest = dumps(_frame(found) | (more or {}))
     for name, items in _lists(found).items():
         before, empty, rest = rest.partition(f'\n "{name}": []')  # in a text its quotes would be escaped
         yield before + empty.removesuffix("[]")
@@ -36,37 +35,35 @@ def pieces(found: Validation, more: dict[str, Any] | None = None) -> Iterator[st
 def _list(items: Iterator[dict[str, Any]]) -> Iterator[str]:
     opening = "["
     for item in items:
-        yield f"{opening}\n  " + json.dumps(item, indent=1).replace("\n", "\n  ")
+        yield f"{opening}\n  " + dumps(item).replace("\n", "\n  ")
         opening = ","
     yield "[]" if opening == "[" else "\n ]"
 
 
 def _lists(found: Validation) -> dict[str, Iterator[dict[str, Any]]]:
     refused = ({"index": index, "reason": reason} for index, reason in found.refused.items())
-    return dict(zip(_LONG, ((_finite(_row(row)) for row in found.rows), refused), strict=True))
+    return dict(zip(_LONG, ((_row(row) for row in found.rows), refused), strict=True))
 
 
 def _frame(found: Validation) -> dict[str, Any]:
     """Everything else, with the lists empty."""
-    return _finite(
-        {
-            "scene": found.scene,
-            "seed": found.seed,
-            "variant": found.variant,
-            "paper_scale": found.paper_scale,
-            "settings": [],
-            "refused": [],
-            "paper_table_1": [
-                {"scene": scene, "sensor": sensor, "light": light, "paper_ice": theirs, "paper": ours}
-                for scene, sensor, light, theirs, ours in found.search
-            ],
-            "correlation": found.correlation,
-            "verdict": found.verdict.text,
-            "judgement": asdict(found.verdict),
-            "classic_verdicts": {name: asdict(verdict) for name, verdict in found.classic_verdicts.items()},
-            "seconds": found.seconds,
-        }
-    )
+    return {
+        "scene": found.scene,
+        "seed": found.seed,
+        "variant": found.variant,
+        "paper_scale": found.paper_scale,
+        "settings": [],
+        "refused": [],
+        "paper_table_1": [
+            {"scene": scene, "sensor": sensor, "light": light, "paper_ice": theirs, "paper": ours}
+            for scene, sensor, light, theirs, ours in found.search
+        ],
+        "correlation": found.correlation,
+        "verdict": found.verdict.text,
+        "judgement": asdict(found.verdict),
+        "classic_verdicts": {name: asdict(verdict) for name, verdict in found.classic_verdicts.items()},
+        "seconds": found.seconds,
+    }
 
 
 def _row(row: Row) -> dict[str, Any]:
@@ -96,12 +93,3 @@ def _row(row: Row) -> dict[str, Any]:
 def _measurand(each: JudgedMeasurand) -> dict[str, Any]:
     """With ``texture`` only where there are textures."""
     return {key: value for key, value in asdict(each).items() if key != "texture" or value is not None}
-
-
-def _finite(value: Any) -> Any:
-    """The same document with null for NaN and infinity, which JSON lacks."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -16,7 +16,7 @@ from validation.cli.common import Report
 def bar(errors: Console, title: str, unit: str) -> Iterator[Report]:
     """A bar with rate and time left; it goes when the work is done."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn(unit),

@@ -169,7 +169,7 @@ def _show(
     if goal:
         shown_on.print(goal.text, highlight=False)
     for line in (guide.directory_line(directory), guide.next_line(found, scene, directory)):
-        shown_on.print(line, highlight=False, markup=False, soft_wrap=True)
+        shown_on.print(line, highlight=False, soft_wrap=True)
 
 
 def _goal(accuracy: float | None, budget: str | None) -> float | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,10 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import scenes
-from validation.cli.common import Json, SceneName, Seed, check_number, check_seed, commands, parse_pose, parse_poses
+from validation.cli.common import (
+    Json,
+    SceneName,
+    Seed,
+    check_number,
+    check_seed,
+    commands,
+    parse_pose,
+    parse_poses,
+    say,
+)
 from validation.cli.outputs import check_directory, check_file
 from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
+from validation.strict_json import dumps
 
 if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget
@@ -75,7 +85,7 @@ def budget_command(
     facts = budgets.facts(found, drawn, shown, reach)
     if out:
         out.mkdir(parents=True, exist_ok=True)
-        (out / "budget.json").write_text(json.dumps(facts, indent=1), encoding="utf-8")
+        (out / "budget.json").write_text(dumps(facts), encoding="utf-8")
         write_csv(found, out / "budget.csv")
         from validation.report import budget_figure
 
@@ -83,7 +93,7 @@ def budget_command(
     if csv_file:
         write_csv(found, csv_file)
     if as_json:
-        print(json.dumps(facts, indent=1))
+        say(facts, True, "")
         return
     _show(found, drawn, shown, reach)
     if out:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import scenes
 from scenes import InvalidInput
 from validation.cli.common import Json, check_number, commands, progress, say
 from validation.cli.outputs import check_file
@@ -63,8 +64,9 @@ def calibrate_camera_command(
     from validation.report import camera_table
 
     read_model(model)
+    camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
-        seen = read_boards(boards, wanted, noise, shown)
+        seen = read_boards(boards, wanted, noise, shown, camera and (scene, (camera.height, camera.width)))
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, square, seen.image_shape, model, square_sd)

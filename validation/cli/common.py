@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 import time
@@ -16,6 +15,7 @@ from scenes import InvalidInput, Pose
 from validation.batch.stopped import CONTINUE, Interrupted
 from validation.cli import verbosity
 from validation.report.terminal import console
+from validation.strict_json import dumps
 
 if TYPE_CHECKING:
     from render import Tolerance
@@ -24,7 +24,7 @@ Report = Callable[[str, int, int], None]
 
 MOST_SEED = 2**63 - 1
 MOST_WORKERS = 1024
-_EVERY_S = 10.0  # between lines of progress where there is no terminal
+_EVERY_S, _SOON_S = 10.0, 3.0  # between lines of progress where there is no terminal
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene or a TOML file.")]
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
@@ -113,18 +113,23 @@ def parse_poses(option: str, text: str | None) -> Pose | tuple[Pose, ...] | None
 
 def say(facts: dict, as_json: bool, text: str) -> None:
     """Print a command's facts: as JSON, or the text."""
-    print(json.dumps(facts, indent=1) if as_json else text)
+    print(dumps(facts) if as_json else text)
 
 
 @contextmanager
-def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
-    """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s."""
+def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterator[Report | None]:
+    """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s.
+
+    ``at_once`` says already that work begins, and then a line every 3 s: for what is silent for long.
+    """
     if verbosity.quiet():
         yield None
         return
     errors = console(stderr=True)
     if not errors.is_terminal:
-        yield _lines(title, unit)
+        if at_once:
+            print(f"{title} ...", file=sys.stderr, flush=True)
+        yield _lines(title, unit, at_once)
         return
     from validation.cli.bar import bar
 
@@ -132,14 +137,15 @@ def progress(title: str, unit: str = "images") -> Iterator[Report | None]:
         yield report
 
 
-def _lines(title: str, unit: str) -> Report:
-    told = time.monotonic()
+def _lines(title: str, unit: str, at_once: bool) -> Report:
+    told, every_s = time.monotonic(), _SOON_S if at_once else _EVERY_S
 
-    def report(_what: str, done: int, total: int) -> None:
+    def report(what: str, done: int, total: int) -> None:
         nonlocal told
-        if time.monotonic() - told >= _EVERY_S:
+        if time.monotonic() - told >= every_s:
             told = time.monotonic()
-            print(f"{title}: {done} of {total} {unit}", file=sys.stderr, flush=True)
+            named = f"{what}, " if at_once else ""
+            print(f"{title}: {named}{done} of {total} {unit}", file=sys.stderr, flush=True)
 
     return report
 
@@ -164,4 +170,5 @@ class _JsonLine(logging.Formatter):
     """One JSON object a line: time (seconds since 1970), event, and the event's facts."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return json.dumps({"time": record.created, "event": record.getMessage(), **getattr(record, "facts", {})})
+        facts = getattr(record, "facts", {})
+        return dumps({"time": record.created, "event": record.getMessage(), **facts}, indent=None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from validation.cli.common import Json, SceneName, Seed, check_seed, commands, p
 from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
+from validation.strict_json import dumps
 
 commands = commands()
 
@@ -21,10 +21,13 @@ commands = commands()
 def cost_command(
     scene: SceneName,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write; default runs/SCENE-cost.")] = None,
+    budget: Annotated[str, typer.Option(metavar="TIME", help="About how long it may take: 60s, 2min, ...")] = "2min",
     seed: Seed = DEFAULT_SEED,
     as_json: Json = False,
 ) -> None:
     """Measure what each parameter costs in time and gives in accuracy on this machine.
+
+    Of a slow scene fewer samples are taken, and parameters are left out for which no time is left.
 
     Writes cost.json, and a CSV file and a plot of each parameter to DIR.
     """
@@ -32,14 +35,18 @@ def cost_command(
     loaded = campaign.load(scene)
     directory = out or Path("runs") / f"{loaded.name}-cost"
     check_directory("--out", directory)
-    from validation.cost.sweep import sweep
+    from validation.cost.goal import seconds
+
+    limit = seconds(budget)
+    with progress(f"{loaded.name}: cost", "parameters", at_once=True) as shown:
+        from validation.cost.sweep import sweep
+
+        found = sweep(loaded, seed, shown, limit)
     from validation.cost.table import tables, write_csv
     from validation.report import cost_figures
 
-    with progress(f"{loaded.name}: cost", "parameters") as shown:
-        found = sweep(loaded, seed, shown)
     directory.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(found.to_json(), indent=1)
+    text = dumps(found.to_json())
     (directory / "cost.json").write_text(text, encoding="utf-8")
     write_csv(found, directory)
     cost_figures.draw(found, directory)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ import typer
 import scenes
 from validation.batch.stopped import Interrupted
 from validation.cli.common import Json, SceneName, check_number, commands
+from validation.strict_json import dumps
 
 commands = commands()
 
@@ -40,7 +40,8 @@ def explore_command(
     from validation.explore.session import Place
 
     def told(address: str) -> None:
-        print(json.dumps({"url": address}) if as_json else f"{loaded.name}: {address} (Ctrl-C ends)", flush=True)
+        facts = {"scene": loaded.name, "url": address}  # in one line and at once, for whoever reads a pipe
+        print(dumps(facts, indent=None) if as_json else f"{loaded.name}: {address} (Ctrl-C ends)", flush=True)
         if open_it:
             import webbrowser
 

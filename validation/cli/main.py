@@ -25,6 +25,9 @@ _FLAGS = ("-q", "--quiet", "-v", "--verbose")
 
 def main() -> None:
     """Entry point. Little is loaded before it begins, so that it is in charge when something goes wrong."""
+    from validation.cli.streams import make_usable
+
+    make_usable()
     code = 3
     try:
         for number in (signal.SIGINT, signal.SIGTERM):

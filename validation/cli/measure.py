@@ -15,6 +15,7 @@ from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
+from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
@@ -66,6 +67,10 @@ def measure_command(
     import measure
     from validation import picture_file
 
+    if estimator is not None and estimator not in measure.ESTIMATORS:
+        raise InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {estimator!r}")
+    check_file("--output", output, ".png", ".pdf", ".svg")
+    check_file("--mtf", mtf, ".png")
     chosen = {"--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output}
     chosen["--all"] = every or None
     if scene is None:
@@ -78,19 +83,21 @@ def measure_command(
             "kinds": None if kind is None else tuple(kind.split(",")),
             "most": _ALL if every else _MOST if most is None else most,
         }
+        if mtf is not None:
+            recorded.check_mtf(wanted["kinds"])
         photo = scenes.photograph.read(file, gamma, channel, bayer)
         _photograph(file, photo, wanted, estimator, lens, output, mtf, as_json)
     chosen |= {"--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf}
     for option, value in chosen.items():
         if value is not None:
             raise InvalidInput(f"{option} must be left out with a scene, got {value}")
-    picture = picture_file.read(file)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
     known = scenes.load(scene)
+    picture = picture_file.read(file)
     found = measure.measure(picture, known, *poses, estimator, threshold)
     rows = measurands.facts(found)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}
@@ -137,7 +144,8 @@ def _photograph(
             console().print(photograph.table(found), highlight=False)
         lines = [recorded.text(photo), photograph.text(found), *recorded.sharpness_lines(sharp)]
         say({}, False, "\n".join(lines))
-    raise typer.Exit(0 if any(one.measured for one in found.found) else 1)
+    good = any(one.measured for one in found.found) and sharp.get("mtf") != []
+    raise typer.Exit(0 if good else 1)
 
 
 def _distance_facts(found: measure.Measurement) -> dict:

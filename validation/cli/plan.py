@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +11,7 @@ import typer
 
 import scenes
 from validation.cli import plan_json
-from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress
+from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress, say
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 
@@ -144,8 +143,8 @@ def plan_command(
         plan_views.run(loaded, views, objective, where | {"share": views_share}, bool(count), out, as_json)
         _say_unchecked(loaded, bool(count or no_check or as_json))
         return
+    tolerances = _tolerances(tolerance or [], loaded)
     how = where | {"search": search, "edges": edges, "shares": shares, "start": first} | _varied(loaded, vary, hold)
-    tolerances = _tolerances(tolerance or [])
     found, seconds = _plan(loaded, objective, how)
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = _check(found, count) if count else None
@@ -243,8 +242,9 @@ def _two(option: str, text: str) -> tuple[float, float]:
     return low, high
 
 
-def _tolerances(texts: list[str]) -> planner.Tolerances | None:
+def _tolerances(texts: list[str], scene: scenes.Scene) -> planner.Tolerances | None:
     import planner
+    from planner.search.robustness import check_robust
 
     known = [field.name for field in dataclasses.fields(planner.Tolerances)]
     values = {}
@@ -256,7 +256,11 @@ def _tolerances(texts: list[str]) -> planner.Tolerances | None:
             values[name] = float(value)
         except ValueError:
             raise scenes.InvalidInput(f"--tolerance {name} must be a number, got {value!r}") from None
-    return planner.Tolerances(**values) if values else None
+    if not values:
+        return None
+    tolerances = planner.Tolerances(**values)
+    check_robust(scene, tolerances)
+    return tolerances
 
 
 def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> list[Path]:
@@ -276,7 +280,7 @@ def _show(
 
     if as_json:
         varied = {"varied": vary_table.facts(found.varied, scatter)}
-        print(json.dumps(plan_json.facts(found, checked, safe, seconds, pictures) | varied, indent=1))
+        say(plan_json.facts(found, checked, safe, seconds, pictures) | varied, True, "")
         return
     from validation.report import plan_table
 

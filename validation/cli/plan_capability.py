@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import time
 from typing import TYPE_CHECKING
 
 import scenes
 from scenes.status import is_trusted
-from validation.cli.common import progress
+from validation.cli.common import progress, say
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
         found = plan_capability(scene, step_deg=step, **how, report=shown or (lambda *_: None))
     seconds = time.perf_counter() - began
     if as_json:
-        print(json.dumps(facts(scene, found, step, seconds), indent=1))
+        say(facts(scene, found, step, seconds), True, "")
         return
     from rich.table import Table
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from pathlib import Path
@@ -12,7 +11,7 @@ import typer
 
 import scenes
 from planner.views import MOST_VIEWS
-from validation.cli.common import check_left_out, progress
+from validation.cli.common import check_left_out, progress, say
 from validation.report.terminal import console
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ def run(
     check = _check(found) if checked else None
     pictures = _pictures(found, out) if out else []
     if as_json:
-        print(json.dumps(facts(found, check, pictures, seconds), indent=1))
+        say(facts(found, check, pictures, seconds), True, "")
     else:
         from validation.report import views_table
 

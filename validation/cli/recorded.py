@@ -23,6 +23,7 @@ Channel = Annotated[
 Bayer = Annotated[
     str | None, typer.Option(metavar="RGGB|...", help="The photograph is a raw mosaic: its first pixels.")
 ]
+_WITH_SIDES = ("quadrilateral", "tag")
 Mtf = Annotated[Path | None, typer.Option(metavar="PNG", help="Draw edge spread and modulation transfer of each side.")]
 
 
@@ -61,20 +62,32 @@ def of_sides_lines(found: measure.Quadrilateral) -> list[str]:
     return lines
 
 
-def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str, Any]:
-    """Modulation transfer of each side of the first quadrilateral, drawn to ``plot``.
+def check_mtf(kinds: tuple[str, ...] | None) -> None:
+    """See that kinds of shapes that are sought, all if None, have sides.
 
     Raises
     ------
     InvalidInput
-        If none was measured, or the file cannot be written.
+        If none has.
+    """
+    if kinds is not None and not {*kinds} & {*_WITH_SIDES}:
+        raise InvalidInput(f"--kind must hold {' or '.join(_WITH_SIDES)} with --mtf, got {','.join(kinds)}")
+
+
+def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str, Any]:
+    """Modulation transfer of each side of the first quadrilateral, drawn to ``plot``; of none where none was measured.
+
+    Raises
+    ------
+    InvalidInput
+        If the file cannot be written.
     """
     from measure import mtf
     from validation.report import sharpness
 
     four = next((one for one in found.found if one.quadrilateral is not None and one.measured), None)
     if four is None:
-        raise InvalidInput("--mtf must go with a photograph of which a quadrilateral is measured, got none")
+        return {"mtf": []}
     sides, refused = [], []
     for side in range(4):
         try:
@@ -96,7 +109,7 @@ def _number(value: float) -> float | None:
 
 def sharpness_lines(told: dict[str, Any]) -> list[str]:
     """What `sharpness` says, in words."""
-    lines = []
+    lines = ["no quadrilateral was measured, so that no modulation transfer is drawn"] if told.get("mtf") == [] else []
     for one in told.get("mtf", ()):
         if "refused" in one:
             lines.append(one["refused"])

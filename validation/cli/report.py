@@ -25,6 +25,10 @@ def report_command(
     A run that is not finished, or still going, is reported as far as it has come.
     """
     check_directory("--out", out)
+    from validation.report.export import check_parquet
+
+    if parquet:
+        check_parquet()
     from validation.batch.result import collect
     from validation.batch.store import RunFile
     from validation.report import export

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import scenes
-from validation.cli.common import Json, SceneName, commands, parse_pose, say
+from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -25,13 +24,14 @@ Sensor = Annotated[str | None, typer.Option(metavar="P,A", help="Seen from there
 @commands.command("new")
 def new_command(part: Part, output: Output = None, units: Units = "mm", as_json: Json = False) -> None:
     """Write a commented scene of a part: a camera that sees all of it, a task, a setting. It runs as it is."""
-    from validation.new_scene import written
-
     path = output or Path(f"{part.stem}.toml")
     check_file("--output", path, ".toml")
     if path.exists():
         raise scenes.InvalidInput(f"--output must be a new file, got {path}, which exists")
-    made = written(part, path, units)
+    with progress(f"{part}", "steps", at_once=True) as shown:
+        from validation.new_scene import written  # the planner takes a second to load
+
+        made = written(part, path, units, shown or (lambda *_: None))
     facts = {"file": str(path), "edges": len(made.solid.sharp), "circles": len(made.solid.circles)}
     text = (
         f"{path}: {facts['edges']} edges, {facts['circles']} circles; ice show {path} lists them, ice plan {path} plans"
@@ -56,7 +56,7 @@ def show_command(scene: SceneName, sensor: Sensor = None, output: Picture = None
         draw(loaded, pose, output)
     facts = {**scene_table.facts(loaded), "sensor": list(pose), "picture": output and str(output)}
     if as_json:
-        print(json.dumps(facts, indent=1))
+        say(facts, True, "")
         return
     console().print(scene_table.report(loaded), highlight=False)
     if output is not None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from scenes import InvalidInput
 from validation.batch.campaign import Case
 from validation.cost.parameter import Parameter
+from validation.cost.watch import Watch
 from validation.effects_check import RENDERED, check
 
 
-def effects_parameter(case: Case, variant: str) -> Parameter:
+def effects_parameter(case: Case, variant: str, watch: Watch = Watch()) -> Parameter:
     """Influence on the noise-free distance and on its variance, against time, of each effect switched on alone.
 
     Raises
@@ -18,7 +19,9 @@ def effects_parameter(case: Case, variant: str) -> Parameter:
     """
     if variant.startswith("scalar"):
         raise InvalidInput(f"effects must be timed in a compiled variant of Mitsuba, got {variant}")
-    found = check(case.scene, settings=(case.setting,), only=RENDERED)
+    found = []
+    for number in watch.samples(len(RENDERED), least=1):
+        found += check(case.scene, settings=(case.setting,), only=RENDERED[number : number + 1])
     rows = tuple(
         (s.name, s.seconds, s.seconds / s.seconds_auto, abs(s.bias_px), s.resolution_px, abs(s.variance),
          s.resolution_variance)

@@ -8,22 +8,24 @@ import planner
 from planner.search.exhaustive import has_bound
 from scenes import Scene
 from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.watch import Watch
 
 _STEPS = (20.0, 10.0, 5.0, 2.5)
 _COARSE = (30.0, 20.0, 15.0)  # where every pair has to be evaluated
 
 
-def grid_parameter(scene: Scene) -> Parameter:
+def grid_parameter(scene: Scene, watch: Watch = Watch()) -> Parameter:
     """Variance of the grid's optimum over the refined one's, less 1, against the step."""
-    steps, rows = _STEPS if has_bound(scene, "calibrated") else _COARSE, []
+    steps, told = _STEPS if has_bound(scene, "calibrated") else _COARSE, lambda *_: watch.tell()
     plans = []
-    for step in steps:
+    for number in watch.samples(len(steps), least=2):
+        step = steps[number]
         for search in ("exhaustive", "alternating"):
             began = time.perf_counter()
-            found = planner.plan(scene, step_deg=step, search=search, refined=False)
+            found = planner.plan(scene, step_deg=step, search=search, refined=False, report=told)
             plans.append((search, step, time.perf_counter() - began, found))
     finest = plans[-2][3]
-    best = min(planner.plan(scene, step_deg=steps[-1]).variance, finest.grid_variance)
+    best = min(planner.plan(scene, step_deg=step, report=told).variance, finest.grid_variance)
     rows = tuple((s, step, seconds, found.grid_variance / best - 1) for s, step, seconds, found in plans)
     points = [(row[1], row[3]) for row in rows if row[0] == "exhaustive" and row[3] > 0]
     fits = (Fit("exhaustive: gap against step", slope(*zip(*points, strict=True)), 2.0),) if len(points) > 1 else ()

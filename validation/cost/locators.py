@@ -12,32 +12,44 @@ import planner
 import render
 from validation.batch.campaign import Case
 from validation.cost.parameter import Parameter
+from validation.cost.watch import Watch, at_once
 
-_IMAGES = 200
+_IMAGES, _FEWEST = 200, 20  # of each setting
 
 
-def estimators_parameter(cases: Sequence[Case], images: Sequence[np.ndarray], seed: int) -> Parameter:
+def estimators_parameter(
+    cases: Sequence[Case], images: Sequence[np.ndarray], seed: int, watch: Watch = Watch()
+) -> Parameter:
     """Variance of the distance over its bound, and processor time an image, on the same noisy images."""
     ratios = {name: [] for name in measure.ESTIMATORS}
-    seconds, failed = dict.fromkeys(measure.ESTIMATORS, 0.0), dict.fromkeys(measure.ESTIMATORS, 0)
+    spent, failed = dict.fromkeys(measure.ESTIMATORS, 0.0), dict.fromkeys(measure.ESTIMATORS, 0)
+    count = 0  # images of all settings
     for case, image in zip(cases, images, strict=True):
         scene, sensor, light = case.scene, case.setting.sensor, case.setting.light
         bound = planner.predict(scene, sensor, light, "bound").variance_px2
-        pictures = render.expose(image, scene.noise, np.random.default_rng(seed), _IMAGES)
+        rng, size = np.random.default_rng(seed), at_once(image.size, 50)
         for name in measure.ESTIMATORS:
-            measure.distance(pictures[:50], scene, sensor, light, name)  # prepares it
-            began = time.process_time()
-            values = measure.distance(pictures, scene, sensor, light, name).value_px
-            seconds[name] += (time.process_time() - began) / _IMAGES / len(cases)
+            measure.distance(image, scene, sensor, light, name)  # prepares it
+        parts: dict[str, list[np.ndarray]] = {name: [] for name in measure.ESTIMATORS}
+        part = Watch(watch.left / len(cases), watch.tell)
+        for _ in part.samples(-(-_IMAGES // size), least=-(-_FEWEST // size)):
+            pictures = render.expose(image, scene.noise, rng, size)
+            for name, found in parts.items():
+                began = time.process_time()
+                found.append(measure.distance(pictures, scene, sensor, light, name).value_px)
+                spent[name] += time.process_time() - began
+        count += size * len(found)
+        for name, found in parts.items():
+            values = np.concatenate(found)
             good = values[np.isfinite(values)]
             failed[name] += values.size - good.size
             if good.size > 1:
                 ratios[name].append(good.var(ddof=1) / bound)
     rows = []
     for name in measure.ESTIMATORS:
-        ratio, spent = float(np.mean(ratios[name] or np.nan)), 1e3 * seconds[name]
-        rows.append((name, spent, ratio, 1 / ratio, spent * ratio, failed[name]))
-    error = float(np.sqrt(2 / (_IMAGES - 1) / len(cases)))
+        ratio, each_ms = float(np.mean(ratios[name] or np.nan)), 1e3 * spent[name] / count
+        rows.append((name, each_ms, ratio, 1 / ratio, each_ms * ratio, failed[name]))
+    error = float(np.sqrt(2 / (count - len(cases))))
     return Parameter(
         name="estimators",
         title="Estimators: variance over the Cramer-Rao bound against time",
@@ -46,6 +58,6 @@ def estimators_parameter(cases: Sequence[Case], images: Sequence[np.ndarray], se
         x="ms an image",
         y="variance / bound",
         series="estimator",
-        note=f"{_IMAGES} images of each of {len(cases)} settings: the variances are known to {error:.0%} (1 sigma). "
+        note=f"{count} images of {len(cases)} settings: the variances are known to {error:.0%} (1 sigma). "
         "ms x variance / bound: processor time for a given precision of a mean.",
     )

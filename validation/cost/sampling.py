@@ -8,28 +8,42 @@ import numpy as np
 
 import measure
 import render
+from scenes import InvalidInput
 from validation.batch.campaign import Case
 from validation.cost.interval import half_width
 from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.watch import Watch, at_once
 
 _COUNTS = (10, 20, 40, 80, 160, 320)
-_IMAGES = 6400
+_IMAGES = 6400  # at most
+_FEWEST = 800
+_GROUPS = 10  # of images, the fewest whose variances are compared
 
 
-def images_parameter(case: Case, image: np.ndarray, seed: int) -> Parameter:
-    """Relative scatter of the variance of n distances, from disjoint groups of images of one setting."""
+def images_parameter(case: Case, image: np.ndarray, seed: int, watch: Watch = Watch()) -> Parameter:
+    """Relative scatter of the variance of n distances, from disjoint groups of images of one setting.
+
+    Raises
+    ------
+    InvalidInput
+        If too many images cannot be measured.
+    """
     scene, sensor = case.scene, case.setting.sensor
     where, rng = measure.region_of_interest(scene, sensor), np.random.default_rng(seed)
-    began, parts = time.perf_counter(), []
-    for _ in range(0, _IMAGES, 50):
-        parts.append(measure.distance(render.expose(image, scene.noise, rng, 50, where), scene, sensor).value_px)
-    seconds = (time.perf_counter() - began) / _IMAGES
+    began, parts, size = time.perf_counter(), [], at_once(image.size, 50)
+    for _ in watch.samples(_IMAGES // size, least=_FEWEST // size + 1):
+        parts.append(measure.distance(render.expose(image, scene.noise, rng, size, where), scene, sensor).value_px)
+    seconds = (time.perf_counter() - began) / (size * len(parts))
     values = np.concatenate(parts)
     values = values[np.isfinite(values)]
     rows = []
     for n in _COUNTS:
+        if values.size < _GROUPS * n:
+            break
         groups = values[: values.size // n * n].reshape(-1, n).var(1, ddof=1)
         rows.append((n, n * seconds, len(groups), float(groups.std(ddof=1) / groups.mean()), half_width(n)))
+    if len(rows) < 4:
+        raise InvalidInput(f"images must be measured in {_FEWEST} of them, got {values.size} that were")
     n, _, groups, found, widths = np.array(rows).T
     return Parameter(
         name="images",

@@ -8,19 +8,30 @@ import numpy as np
 
 import measure
 import render
-from scenes import Scene
+from scenes import InvalidInput, Scene
 from validation.batch import work
 from validation.batch.campaign import Case
 from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.watch import Watch
 
 _FACTORS = (0.5, 1.0, 2.0, 4.0)
 _IMAGES = 50
+_LARGEST = 6_000_000  # pixels
 
 
-def size_parameter(case: Case, variant: str, seed: int) -> Parameter:
-    """Seconds of a render and of a noisy image, and relative error of the distance, against the image's size."""
-    rows = []
-    for factor in _FACTORS:
+def size_parameter(case: Case, variant: str, seed: int, watch: Watch = Watch()) -> Parameter:
+    """Seconds of a render and of a noisy image, and relative error of the distance, against the image's size.
+
+    Raises
+    ------
+    InvalidInput
+        If the image is so large that it cannot be made larger.
+    """
+    rows, usable = [], [f for f in _FACTORS if f**2 * case.scene.camera.width * case.scene.camera.height <= _LARGEST]
+    if len(usable) < 3:
+        raise InvalidInput(f"size must be of an image below {_LARGEST / 4 / 1e6:.1f} megapixels, got a larger one")
+    for number in watch.samples(len(usable), least=3):
+        factor = usable[number]
         scene = _scaled(case.scene, factor)
         sized = Case(case.index, scene, case.setting)
         began = time.perf_counter()
@@ -31,6 +42,8 @@ def size_parameter(case: Case, variant: str, seed: int) -> Parameter:
         began = time.perf_counter()
         work.measure_chunk(sized, image, seed, 0, _IMAGES)
         seconds = (time.perf_counter() - began) / _IMAGES
+        if not rows and 4 * (rendered + seconds * _IMAGES) > watch.left:  # of the next alone
+            raise InvalidInput(f"size must leave time for a larger image, got {rendered:.0f} s for the smallest")
         relative = float(np.sqrt(found.variance_px2)) / found.value_px
         rows.append((scene.camera.width, scene.camera.height, rendered, 1e3 * seconds, relative))
     width, height, rendered, image, error = np.array(rows).T

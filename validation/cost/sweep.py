@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import render
@@ -23,8 +24,10 @@ from validation.cost.sampling import images_parameter
 from validation.cost.scaling import scaling_parameter
 from validation.cost.size import size_parameter
 from validation.cost.trial import spread_cases, trial
+from validation.cost.watch import Watch
 from validation.defaults import DEFAULT_SEED
 
+BUDGET = 120.0  # seconds
 _STEPS = 10  # the trial and nine parameters
 _SETTINGS = 2  # of the parameters that render
 
@@ -49,36 +52,70 @@ class Sweep:
         }
 
 
-def sweep(campaign: Campaign, seed: int = DEFAULT_SEED, report: Callable[[str, int, int], None] | None = None) -> Sweep:
+def sweep(
+    campaign: Campaign,
+    seed: int = DEFAULT_SEED,
+    report: Callable[[str, int, int], None] | None = None,
+    budget: float = BUDGET,
+) -> Sweep:
     """Measure each parameter of a scene on this machine.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    seed : int
+        Of the noise.
+    report : callable, optional
+        As report(what, done, total); called every few seconds.
+    budget : float
+        Seconds, about: fewer samples are taken of a slow scene, and parameters that need some are left out once it is
+        over.
 
     Raises
     ------
     InvalidInput
         If no setting of the scene can be measured.
     """
-    began, tell = time.perf_counter(), report or (lambda *_: None)
+    whole, tell = Watch(budget), report or (lambda *_: None)
     tell("trial", 0, _STEPS)
-    model = trial(campaign, seed)
-    variant, cases = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)[1::2]
+    model = trial(campaign, seed, report=lambda *_: tell("trial", 0, _STEPS), watch=Watch(budget / 3))
+    variant, spread = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)
+    cases = spread[1::2] or spread
     images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]
-    makers: dict[str, Callable[[], Parameter]] = {
-        "rays": lambda: rays_parameter(cases, variant),
-        "images": lambda: images_parameter(cases[0], images[0], seed),
-        "estimators": lambda: estimators_parameter(cases, images, seed),
-        "points": lambda: points_parameter(cases[0]),
-        "grid": lambda: grid_parameter(campaign.scenes[0]),
-        "size": lambda: size_parameter(cases[0], variant, seed),
-        "effects": lambda: effects_parameter(cases[0], variant),
+    makers: dict[str, Callable[[Watch], Parameter]] = {
+        "images": lambda watch: images_parameter(cases[0], images[0], seed, watch),
+        "estimators": lambda watch: estimators_parameter(cases, images, seed, watch),
+        "rays": lambda watch: rays_parameter(cases, variant, watch),
+        "size": lambda watch: size_parameter(cases[0], variant, seed, watch),
+        "effects": lambda watch: effects_parameter(cases[0], variant, watch),
+        "grid": lambda watch: grid_parameter(campaign.scenes[0], watch),
+    }
+    quick = {
         "scaling": lambda: scaling_parameter(model),
         "pareto": lambda: pareto_parameter(model),
+        "points": lambda: points_parameter(cases[0]),
     }
     parameters, omitted = [], {}
-    for done, (name, make) in enumerate(makers.items(), 1):
-        tell(name, done, _STEPS)
+    for done, name in enumerate((*quick, *makers), 1):
+        step = partial(tell, name, done, _STEPS)
         try:
-            parameters.append(make())
+            made = quick[name]() if name in quick else makers[name](_share(whole, _STEPS - done, step))
+            parameters.append(made)
         except InvalidInput as error:
             omitted[name] = str(error)
     tell("done", _STEPS, _STEPS)
-    return Sweep(campaign.name, model, tuple(parameters), omitted, time.perf_counter() - began)
+    return Sweep(campaign.name, model, tuple(parameters), omitted, time.perf_counter() - whole.began)
+
+
+def _share(whole: Watch, left: int, tell: Callable[[], None]) -> Watch:
+    """The time of the next of so many parameters that are left.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none.
+    """
+    tell()
+    if whole.left <= 0:
+        raise InvalidInput(f"--budget must be longer for it, got {whole.seconds:g} s")
+    return Watch(whole.left / left, tell)

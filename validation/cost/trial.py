@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from validation.batch import pool, work
 from validation.batch.campaign import Campaign, Case
 from validation.batch.work import Rendering
 from validation.cost.model import CostModel, Rendered, qualities
+from validation.cost.watch import Watch, at_once
 from validation.defaults import DEFAULT_SEED
 
 SAMPLES = (4, 16, 64)
@@ -36,6 +38,7 @@ def trial(
     fine: float = 0.0,
     report: Report | None = None,
     how: Rendering = Rendering(),
+    watch: Watch = Watch(),
 ) -> CostModel:
     """Measure what the run of a campaign will cost, on a few settings spread over it.
 
@@ -54,6 +57,8 @@ def trial(
         As report(what, done, total).
     how : Rendering
         Which effects are simulated.
+    watch : Watch
+        Once its time is over, no further setting and no more rays are tried.
 
     Raises
     ------
@@ -64,13 +69,15 @@ def trial(
     variant, cases = variants.choose(), spread_cases(campaign, settings)
     warm = _timed(lambda: work.render_setting(cases[0], variant, how))
     found = []
-    for done, case in enumerate(cases):
-        (report or (lambda *_: None))("trial", done, len(cases))
-        found.append(_Tried(case, variant, seed, how))
+    for done in watch.samples(len(cases), least=1):
+        case = cases[done]
+        tell = partial(report or (lambda *_: None), "trial", done, len(cases))
+        tell()
+        found.append(_Tried(case, variant, seed, how, tell))
     good = [tried for tried in found if tried.usable]
     if not good:
         raise InvalidInput(f"{campaign.name}: settings must be measurable for a trial, got {found[0].status}")
-    rendered = _ladder(good, fine)
+    rendered = _ladder(good, fine, watch)
     squares = [tried.linearity() for tried in good]
     model = math.sqrt(max(0.0, float(np.mean([delta**2 - se**2 for delta, se in squares]))))
     return CostModel(
@@ -88,10 +95,12 @@ def trial(
     )
 
 
-def _ladder(tried: list[_Tried], fine: float) -> tuple[Rendered, ...]:
+def _ladder(tried: list[_Tried], fine: float, watch: Watch) -> tuple[Rendered, ...]:
     """From few rays to many, until they are enough."""
     rendered: list[Rendered] = []
-    for quality in qualities(*SAMPLES):
+    ladder = qualities(*SAMPLES)
+    for number in watch.samples(len(ladder), least=1):
+        quality = ladder[number]
         seconds, spread = zip(*(one.rendered(quality) for one in tried), strict=True)
         rendered.append(Rendered(quality, float(np.mean(seconds)), _rms(spread)))
         if rendered[-1].sigma <= fine:
@@ -115,8 +124,8 @@ def spread_cases(campaign: Campaign, count: int) -> list[Case]:
 class _Tried:
     """One setting of the trial."""
 
-    def __init__(self, case: Case, variant: str, seed: int, how: Rendering) -> None:
-        self.case, self.variant, self.seed, self.how = case, variant, seed, how
+    def __init__(self, case: Case, variant: str, seed: int, how: Rendering, tell: Callable[[], None]) -> None:
+        self.case, self.variant, self.seed, self.how, self.tell = case, variant, seed, how, tell
         clean = work.render_setting(case, variant, how)
         self.seconds = sum(clean.seconds.values())
         self.image = clean.image.array()
@@ -125,7 +134,14 @@ class _Tried:
         self.usable = math.isfinite(self.found.variance_px2)
         self.overhead = clean.seconds["predict"] + clean.seconds["propagate"]
         work.measure_chunk(case, self.image, seed, 0, 2)  # prepares the estimators
-        self.image_seconds = _timed(lambda: work.measure_chunk(case, self.image, seed, 0, _IMAGES)) / _IMAGES
+        tell()
+        self.image_seconds = _timed(self._measure_images) / _IMAGES
+
+    def _measure_images(self) -> None:
+        size = at_once(self.image.size, _IMAGES)
+        for number, first in enumerate(range(0, _IMAGES, size)):
+            self.tell()
+            work.measure_chunk(self.case, self.image, self.seed, number, min(size, _IMAGES - first))
 
     def rendered(self, quality: Quality) -> tuple[float, float]:
         """Seconds of a render, and relative sigma of the predicted variance from two seeds."""
@@ -160,9 +176,13 @@ class _Tried:
         scene, sensor = self.case.scene, self.case.setting.sensor
         where = measure.region_of_interest(scene, sensor)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.case.index, 1 << 30)))
-        pictures = render.expose(self.image, scene.noise, rng, _IMAGES, where)
-        values = measure.measure(pictures, scene, sensor, estimator="gradient").value_image[:, 0]
-        linear = np.einsum("nij,ij->n", pictures - self.image, self.found.response)
+        parts, size = [], at_once(self.image.size, _IMAGES)
+        for first in range(0, _IMAGES, size):
+            self.tell()
+            pictures = render.expose(self.image, scene.noise, rng, min(size, _IMAGES - first), where)
+            found = measure.measure(pictures, scene, sensor, estimator="gradient").value_image[:, 0]
+            parts.append((found, np.einsum("nij,ij->n", pictures - self.image, self.found.response)))
+        values, linear = np.concatenate(parts, axis=1)
         good = np.isfinite(values)
         if good.sum() < 3:
             return 0.0, 0.0
@@ -171,6 +191,7 @@ class _Tried:
         return float(pair[0, 0] / pair[1, 1] - 1), 2 * math.sqrt(unexplained / (good.sum() - 1))
 
     def _image(self, sensor: Pose, quality: Quality) -> np.ndarray:
+        self.tell()
         how, light = self.how, self.case.setting.light
         return render.image(self.case.scene, sensor, light, quality, self.variant, how.effects, how.tolerance)
 

@@ -9,17 +9,7 @@ from measure.calibration import Calibration, blur_for
 
 
 def facts(found: Calibration) -> dict:
-    curves = [
-        {**vars(curve), "ratios": curve.ratios.tolist(), "sigma_px": _finite(curve.sigma_px)} for curve in found.curves
-    ]
-    for curve in curves:
-        for key in ("floor_px", "kappa2", "correlation_px", "linear_to", "efficiency"):
-            curve[key] = curve[key] if np.isfinite(curve[key]) else None
-    return {**vars(found), "curves": curves}
-
-
-def _finite(values: np.ndarray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+    return {**vars(found), "curves": [vars(curve) for curve in found.curves]}
 
 
 def table(found: Calibration) -> Table:

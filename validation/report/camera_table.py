@@ -13,6 +13,7 @@ import scenes
 from measure.boards.camera import CameraCalibration
 from scenes import InvalidInput
 from validation.boards import Boards
+from validation.strict_json import dumps
 
 _STRONG = 0.9  # correlation that is told of
 
@@ -74,7 +75,7 @@ def lens_file(found: CameraCalibration) -> str:
 
 def covariance_file(found: CameraCalibration) -> str:
     """JSON as ``uncertainty.covariance`` reads it."""
-    return json.dumps(_covariance(found), indent=1) + "\n"
+    return dumps(_covariance(found)) + "\n"
 
 
 def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> str:
@@ -112,7 +113,7 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
 def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
     """The document of ``ice calibrate-camera --json``."""
     lens = found.lens
-    told = {
+    return {
         "status": found.status,
         "image": list(found.image_shape[::-1]),
         "units": units,
@@ -133,7 +134,6 @@ def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }
-    return _finite(told)
 
 
 def _board_facts(found: CameraCalibration, seen: Boards) -> list[dict[str, Any]]:
@@ -171,11 +171,3 @@ def _covariance(found: CameraCalibration) -> dict[str, Any]:
 
 def _inline(covariance: dict[str, Any]) -> str:
     return f"{{ names = {json.dumps(covariance['names'])}, matrix = {json.dumps(covariance['matrix'])} }}"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -8,6 +8,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.text import Text
 
 WIDTH = 5.2  # inches; shown 390 px wide, 10 points are 10 px high
 TEXT = 10  # points: the least
@@ -15,7 +16,14 @@ _DPI = 160
 
 
 def save(figure, path: Path) -> Path:
-    """Write a figure to a file and forget it; the file's path."""
+    """Write a figure to a file and forget it; the file's path.
+
+    Texts are shown as they are, for names and titles are the user's: only powers along logarithmic axes are formulas.
+    """
+    axes = [axis for each in figure.axes for axis in (each.xaxis, each.yaxis) if axis.get_scale() == "log"]
+    powers = {label for axis in axes for label in axis.get_ticklabels(which="both")}
+    for text in figure.findobj(Text):
+        text.set_parse_math(text in powers)
     figure.savefig(path, dpi=_DPI)
     plt.close(figure)
     return path

@@ -29,7 +29,7 @@ def _draw(parameter: Parameter, path: Path) -> Path:
     if parameter.name == "pareto":
         _front(parameter, axes)
     axes.set(xscale="log", yscale="log", ylabel=parameter.y)
-    axes.set_title(textwrap.fill(parameter.title, 48), fontsize=11, parse_math=False)
+    axes.set_title(textwrap.fill(parameter.title, 48), fontsize=11)
     if parameter.series:
         legend_below(axes, 2)
     axes.grid(which="both", alpha=0.2)

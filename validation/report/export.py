@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 from scenes import InvalidInput
@@ -46,20 +47,23 @@ def write_json(found: Validation, path: Path) -> Path:
     return path
 
 
-def write_parquet(found: Validation, path: Path) -> Path:
-    """The lines of `write_csv` as Parquet.
+def check_parquet() -> None:
+    """See that Parquet can be written.
 
     Raises
     ------
     InvalidInput
         If pyarrow, 170 MB and so an extra, is not installed.
     """
-    try:
-        from pyarrow import Table, concat_tables, parquet
-    except ImportError:
-        raise InvalidInput(
-            "--parquet must be used with the extra 'parquet' installed, got no package pyarrow"
-        ) from None
+    if find_spec("pyarrow") is None:
+        raise InvalidInput("--parquet must be used with the extra 'parquet' installed, got no package pyarrow")
+
+
+def write_parquet(found: Validation, path: Path) -> Path:
+    """The lines of `write_csv` as Parquet."""
+    check_parquet()
+    from pyarrow import Table, concat_tables, parquet
+
     every = lines(found)
     parts = iter(lambda: list(itertools.islice(every, _PART)), [])
     tables = [Table.from_pylist(part) for part in parts]

@@ -118,7 +118,7 @@ def draw_seen(axis, scene, sensor, light, points) -> None:
         xlabel="x, px",
         ylabel="y, px",
     )
-    axis.set_title(f"{scene.name} from {short(sensor)}{_lit(light)}", fontsize=11, parse_math=False)
+    axis.set_title(f"{scene.name} from {short(sensor)}{_lit(light)}", fontsize=11)
     axis.legend(title="required", fontsize=10, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=4, frameon=False)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.hard.fuzzing import arrays, commands, directories, documents, files
+from tests.hard.fuzzing import arrays, commands, directories, documents, files, uncertainties
 
 
 @dataclass
@@ -77,4 +77,9 @@ def array(rng: np.random.Generator, _room: Room) -> str:
     return arrays.array(rng)
 
 
-DOORS = (scene, mesh, image, campaign, lens, comparison, directory, command, array, array)
+def uncertain(rng: np.random.Generator, room: Room) -> str:
+    return uncertainties.uncertain(rng, room.folder)
+
+
+_USUAL = (scene, mesh, image, campaign, lens, comparison, directory, command, array)
+DOORS = (*_USUAL, array, *_USUAL, uncertain)
