@@ -51,9 +51,9 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
         If things hide or shade each other in the scene.
     """
     layout = layout_of(Picture.of(scene, sensor, light))
-    tool = prepared(layout, "arrangement", 1.0)
-    if not isinstance(tool, ArrangementEstimator):
+    if layout.arrangement is None:
         raise InvalidInput(f"scene must be a convex body before darkness for a bound from an image, got {scene.name}")
+    tool = prepared(layout, "arrangement", 1.0)
     clean = one_picture(clean)
     if str(distance(clean, scene, sensor, light, "arrangement").status) not in status.MEASURED:
         return float("inf")

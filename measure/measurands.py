@@ -10,7 +10,7 @@ import numpy as np
 
 from measure import status
 from measure.estimators.registry import best_estimator
-from measure.measurement import Measurement, _check_method, checked_image, of_first
+from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import Found, find
 from planner.forecast import unit_of
 from scenes import Picture, Quantity, Scene
@@ -134,7 +134,7 @@ def measure_by(
 ) -> tuple[Measurements, ...]:
     """The same by several methods (estimator, threshold of ``canny``) in the same images, checked once."""
     for name, threshold in methods:
-        _check_method(name, threshold)
+        check_method(name, threshold)
     camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]

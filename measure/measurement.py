@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from measure import status
+from measure.estimators.registry import known_name
 from measure.quantities import Found, find
 from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
@@ -168,7 +169,7 @@ def distances(
     Parameters and errors are those of `distance`.
     """
     for name, threshold in methods:
-        _check_method(name, threshold)
+        check_method(name, threshold)
     _check_distance(picture.scene)
     camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
@@ -183,9 +184,11 @@ def _check_distance(scene: Scene) -> None:
         )
 
 
-def _check_method(estimator: Any, threshold: Any) -> None:
+def check_method(estimator: Any, threshold: Any) -> None:
+    """Raise InvalidInput unless there is such an estimator and the threshold is none or a positive number."""
     if not isinstance(estimator, str):
         raise InvalidInput(f"estimator must be the name of one, got {type(estimator).__name__}")
+    known_name(estimator)
     number = isinstance(threshold, int | float | np.number) and not isinstance(threshold, bool)
     if threshold is not None and not (number and 0 < threshold <= BRIGHTEST):
         wanted = "greater than 0" if number and threshold <= 0 else f"a number up to {BRIGHTEST:g}"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from measure.features.layout import layout_of
-from measure.features.rims import rim_tool
+from measure.features.rims import rim_tool, unmoved
 from measure.features.shape import prepared
 from planner.features.projected_edges import circles
 from scenes import Picture, Scene
@@ -32,7 +32,7 @@ def region_of_interest(
     layout = layout_of(picture)
     used = np.zeros(layout.optics.shape, bool)
     for name in circles(picture.scene):
-        used.flat[rim_tool(picture, name, (0.0, 0.0, 0.0)).locator.pixels] = True
+        used.flat[rim_tool(picture, name, unmoved(picture, name)).locator.pixels] = True
     for name in estimators if layout.names else ():
         used.flat[prepared(layout, name, picture.scene.locator.thresholds[0]).pixels] = True
     return used
