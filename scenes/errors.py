@@ -61,6 +61,18 @@ def one_line(text: str, most: int = _MOST) -> str:
     return shown if len(shown) <= 2 * most else f"{shown[:most]} ..."
 
 
+def given(value: Any) -> str:
+    """What was given, for a message; Python prints no whole number of more than 4,300 digits.
+
+    >>> given("x"), given(10**5000)
+    ("'x'", 'a whole number of too many digits')
+    """
+    try:
+        return repr(value)
+    except ValueError:
+        return "a whole number of too many digits"
+
+
 def describe(error: ValidationError) -> str:
     """First problem of a pydantic report as one line "key must be ..., got ..."."""
     problem = error.errors(include_url=False)[0]
@@ -94,5 +106,5 @@ def _requirement(problem: Any) -> str:
 def _shown(problem: Any) -> str:
     if problem["type"] == "missing":
         return "nothing"
-    text = repr(problem["input"])
+    text = given(problem["input"])
     return text if len(text) <= 80 else text[:77] + "..."

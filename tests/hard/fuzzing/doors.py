@@ -1,4 +1,4 @@
-"""Every way in: files, run directories, results, the command line, arrays."""
+"""Every way in: files, run directories, results, the command line, arrays, the page of `ice explore`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.hard.fuzzing import arrays, commands, directories, documents, files
+from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files
 
 
 @dataclass
@@ -77,4 +77,8 @@ def array(rng: np.random.Generator, _room: Room) -> str:
     return arrays.array(rng)
 
 
-DOORS = (scene, mesh, image, campaign, lens, comparison, directory, command, array, array)
+def message(rng: np.random.Generator, room: Room) -> str:
+    return exploring.message(rng, room.folder)
+
+
+DOORS = (scene, mesh, image, campaign, lens, comparison, directory, command, array, array, message)
