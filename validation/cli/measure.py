@@ -11,6 +11,7 @@ import typer
 import scenes
 import scenes.photograph
 from scenes import InvalidInput
+from scenes.image_file import Size
 from scenes.photograph import Photograph
 from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
@@ -83,13 +84,13 @@ def measure_command(
     for option, value in chosen.items():
         if value is not None:
             raise InvalidInput(f"{option} must be left out with a scene, got {value}")
-    picture = picture_file.read(file)
     if sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
     known = scenes.load(scene)
+    picture = picture_file.read(file, Size.of_camera(known.camera))
     found = measure.measure(picture, known, *poses, estimator, threshold)
     rows = measurands.facts(found)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}
