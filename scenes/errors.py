@@ -73,13 +73,14 @@ def given(value: Any) -> str:
         return "a whole number of too many digits"
 
 
-def describe(error: ValidationError) -> str:
-    """First problem of a pydantic report as one line "key must be ..., got ..."."""
+def describe(error: ValidationError, *where: int | str) -> str:
+    """First problem of a pydantic report as one line "key must be ..., got ..."; ``where`` what was checked stands."""
     problem = error.errors(include_url=False)[0]
+    location = (*where, *problem["loc"])
     if problem["type"] == "value_error" and " must " in str(problem["ctx"]["error"]):
         text = str(problem["ctx"]["error"])
-        return text if not problem["loc"] or "." in text.split(" must ")[0] else f"{_key(problem['loc'])}: {text}"
-    return f"{_key(problem['loc'])} must be {_requirement(problem)}, got {_shown(problem)}"
+        return text if not location or "." in text.split(" must ")[0] else f"{_key(location)}: {text}"
+    return f"{_key(location)} must be {_requirement(problem)}, got {_shown(problem)}"
 
 
 def _key(location: tuple[int | str, ...]) -> str:
