@@ -50,6 +50,8 @@ class Measurement(Shown):
     p_value : ndarray, shape (...)
         Goodness of fit: probability of a residual at least as unlikely, if the image is what the model says and the
         noise the sensor's; NaN for estimators that have no model of the image.
+    picture : Picture
+        What the images are taken to show: scene, sensor, and the lights where they are known.
     """
 
     value_px: np.ndarray
@@ -64,12 +66,15 @@ class Measurement(Shown):
     used: np.ndarray
     rejected: np.ndarray
     p_value: np.ndarray
+    picture: Picture
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record an image: distance and its variance, px and px^2, status; None where there is no value."""
+        """One record an image: scene and poses, distance and its variance, px and px^2, status; None: no value."""
+        where = self.picture.row
         columns = (self.value_px, self.variance_px2, self.bias_px, self.status, self.p_value)
         return [
-            {
+            where
+            | {
                 "image": i,
                 "value_px": finite(found),
                 "variance_px2": finite(variance),
@@ -197,13 +202,14 @@ def check_method(estimator: Any, threshold: Any) -> None:
 
 def _by_method(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    return of_first(find(stack, picture, estimator, threshold), lead)
+    return of_first(find(stack, picture, estimator, threshold), picture, lead)
 
 
-def of_first(found: Found, lead: tuple[int, ...]) -> Measurement:
+def of_first(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurement:
     """The first quantity, a distance, of what was found in images of leading shape ``lead``."""
     return Measurement(
         edge_names=found.names,
+        picture=picture,
         **{key: column.reshape((*lead, *column.shape[1:])) for key, column in _columns(found).items()},
     )
 

@@ -59,8 +59,9 @@ class SceneBudget(Shown):
         return next(each for each in self.measurands if each.name == name)
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record a measurand and source (`Budget.as_rows`)."""
-        return [{"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
+        """One record a measurand and source: scene and poses (`Picture.row`), and the source's (`Budget.as_rows`)."""
+        where = self.picture.row
+        return [where | {"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
 
     def _line(self) -> str:
         return "; ".join(f"{each.name} {value(each.value, each.U, each.unit)}, k = {each.k:.2f}" for each in self)

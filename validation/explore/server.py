@@ -105,7 +105,9 @@ async def serve(
                 await site.start()
             except (OSError, ValueError) as error:
                 reason = getattr(error, "strerror", None) or error
-                raise InvalidInput(f"--host and --port must be free to listen at, got {host}:{port} ({reason})") from None
+                raise InvalidInput(
+                    f"--host and --port must be free to listen at, got {host}:{port} ({reason})"
+                ) from None
             address = runner.addresses[0]
             shown = f"[{address[0]}]" if ":" in address[0] else address[0]
             told(f"http://{shown}:{address[1]}/" + (f"?token={token}" if token else ""))
