@@ -9,8 +9,10 @@ import numpy as np
 from measure.features.layout import layout_of
 from measure.features.rims import rim_tool, unmoved
 from measure.features.shape import prepared
+from measure.measurement import check_method
 from planner.features.projected_edges import circles
-from scenes import Picture, Scene
+from scenes import InvalidInput, Picture, Scene
+from scenes.errors import given
 
 
 def region_of_interest(
@@ -29,6 +31,10 @@ def region_of_interest(
     ndarray of bool, shape (height, width)
     """
     picture = Picture.of(scene, sensor, light)
+    if not isinstance(estimators, tuple | list):
+        raise InvalidInput(f"estimators must be a tuple of names, got {given(estimators)}")
+    for name in estimators:
+        check_method(name, None)
     layout = layout_of(picture)
     used = np.zeros(layout.optics.shape, bool)
     for name in circles(picture.scene):

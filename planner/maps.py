@@ -17,6 +17,7 @@ from planner.search.aim import DEFAULT_OBJECTIVE, Objective
 from planner.search.poses import as_array, by_light
 from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput, Pose, Scene, several
+from scenes.errors import given
 from scenes.results import Shown, finite, poses
 
 _CHUNK = 4096  # directions at a time, which bounds the memory
@@ -137,6 +138,8 @@ def _map(scene, sensor, light, space, model, objective, clutter: Callable[[Pictu
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
+    if not isinstance(space, ViewingSpace):
+        raise InvalidInput(f"space must be a ViewingSpace, got {given(space)}")
     if light is None:
         if len(scene.free) != 1:
             raise InvalidInput(f"light must be given where not exactly one light is free, got {len(scene.free)} free")

@@ -22,6 +22,7 @@ from planner.uncertainty.groups import Group
 from planner.uncertainty.groups import Source as EngineInput
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import InvalidInput, Picture, Scene
+from scenes.arrays import finite
 from scenes.results import Shown, value
 
 CALIBRATION = "camera calibration"
@@ -127,6 +128,9 @@ def budget(
     ['sensor_distance', 'pixel noise', 'model error']
     """
     picture = Picture.of(scene, sensor, light)
+    variances, biases = (_checked(*told, picture) for told in (("variances", variances), ("biases", biases)))
+    if variances is not None and variances.min() < 0:
+        raise InvalidInput(f"variances must be at least 0, got {variances.min():g}")
     prediction = predict(picture)
     for each in prediction.measurands:
         if not np.isfinite(each.variance_object):
@@ -144,6 +148,13 @@ def budget(
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(each.name, each.unit, each.value_object, whole, told, p))
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets))
+
+
+def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:
+    count = len(picture.scene.quantities)
+    if values is not None and finite(values, name).shape != (count,):
+        raise InvalidInput(f"{name} must be one for each of {count} measurands, got shape {np.shape(values)}")
+    return None if values is None else finite(values, name)
 
 
 def _noise(prediction: Prediction, picture: Picture, *, biased: bool) -> np.ndarray:

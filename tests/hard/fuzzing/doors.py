@@ -11,7 +11,7 @@ import numpy as np
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files
+from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files, library as libraries
 
 
 @dataclass
@@ -81,4 +81,8 @@ def message(rng: np.random.Generator, room: Room) -> str:
     return exploring.message(rng, room.folder)
 
 
-DOORS = (scene, mesh, image, campaign, lens, comparison, directory, command, array, array, message)
+def library(rng: np.random.Generator, _room: Room) -> str:
+    return libraries.library(rng)
+
+
+DOORS = (scene, mesh, image, campaign, lens, comparison, directory, command, array, array, message, library)
