@@ -33,6 +33,10 @@ class Model(BaseModel):
         checked = {name: _checked(type(self), name, value) for name, value in (update or {}).items()}
         return super().model_copy(update=checked, deep=deep)
 
+    def tried(self, **values: Any) -> Self:
+        """A copy with other values, unchecked: what a search or a difference tries may lie beyond what can be."""
+        return super().model_copy(update=values)
+
 
 def _checked(model: type[Model], name: str, value: Any) -> Any:
     if name not in model.model_fields:

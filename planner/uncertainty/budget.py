@@ -208,7 +208,7 @@ def coverage_factor(p: float, dof: float = math.inf) -> float:
     >>> round(coverage_factor(0.99, 16.8), 2), round(coverage_factor(0.95), 2)
     (2.92, 1.96)
     """
-    if not 0 < number(p, "p") < 1:
+    if not 0 < p < 1:
         raise InvalidInput(f"p must be between 0 and 1, got {p}")
     if not dof >= 1 - 1e-9:
         raise InvalidInput(f"dof must be at least 1, got {dof}")

@@ -523,6 +523,33 @@ def test_denormal_images_are_dark_without_a_warning():
         measure.measure_quadrilateral(PICTURE * 1e-320)
 
 
+def test_a_quadrilateral_of_levels_far_below_any_sensors():
+    """Its noise is less than a scene may say, and so was no noise that could be made."""
+    noise = np.random.default_rng(1).standard_normal(PICTURE.shape)
+    assert isinstance(measure.measure_quadrilateral((PICTURE + noise) * 1e-40).status, str)
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda: scenes.load(3), "scene must be a name or a path, got 3"),
+        (lambda: planner.ViewingSpace("15"), "step_deg must be a finite number, got '15'"),
+        (lambda: planner.ViewingSpace(15, (0, 10, 20)), "polar range must be two angles"),
+        (lambda: planner.pose_map(scenes.load("task1"), sensor=(30, 135), space=15), "space must be a ViewingSpace"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), p="x"), "p must be a finite number"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), variances=[1, 2]), "variances must be one"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), variances=[-1]), "variances must be at"),
+        (lambda: planner.predict(scenes.load("task1"), (30, 135), (15, 315), 10**5000), "model must be one of"),
+        (lambda: measure.region_of_interest(scenes.load("task1"), (30, 135), estimators="canny"), "estimators must be"),
+        (lambda: render.effects("task1"), "scene must be a Scene, got 'task1'"),
+        (lambda: scenes.Pose(10**5000, 0), "polar_deg must be a finite number of degrees, got a whole number of too"),
+    ],
+)  # fmt: skip
+def test_absurd_arguments_are_refused_in_one_line(use, message):
+    with pytest.raises(InvalidInput, match=message):
+        use()
+
+
 def test_array_files(tmp_path):
     for name, array in (("five", np.zeros((4, 4, 5))), ("none", np.array(None)), ("complex", PICTURE + 1j)):
         np.save(tmp_path / f"{name}.npy", array, allow_pickle=True)

@@ -11,7 +11,8 @@ import numpy as np
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files, library as libraries
+from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files
+from tests.hard.fuzzing import library as libraries
 
 
 @dataclass

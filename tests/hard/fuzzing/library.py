@@ -13,15 +13,16 @@ import render
 import scenes
 
 _VALUES: tuple[Any, ...] = (
-    None, "x", "", "3", b"3", True, -1, 0, 0.0, 1e-320, 1e300, 10**400, 10**5000, float("nan"), float("inf"), -float("inf"), [],
-    (), {}, [[]], [None], {"a": 1}, (30,), (30, 135), ("30", "135"), (np.nan, 0), (200, 0), ((15, 315),), ((15, 315), None),
-    np.zeros(0), np.zeros((2, 2)), np.array(["a"]), np.float32(2), np.int64(3), object(), 1j, "\ud800",
-    "a\nb", range(3), {1, 2}, scenes.Pose(30, 135),
+    None, "x", "", "3", b"3", True, -1, 0, 0.0, 1e-320, 1e300, 10**400, 10**5000, float("nan"), float("inf"),
+    -float("inf"), [], (), {}, [[]], [None], {"a": 1}, (30,), (30, 135), ("30", "135"), (np.nan, 0), (200, 0),
+    ((15, 315),), ((15, 315), None), np.zeros(0), np.zeros((2, 2)), np.array(["a"]), np.float32(2), np.int64(3),
+    object(), 1j, "\ud800", "a\nb", range(3), {1, 2}, scenes.Pose(30, 135),
 )  # fmt: skip
 _KEYS = (
-    "noise", "noise.sigma", "noise.bits", "camera", "camera.width", "camera.look_at[1]", "light", "light.distance", "lights",
-    "lights[0].distance", "settings", "settings[0]", "settings[3].light", "object.size", "task", "task.start", "material",
-    "uncertain", "uncertainty", "units", "name", "nonsense", "a.b", "", "noise..sigma", "floor", "obstacles", "measurands",
+    "noise", "noise.sigma", "noise.bits", "camera", "camera.width", "camera.look_at[1]", "light", "light.distance",
+    "lights", "lights[0].distance", "settings", "settings[0]", "settings[3].light", "object.size", "task", "task.start",
+    "material", "uncertain", "uncertainty", "units", "name", "nonsense", "a.b", "", "noise..sigma", "floor",
+    "obstacles", "measurands",
 )  # fmt: skip
 
 
