@@ -19,7 +19,7 @@ from scenes.results import Shown, finite, value
 
 DEFAULT_ESTIMATOR = "gradient"
 PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
-_DARK = 1e-200  # squared grey levels
+_DARK = 1e-30  # squared grey levels
 
 
 @dataclass(frozen=True, repr=False)

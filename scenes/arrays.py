@@ -12,7 +12,7 @@ import numpy as np
 from scenes.errors import InvalidInput, given
 
 BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
-_TINY = 1e-150  # below, squares are no ordinary numbers any more; it is 0 for every sensor
+_TINY = 1e-15  # grey levels, the least that a scene may say: of less all is 0
 
 
 def numbers(values: Any, name: str) -> np.ndarray:

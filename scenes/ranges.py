@@ -7,7 +7,6 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-
 LEAST_SIGMA = 1e-15  # grey levels; the square of less, and the square of that, would be lost
 
 
