@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from measure.estimators.arrangement import ArrangementEstimator
 from measure.features.layout import Layout, layout_of
 from measure.features.locating import locate
 from measure.features.shape import prepared
@@ -19,7 +18,7 @@ from scenes import InvalidInput, Noise, Picture, Scene, status
 from scenes.arrays import picture as one_picture
 
 
-def bound(scene: Scene, sensor: Any, light: Any) -> float:
+def bound(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> float:
     """Smallest variance of the distance that any unbiased estimator can have in this setting, px^2.
 
     From the planner's model of the whole picture around the required edges: free are all vertices there, the levels of
@@ -34,7 +33,7 @@ def bound(scene: Scene, sensor: Any, light: Any) -> float:
     return predict(scene, sensor, light, model="bound").variance_px2
 
 
-def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> float:
+def image_bound(clean: np.ndarray, scene: Scene | Picture, sensor: Any = None, light: Any = None) -> float:
     """The same bound with positions and levels as an image shows them, px^2; infinite where it shows none.
 
     Parameters
@@ -49,15 +48,16 @@ def image_bound(clean: np.ndarray, scene: Scene, sensor: Any, light: Any) -> flo
     InvalidInput
         If things hide or shade each other in the scene.
     """
-    layout = layout_of(Picture.of(scene, sensor, light))
+    picture = Picture.of(scene, sensor, light)
+    layout, name = layout_of(picture), picture.scene.name
+    if layout.arrangement is None:
+        raise InvalidInput(f"scene must be a convex body before darkness for a bound from an image, got {name}")
     tool = prepared(layout, "arrangement", 1.0)
-    if not isinstance(tool, ArrangementEstimator):
-        raise InvalidInput(f"scene must be a convex body before darkness for a bound from an image, got {scene.name}")
     clean = one_picture(clean)
-    if str(distance(clean, scene, sensor, light, "arrangement").status) not in status.MEASURED:
+    if str(distance(clean, picture, estimator="arrangement").status) not in status.MEASURED:
         return float("inf")
     state = locate(tool, layout, tool.taken(clean[None])[0], clean).state
-    covariance = _corners(layout, state, scene.noise)
+    covariance = _corners(layout, state, picture.scene.noise)
     _, gradient = separation(state.vertices[tool.arrangement.corners[:2]][None])
     return float(gradient[0] @ covariance[:4, :4] @ gradient[0])
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from measure.estimators.registry import best_estimator
-from measure.measurement import Measurement, _check_method, checked_image, of_first
+from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import Found, find
 from planner.forecast import unit_of
 from scenes import Picture, Quantity, Scene, status
@@ -41,6 +41,8 @@ class Measurements(Shown):
         Goodness of fit, as of `measure.distance`.
     first : Measurement, optional
         The first quantity as `measure.distance` gives it, with its edges, if it is a distance.
+    picture : Picture
+        What the images are taken to show: scene, sensor, and the lights where they are known.
     """
 
     quantities: tuple[Quantity, ...]
@@ -53,6 +55,7 @@ class Measurements(Shown):
     status: np.ndarray
     p_value: np.ndarray
     first: Measurement | None
+    picture: Picture
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,11 +67,12 @@ class Measurements(Shown):
         return np.sqrt(np.einsum("...mm->...m", self.covariance))
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record an image and measurand: value, one sigma, status; None where there is no value."""
-        count = len(self.quantities)
+        """One record an image and measurand: scene and poses, value, one sigma, status; None where there is none."""
+        where, count = self.picture.row, len(self.quantities)
         columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.status))
         return [
-            {
+            where
+            | {
                 "image": i,
                 "name": quantity.name,
                 "kind": quantity.kind,
@@ -133,14 +137,14 @@ def measure_by(
 ) -> tuple[Measurements, ...]:
     """The same by several methods (estimator, threshold of ``canny``) in the same images, checked once."""
     for name, threshold in methods:
-        _check_method(name, threshold)
+        check_method(name, threshold)
     camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    return tuple(_gathered(find(stack, picture, *method), picture.scene, lead) for method in methods)
+    return tuple(_gathered(find(stack, picture, *method), picture, lead) for method in methods)
 
 
-def _gathered(found: Found, scene: Scene, lead: tuple[int, ...]) -> Measurements:
+def _gathered(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurements:
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)
@@ -149,7 +153,7 @@ def _gathered(found: Found, scene: Scene, lead: tuple[int, ...]) -> Measurements
     ]
     return Measurements(
         quantities=quantities,
-        units=tuple(unit_of(scene, quantity) for quantity in quantities),
+        units=tuple(unit_of(picture.scene, quantity) for quantity in quantities),
         nominal=np.array(told, float),
         value_image=np.where(measured, found.image.value, np.nan).reshape(*lead, count),
         value=np.where(measured, found.plane.value, np.nan).reshape(*lead, count),
@@ -157,7 +161,8 @@ def _gathered(found: Found, scene: Scene, lead: tuple[int, ...]) -> Measurements
         covariance=_known(found.plane.covariance, measured).reshape(*lead, count, count),
         status=found.status.reshape(*lead, count),
         p_value=found.shape.p_value.reshape(lead),
-        first=of_first(found, lead) if quantities[0].kind == "distance" else None,
+        first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
+        picture=picture,
     )
 
 

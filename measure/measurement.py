@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from measure.estimators.registry import known_name
 from measure.quantities import Found, find
 from planner.imaging.pictures import Pictures
 from planner.models.bias import bias
@@ -17,7 +18,7 @@ from scenes.results import Shown, finite, value
 
 DEFAULT_ESTIMATOR = "gradient"
 PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
-_DARK = 1e-200  # squared grey levels
+_DARK = 1e-30  # squared grey levels
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,6 +49,8 @@ class Measurement(Shown):
     p_value : ndarray, shape (...)
         Goodness of fit: probability of a residual at least as unlikely, if the image is what the model says and the
         noise the sensor's; NaN for estimators that have no model of the image.
+    picture : Picture
+        What the images are taken to show: scene, sensor, and the lights where they are known.
     """
 
     value_px: np.ndarray
@@ -62,12 +65,15 @@ class Measurement(Shown):
     used: np.ndarray
     rejected: np.ndarray
     p_value: np.ndarray
+    picture: Picture
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record an image: distance and its variance, px and px^2, status; None where there is no value."""
+        """One record an image: scene and poses, distance and its variance, px and px^2, status; None: no value."""
+        where = self.picture.row
         columns = (self.value_px, self.variance_px2, self.bias_px, self.status, self.p_value)
         return [
-            {
+            where
+            | {
                 "image": i,
                 "value_px": finite(found),
                 "variance_px2": finite(variance),
@@ -167,7 +173,7 @@ def distances(
     Parameters and errors are those of `distance`.
     """
     for name, threshold in methods:
-        _check_method(name, threshold)
+        check_method(name, threshold)
     _check_distance(picture.scene)
     camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
@@ -182,9 +188,11 @@ def _check_distance(scene: Scene) -> None:
         )
 
 
-def _check_method(estimator: Any, threshold: Any) -> None:
+def check_method(estimator: Any, threshold: Any) -> None:
+    """Raise InvalidInput unless there is such an estimator and the threshold is none or a positive number."""
     if not isinstance(estimator, str):
         raise InvalidInput(f"estimator must be the name of one, got {type(estimator).__name__}")
+    known_name(estimator)
     number = isinstance(threshold, int | float | np.number) and not isinstance(threshold, bool)
     if threshold is not None and not (number and 0 < threshold <= BRIGHTEST):
         wanted = "greater than 0" if number and threshold <= 0 else f"a number up to {BRIGHTEST:g}"
@@ -193,13 +201,14 @@ def _check_method(estimator: Any, threshold: Any) -> None:
 
 def _by_method(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None) -> Measurement:
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    return of_first(find(stack, picture, estimator, threshold), lead)
+    return of_first(find(stack, picture, estimator, threshold), picture, lead)
 
 
-def of_first(found: Found, lead: tuple[int, ...]) -> Measurement:
+def of_first(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurement:
     """The first quantity, a distance, of what was found in images of leading shape ``lead``."""
     return Measurement(
         edge_names=found.names,
+        picture=picture,
         **{key: column.reshape((*lead, *column.shape[1:])) for key, column in _columns(found).items()},
     )
 

@@ -12,7 +12,7 @@ from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response
 from measure.features.shape import prepared
-from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, checked_image
+from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, check_method, checked_image
 from measure.quantities import Found, find
 from planner.imaging.pictures import Pictures
 from planner.imaging.sensor import recorded
@@ -110,6 +110,7 @@ def propagate(
         The image is the mean of photographs of a camera that stands about where the scene says: how far its value is
         off the model's tells of the poses, and not of ``clutter``.
     """
+    check_method(estimator, threshold)
     picture = Picture.of(scene, sensor, light)
     camera = picture.scene.camera
     clean, noise = recorded(picture.scene.noise, checked_image(one_picture(clean), (camera.height, camera.width)))

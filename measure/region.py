@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from measure.features.layout import layout_of
-from measure.features.rims import rim_tool
+from measure.features.rims import rim_tool, unmoved
 from measure.features.shape import prepared
+from measure.measurement import check_method
 from planner.features.projected_edges import circles
-from scenes import Picture, Scene
+from scenes import InvalidInput, Picture, Scene
+from scenes.errors import given
 
 
 def region_of_interest(
@@ -29,10 +31,14 @@ def region_of_interest(
     ndarray of bool, shape (height, width)
     """
     picture = Picture.of(scene, sensor, light)
+    if not isinstance(estimators, tuple | list):
+        raise InvalidInput(f"estimators must be a tuple of names, got {given(estimators)}")
+    for name in estimators:
+        check_method(name, None)
     layout = layout_of(picture)
     used = np.zeros(layout.optics.shape, bool)
     for name in circles(picture.scene):
-        used.flat[rim_tool(picture, name, (0.0, 0.0, 0.0)).locator.pixels] = True
+        used.flat[rim_tool(picture, name, unmoved(picture, name)).locator.pixels] = True
     for name in estimators if layout.names else ():
         used.flat[prepared(layout, name, picture.scene.locator.thresholds[0]).pixels] = True
     return used

@@ -16,14 +16,16 @@ from planner.ranks import quantity_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Objective
 from planner.search.poses import as_array, by_light
 from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Scene, several
+from scenes import InvalidInput, Pose, Scene, several
+from scenes.errors import given
+from scenes.results import Shown, finite, poses
 from scenes.status import WORST_FIRST
 
 _CHUNK = 4096  # directions at a time, which bounds the memory
 
 
-@dataclass(frozen=True, eq=False)
-class Map:
+@dataclass(frozen=True, eq=False, repr=False)
+class Map(Shown):
     """One number and one status for each direction that the sensor or the light may have.
 
     Attributes
@@ -35,11 +37,31 @@ class Map:
         The worst of all quantities, as of `Prediction`: where the variance is infinite the reason; else ``ok`` or,
         where bias was looked for, ``clutter``. From a glance: what a close look at one setting knows besides (rims
         of circles, light between faces) is left out.
+    scene : Scene
+    sensor, lights : Pose and tuple of Pose, or None
+        What is held fixed; None of what takes the space's directions.
     """
 
     space: ViewingSpace
     variance: np.ndarray
     status: np.ndarray
+    scene: Scene
+    sensor: Pose | None
+    lights: tuple[Pose, ...] | None
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a direction: scene, poses in degrees, variance (None where infinite) and status."""
+        moved = [tuple(pose) for pose in self.space.poses.tolist()]
+        return [
+            {"scene": self.scene.name, **poses(self.sensor or pose, pose if self.lights is None else self.lights)}
+            | {"variance": finite(variance), "status": str(status)}
+            for pose, variance, status in zip(moved, self.variance, self.status, strict=True)
+        ]
+
+    def _line(self) -> str:
+        known = int(np.isfinite(self.variance).sum())
+        told = f", the least variance {self.variance.min():.3g}" if known else ""
+        return f"{self.scene.name}: {len(self.variance)} directions, {known} can be measured from{told}"
 
 
 def variance_map(
@@ -117,21 +139,25 @@ def _map(scene, sensor, light, space, model, objective, clutter: Callable[[Pictu
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
     space = ViewingSpace() if space is None else space
+    if not isinstance(space, ViewingSpace):
+        raise InvalidInput(f"space must be a ViewingSpace, got {given(space)}")
     if light is None:
         if len(scene.free) != 1:
             raise InvalidInput(f"light must be given where not exactly one light is free, got {len(scene.free)} free")
-        fixed = np.array(list(scene.check_pose("sensor", sensor)))
+        held = scene.check_pose("sensor", sensor), None
+        fixed = np.array(list(held[0]))
     else:
-        fixed = by_light(as_array(scene.check_lights(several(light))))
+        held = None, scene.check_lights(several(light))
+        fixed = by_light(as_array(held[1]))
     evaluate = variance_model(model)
     values, ranks = np.empty(len(space)), np.full(len(space), WORST_FIRST.index("ok"))
     for at in range(0, len(space), _CHUNK):
         part = slice(at, at + _CHUNK)
-        poses = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
-        pictures = Pictures.of(scene, *poses)
+        both = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
+        pictures = Pictures.of(scene, *both)
         found = evaluate(pictures)
         values[part] = minimised(found, objective)
         if clutter:
             known = clutter(pictures) if model != "bound" else np.array(False)
             ranks[part] = quantity_ranks(found, known).min(-1)
-    return Map(space, values, np.array(WORST_FIRST)[ranks])
+    return Map(space, values, np.array(WORST_FIRST)[ranks], scene, *held)

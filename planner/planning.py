@@ -115,7 +115,7 @@ class Plan(Shown):
         """One record a candidate, the best first: poses in degrees and variances; None where infinite."""
         names = ("variance", "variance_object", "variance_image")
         return [
-            poses(each.sensor, each.light)
+            {"scene": self.scene.name, **poses(each.sensor, each.light)}
             | {"edges": " ".join(each.edges), "limiting": each.limiting}
             | {name: finite(getattr(each, name)) for name in names}
             for each in self.candidates

@@ -87,8 +87,8 @@ class Prediction(Shown):
     covariance, covariance_object : ndarray, shape (M, M)
         Joint covariance of all quantities in the image and in the object; infinite on the diagonal, NaN beside it,
         where a quantity cannot be measured.
-    units : str
-        The scene's unit of length.
+    picture : Picture
+        What it is predicted for.
     """
 
     model: str
@@ -105,7 +105,12 @@ class Prediction(Shown):
     measurands: tuple[Forecast, ...]
     covariance: np.ndarray
     covariance_object: np.ndarray
-    units: Unit = "cm"
+    picture: Picture
+
+    @property
+    def units(self) -> Unit:
+        """The scene's unit of length."""
+        return self.picture.scene.units
 
     @property
     def value_px(self) -> float:
@@ -144,8 +149,8 @@ class Prediction(Shown):
         return max((each.ratio for each in self.measurands if each.ratio is not None), default=None)
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record a quantity (`Forecast.as_row`)."""
-        return [each.as_row() for each in self.measurands]
+        """One record a quantity: scene and poses (`Picture.row`), and what is told of it (`Forecast.as_row`)."""
+        return [self.picture.row | each.as_row() for each in self.measurands]
 
     @property
     def told(self) -> str:
@@ -274,7 +279,7 @@ def predict(
         measurands=told,
         covariance=covariance,
         covariance_object=covariance_object,
-        units=scene.units,
+        picture=picture,
     )
 
 

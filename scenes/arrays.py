@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from scenes.errors import InvalidInput
+from scenes.errors import InvalidInput, given
 
 BRIGHTEST = 1e15  # grey levels; beyond, squares of them and single precision overflow
-_TINY = 1e-150  # below, squares are no ordinary numbers any more; it is 0 for every sensor
+_TINY = 1e-15  # grey levels, the least that a scene may say: of less all is 0
 
 
 def numbers(values: Any, name: str) -> np.ndarray:
@@ -34,6 +36,28 @@ def numbers(values: Any, name: str) -> np.ndarray:
         if isinstance(error, InvalidInput):
             raise
         raise InvalidInput(f"{name} must be of real numbers, got something else") from None
+
+
+def number(value: Any, name: str) -> float:
+    """One finite real number.
+
+    Raises
+    ------
+    InvalidInput
+        If it is anything else.
+
+    Examples
+    --------
+    >>> number(np.float32(2), "p")
+    2.0
+    """
+    try:
+        found = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise InvalidInput(f"{name} must be a finite number, got {given(value)}")
+    return found
 
 
 def _kind(array: np.ndarray, values: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 from scenes.units import Unit, in_unit
@@ -49,6 +50,19 @@ def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
     if not focal < away:
         raise ValueError(f"camera.focal_length_mm must be less than the distance, {away:g} mm, got {focal:g}")
     return _said(camera, "focal_px", focal * away / (away - focal) / pitch * 1000, "focal_length_mm")
+
+
+def not_derived(camera: dict[str, Any], given: Collection[str]) -> dict[str, Any]:
+    """A completed camera's table of which some keys are given anew, without what follows from the sheet: it follows
+    anew."""
+    follows = set()
+    if camera.get("focal_length_mm") is not None:
+        follows.add("focal_px")
+    if "working_distance_mm" in given and camera["working_distance_mm"] is not None:
+        follows.add("distance")
+    if camera.get("sensor_size_mm") is not None and {"sensor_size_mm", "pixel_pitch_um"} & set(given):
+        follows |= {"width", "height"}
+    return {key: value for key, value in camera.items() if key in given or key not in follows}
 
 
 def _number(value: Any) -> bool:

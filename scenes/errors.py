@@ -61,13 +61,26 @@ def one_line(text: str, most: int = _MOST) -> str:
     return shown if len(shown) <= 2 * most else f"{shown[:most]} ..."
 
 
-def describe(error: ValidationError) -> str:
-    """First problem of a pydantic report as one line "key must be ..., got ..."."""
+def given(value: Any) -> str:
+    """What was given, for a message; Python prints no whole number of more than 4,300 digits.
+
+    >>> given("x"), given(10**5000)
+    ("'x'", 'a whole number of too many digits')
+    """
+    try:
+        return repr(value)
+    except ValueError:
+        return "a whole number of too many digits"
+
+
+def describe(error: ValidationError, *where: int | str) -> str:
+    """First problem of a pydantic report as one line "key must be ..., got ..."; ``where`` what was checked stands."""
     problem = error.errors(include_url=False)[0]
+    location = (*where, *problem["loc"])
     if problem["type"] == "value_error" and " must " in str(problem["ctx"]["error"]):
         text = str(problem["ctx"]["error"])
-        return text if not problem["loc"] or "." in text.split(" must ")[0] else f"{_key(problem['loc'])}: {text}"
-    return f"{_key(problem['loc'])} must be {_requirement(problem)}, got {_shown(problem)}"
+        return text if not location or "." in text.split(" must ")[0] else f"{_key(location)}: {text}"
+    return f"{_key(location)} must be {_requirement(problem)}, got {_shown(problem)}"
 
 
 def _key(location: tuple[int | str, ...]) -> str:
@@ -94,5 +107,5 @@ def _requirement(problem: Any) -> str:
 def _shown(problem: Any) -> str:
     if problem["type"] == "missing":
         return "nothing"
-    text = repr(problem["input"])
+    text = given(problem["input"])
     return text if len(text) <= 80 else text[:77] + "..."

@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from scenes.camera import MOST_PIXELS as _MOST_PIXELS
+from scenes.camera import Camera
 from scenes.errors import InvalidInput
 from scenes.files import Unreadable, opened, read_bytes
 from scenes.image_header import Header, header, turned
@@ -21,7 +23,23 @@ from scenes.image_header import Header, header, turned
 _MOST_BYTES = 8 * _MOST_PIXELS + 10_000  # the largest image as float64, with a header
 
 
-def read(path: Path) -> np.ndarray:
+class WrongSize(InvalidInput):
+    """An image that has not the size of what it is to go with."""
+
+
+class Size(NamedTuple):
+    """Of an image, px, and what has it."""
+
+    height: int
+    width: int
+    of: str = "the camera"
+
+    @classmethod
+    def of_camera(cls, camera: Camera) -> Size:
+        return cls(camera.height, camera.width)
+
+
+def read(path: Path, size: Size | None = None) -> np.ndarray:
     """Grey levels of an image file as they are written, float64, shape (height, width); colour becomes grey.
 
     Turned as the file says that it is to be seen.
@@ -29,27 +47,27 @@ def read(path: Path) -> np.ndarray:
     Raises
     ------
     InvalidInput
-        If the file cannot be read as an image.
+        If the file cannot be read as an image, or has not the given size.
     """
-    image, _ = decoded(path)
+    image, _ = decoded(path, size)
     if image.ndim == 3:
         image = _grey(path, image)
     with np.errstate(invalid="ignore"):  # signalling NaNs
         return image.astype(float)
 
 
-def decoded(path: Path) -> tuple[np.ndarray, Header]:
+def decoded(path: Path, size: Size | None = None) -> tuple[np.ndarray, Header]:
     """The numbers in an image file, (height, width) or (height, width, channels), and what else it says.
 
-    Channels are blue, green, red, as OpenCV has them.
+    Channels are blue, green, red, as OpenCV has them. Where its header tells of another size nothing is decoded.
 
     Raises
     ------
     InvalidInput
-        If the file cannot be read as an image.
+        If the file cannot be read as an image; `WrongSize` if it has not the given size.
     """
     try:
-        image, told = (_array(path), Header(())) if path.suffix.lower() == ".npy" else _decoded(path)
+        image, told = (_array(path, size), Header(())) if path.suffix.lower() == ".npy" else _decoded(path, size)
     except Unreadable as error:
         raise InvalidInput(f"{path} must be a readable image, got: {error.reason}") from None
     except InvalidInput:
@@ -59,26 +77,29 @@ def decoded(path: Path) -> tuple[np.ndarray, Header]:
         raise InvalidInput(f"{path} must be a readable image, got: {reason}") from None
     if image is None or image.ndim not in (2, 3) or image.dtype.kind not in "uif" or not image.size:
         raise InvalidInput(f"{path} must be a readable image, got something else")
-    return turned(image, told.orientation), told
+    image = turned(image, told.orientation)
+    if size is not None and image.shape[:2] != size[:2]:
+        raise _wrong(path, size, image.shape)
+    return image, told
 
 
-def _array(path: Path) -> np.ndarray:
+def _array(path: Path, size: Size | None) -> np.ndarray:
     """What a .npy file holds; its header is not believed before the file is as large as it says."""
-    with opened(path, _MOST_BYTES) as (file, size):
+    with opened(path, _MOST_BYTES) as (file, length):
         version = np.lib.format.read_magic(file)
         reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, by_columns, kind = reader(file, max_header_size=10_000)
-        _check_size(path, shape)
-        if kind.hasobject or math.prod(shape) * kind.itemsize > size:
+        _check_size(path, shape, size)
+        if kind.hasobject or math.prod(shape) * kind.itemsize > length:
             raise ValueError("objects, or fewer bytes than its header tells")
         flat = np.frombuffer(file.read(math.prod(shape) * kind.itemsize), kind)
         return flat.reshape(shape, order="F" if by_columns else "C")
 
 
-def _decoded(path: Path) -> tuple[np.ndarray | None, Header]:
+def _decoded(path: Path, size: Size | None) -> tuple[np.ndarray | None, Header]:
     data = read_bytes(path, _MOST_BYTES)
     told = header(data)
-    _check_size(path, told.size)
+    _check_size(path, told.size[::-1], size)
     with _silent():
         return (cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None), told
 
@@ -107,6 +128,13 @@ def _silent() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _check_size(path: Path, shape: tuple[int, ...]) -> None:
+def _check_size(path: Path, shape: tuple[int, ...], size: Size | None) -> None:
+    """What a header says, before any pixel is looked at; it may still be turned."""
     if math.prod(shape) > _MOST_PIXELS:
         raise InvalidInput(f"{path} must be an image of at most {_MOST_PIXELS} pixels, got more")
+    if size is not None and len(shape) > 1 and sorted(shape[:2]) != sorted(size[:2]):
+        raise _wrong(path, size, shape)
+
+
+def _wrong(path: Path, size: Size, shape: tuple[int, ...]) -> WrongSize:
+    return WrongSize(f"{path} must be {size.width} x {size.height} px as {size.of}, got {shape[1]} x {shape[0]}")

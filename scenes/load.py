@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from scenes.errors import InvalidInput, describe
+from scenes.errors import InvalidInput, describe, given
 from scenes.files import read_toml
 from scenes.scene import Scene
 
@@ -54,6 +54,8 @@ def from_document(path: Path, document: dict[str, Any]) -> Scene:
 
 def find(source: str | Path) -> Path:
     """Path of a scene's file; errors as of `load`, if there can be none."""
+    if not isinstance(source, str | Path):
+        raise InvalidInput(f"scene must be a name or a path, got {given(source)}")
     if str(source) in names():
         return BUNDLED / f"{source}.toml"
     path = Path(source)

@@ -68,7 +68,7 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
     if name in _SHEET and changed.camera.focal_length_mm is not None:
         sheet = changed.camera.model_dump(include={"distance", "pixel_pitch_um", "focal_length_mm"})
         focal = completed(sheet, scene.units)["focal_px"]
-        return changed.model_copy(update={"camera": changed.camera.model_copy(update={"focal_px": focal})})
+        return changed.tried(camera=changed.camera.tried(focal_px=focal))
     if name in _TWICE:
         scale = value / number_at(scene, key)
         return with_number(changed, "camera.distance", scene.camera.distance * scale)
@@ -87,4 +87,4 @@ def _changed(at: Any, steps: list[str | int], value: float) -> Any:
     step, inner = steps[0], _changed(_inner(at, steps[0]), steps[1:], value)
     if isinstance(step, int):
         return (*at[:step], inner, *at[step + 1 :])
-    return at.model_copy(update={"several_lights" if step == "lights" else step: inner})
+    return at.tried(**{"several_lights" if step == "lights" else step: inner})

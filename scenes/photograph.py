@@ -43,7 +43,13 @@ class Photograph:
     tone_known: bool = True
 
 
-def read(path: Path, gamma: str | None = None, channel: str | None = None, bayer: str | None = None) -> Photograph:
+def read(
+    path: Path,
+    gamma: str | None = None,
+    channel: str | None = None,
+    bayer: str | None = None,
+    size: image_file.Size | None = None,
+) -> Photograph:
     """Read a photograph: turned as its EXIF data say, its tone curve undone, one channel of it.
 
     Parameters
@@ -56,15 +62,17 @@ def read(path: Path, gamma: str | None = None, channel: str | None = None, bayer
         That with the largest contrast over noise where not given.
     bayer : {"RGGB", "BGGR", "GRBG", "GBRG"}, optional
         The file is a sensor's raw mosaic, whose first pixels these are.
+    size : Size, optional
+        That it must have; looked at before it is decoded.
 
     Raises
     ------
     InvalidInput
-        If the file is no image, or an option is none of these or does not go with it.
+        If the file is no image or not of that size, or an option is none of these or does not go with it.
     """
     if channel is not None and channel not in CHANNELS:
         raise InvalidInput(f"--channel must be one of {', '.join(CHANNELS)}, got {channel!r}")
-    image, told = image_file.decoded(path)
+    image, told = image_file.decoded(path, size)
     curve, by = (tone.asked(gamma), "as asked") if gamma is not None else (told.tone, told.told_by)
     full = _full_scale(image, curve)
     if full is None and not curve.plain and gamma is None:

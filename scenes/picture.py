@@ -11,6 +11,7 @@ import numpy as np
 from scenes.errors import InvalidInput
 from scenes.lights import Backlight, Luminaire
 from scenes.pose import Pose, several
+from scenes.results import poses
 from scenes.scene import Scene
 
 
@@ -69,6 +70,17 @@ class Picture:
     def light(self) -> Pose | None:
         """The first light's pose; None where it is not known."""
         return self.lights[0] if self.lights else None
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The scene's name and the poses of sensor and free lights, degrees, as columns of a table.
+
+        >>> import scenes
+        >>> Picture.of(scenes.load("task1"), (30, 135)).row["light_polar"] is None
+        True
+        """
+        free = tuple(self.lights[i] for i in self.scene.free) if self.lights else ((None, None),) * len(self.scene.free)
+        return {"scene": self.scene.name, **poses(self.sensor, free)}
 
     def unlit(self) -> Picture:
         """The same picture, its lights not known."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from scenes.errors import InvalidInput
+from scenes.errors import InvalidInput, given
 
 
 @dataclass(frozen=True, order=True)
@@ -40,8 +40,8 @@ class Pose:
     def __post_init__(self) -> None:
         for name in ("polar_deg", "azimuth_deg"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise InvalidInput(f"{name} must be a finite number of degrees, got {value!r}")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+                raise InvalidInput(f"{name} must be a finite number of degrees, got {given(value)}")
             object.__setattr__(self, name, float(value))
         if not 0 <= self.polar_deg <= 180:
             raise InvalidInput(f"polar_deg must be between 0 and 180, got {self.polar_deg:g}")
@@ -54,7 +54,7 @@ class Pose:
         try:
             polar, azimuth = value
         except (TypeError, ValueError):
-            raise InvalidInput(f"pose must be a pair (polar, azimuth) in degrees, got {value!r}") from None
+            raise InvalidInput(f"pose must be a pair (polar, azimuth) in degrees, got {given(value)}") from None
         return cls(polar, azimuth)
 
     def __iter__(self):

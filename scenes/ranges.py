@@ -7,10 +7,12 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
+LEAST_SIGMA = 1e-15  # grey levels; the square of less, and the square of that, would be lost
+
 
 def _none_or_some(value: float) -> float:
-    if 0 < value < 1e-15:  # its square, and the square of that, would be lost
-        raise ValueError(f"noise.sigma must be 0 or at least 1e-15, got {value:g}")
+    if 0 < value < LEAST_SIGMA:
+        raise ValueError(f"noise.sigma must be 0 or at least {LEAST_SIGMA:g}, got {value:g}")
     return value
 
 

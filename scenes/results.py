@@ -55,7 +55,7 @@ class Shown(ABC):
 
 
 def poses(sensor: Any, light: Any) -> dict[str, Any]:
-    """Sensor and light as columns of numbers; several lights are one text.
+    """Sensor and light as columns of numbers; several lights are one text. (None, None) is a pose that is not known.
 
     >>> poses((30, 135), (15, 315))
     {'sensor_polar': 30.0, 'sensor_azimuth': 135.0, 'light_polar': 15.0, 'light_azimuth': 315.0}
@@ -63,10 +63,11 @@ def poses(sensor: Any, light: Any) -> dict[str, Any]:
     '(15, 315) (60, 90)'
     """
     found = dict(zip(("sensor_polar", "sensor_azimuth"), map(float, sensor), strict=True))
-    lights = several(light)
+    lights = tuple(tuple(each) for each in several(light))
     if len(lights) != 1:
-        return found | {"lights": shown(tuple(tuple(each) for each in lights))}
-    return found | dict(zip(("light_polar", "light_azimuth"), map(float, lights[0]), strict=True))
+        return found | {"lights": None if (None, None) in lights else shown(lights)}
+    known = (None if angle is None else float(angle) for angle in lights[0])
+    return found | dict(zip(("light_polar", "light_azimuth"), known, strict=True))
 
 
 def short(value: Any) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.camera import Camera
+from scenes.changes import changed
 from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
 from scenes.features import check_feature, check_quantity
@@ -193,6 +194,38 @@ class Scene(Model):
     def lights(self) -> tuple[AnyLight, ...]:
         """All lights."""
         return self.several_lights or (() if self.light is None else (self.light,))
+
+    def with_(self, **changes: Any) -> Scene:
+        """The scene with some of its keys said anew, checked as a file is.
+
+        A table changes the keys that it has; a list, or a part of another ``kind``, takes the place of the one before.
+        Numbers that carry an uncertainty keep it; ``{"value": 25, "sd": 0.05}`` says another. What follows from a
+        camera's data sheet follows anew. Paths of files are relative to where the program runs.
+
+        Parameters
+        ----------
+        **changes
+            Keys of the scene, or longer ones as error messages name them: ``**{"lights[1].distance": 30}``.
+
+        Raises
+        ------
+        InvalidInput
+            As of `scenes.load`.
+
+        Examples
+        --------
+        >>> import scenes
+        >>> task1 = scenes.load("task1")
+        >>> noisy = task1.with_(noise={"sigma": 2.0}, camera={"blur_px": 1.5})
+        >>> noisy.noise.sigma, noisy.camera.blur_px, noisy.camera.width, task1.camera.blur_px
+        (2.0, 1.5, 256, 0.6)
+        >>> task1.with_(**{"settings[3].light": (20, 300)}).settings[3].light
+        Pose(polar_deg=20.0, azimuth_deg=300.0)
+        >>> task1.with_(noise={"sigma": -1})
+        Traceback (most recent call last):
+        scenes.errors.InvalidInput: noise.sigma must be at least 0, got -1
+        """
+        return changed(self, changes)
 
     def lit_by(self, *lights: AnyLight) -> Scene:
         """The scene with other lights, all else as it is."""

@@ -53,13 +53,13 @@ def read_boards(
     found, left_out = {}, []
     for i, path in enumerate(files):
         try:
-            image = image_file.read(path)
+            image = image_file.read(path, size)
+        except image_file.WrongSize:
+            raise
         except InvalidInput as error:
             left_out.append((path, str(error)))
             continue
-        if size is not None and image.shape != size[1]:
-            raise InvalidInput(f"{path} must be {_size(size[1])} px as {size[0]}, got {_size(image.shape)}")
-        size = size or (path, image.shape)
+        size = size or image_file.Size(*image.shape, of=str(path))
         try:
             board = measure.chessboard(image, shape, noise)
             good = int(board.measured.sum())
@@ -76,8 +76,4 @@ def read_boards(
             f"BOARD must be at least {FEWEST_BOARDS} photographs that show the board, "
             f"got {len(found)} of {len(files)}{first}"
         )
-    return Boards(tuple(found), tuple(found.values()), tuple(left_out), size[1])
-
-
-def _size(shape: tuple[int, ...]) -> str:
-    return f"{shape[1]} x {shape[0]}"
+    return Boards(tuple(found), tuple(found.values()), tuple(left_out), size[:2])

@@ -46,6 +46,14 @@ def best_estimator(scene: Scene) -> str:
     return "arrangement" if is_plain(scene) else "gradient"
 
 
+def known_name(name: str) -> str:
+    """The estimator's name, of a synonym too; raises InvalidInput if there is none of this name."""
+    name = SYNONYMS.get(name, name)
+    if name not in ESTIMATORS:
+        raise InvalidInput(f"estimator must be one of {', '.join(ESTIMATORS)}, got {name!r}")
+    return name
+
+
 def estimator(layout: Layout, name: str, threshold: float = 12.0) -> AnyEstimator:
     """Prepare an estimator.
 
@@ -60,19 +68,20 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> AnyEstimato
     Raises
     ------
     InvalidInput
-        If the name is unknown or the threshold not positive.
+        If the name is unknown or not for such a layout, or the threshold not positive.
     """
-    name = SYNONYMS.get(name, name)
-    if name not in ESTIMATORS:
-        raise InvalidInput(f"estimator must be one of {', '.join(ESTIMATORS)}, got {name!r}")
+    name = known_name(name)
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
     optics = layout.optics
     own_reach = CLEARANCE * edge_blur(optics.blur_px)  # a face less than twice as wide has no pixel of its own level
     if name == "arrangement":
-        if layout.arrangement is not None:
-            return ArrangementEstimator(layout.arrangement, optics.shape, _noisy(optics.sensor))
-        name = "strip"  # things hide or shade each other: each edge by itself
+        if layout.arrangement is None:
+            rest = ", ".join(each for each in ESTIMATORS if each != name)
+            raise InvalidInput(
+                f"estimator must be one of {rest} for what is no convex body before darkness, got {name!r}"
+            )
+        return ArrangementEstimator(layout.arrangement, optics.shape, _noisy(optics.sensor))
     if name == "strip":
         calipers = edge_calipers(layout, own_reach, 0.0, 2 * own_reach)
         parts = [strip_estimator(layout, f, i, own_reach) if _measurable(f) else None for i, f in enumerate(calipers)]

@@ -59,12 +59,12 @@ class Circles:
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
     """A circle or a curved surface of the object in images (n, height, width)."""
-    return _find(images, picture, name, _unmoved(picture, name), _PASSES)
+    return _find(images, picture, name, unmoved(picture, name), _PASSES)
 
 
 def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarray:
     """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width)."""
-    moved = _unmoved(picture, name)
+    moved = unmoved(picture, name)
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
@@ -77,7 +77,7 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarra
     return fit[0][:, taken] @ response[np.flatnonzero(taken)]
 
 
-def _unmoved(picture: Picture, name: str) -> tuple[float, ...]:
+def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
     each = picture.scene.solid.round(name)
     return (0.0,) * (each.count if isinstance(each, Curved) else 3)
 

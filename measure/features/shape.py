@@ -57,9 +57,9 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     Each image is measured by itself: its result does not depend on the others of the stack. Where the edges are not
     within the estimator's capture of their expected place, the layout is moved there first.
     """
-    tool = prepared(layout, name, threshold)
     if not layout.names:
         return nothing(len(images))
+    tool = prepared(layout, name, threshold)
     if isinstance(tool, ArrangementEstimator):
         return find_arranged(images, layout, tool)
     parts = [_find(images[i : i + _BATCH], layout, name, threshold, _PASSES) for i in range(0, len(images), _BATCH)]

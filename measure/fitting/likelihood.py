@@ -85,7 +85,7 @@ class Problem:
         found = []
         for k, shots in enumerate(self.shots):
             signal, dark = self.signal(values, k), self._dark(values, noise)
-            temporal = recorded(noise.model_copy(update={"dark_level": dark}), signal + dark).noise_variance
+            temporal = recorded(noise.tried(dark_level=dark), signal + dark).noise_variance
             temporal = np.broadcast_to(np.maximum(temporal, 1e-6), signal.shape)
             found.append(temporal / shots.count + noise.dsnu**2 + (noise.prnu * np.maximum(signal, 0.0)) ** 2)
         return np.concatenate(found)
@@ -110,7 +110,7 @@ def seen_coarsely(pictures: Pictures, shrink: int, smooth: float) -> Pictures:
         "width": camera.width // shrink, "height": camera.height // shrink, "focal_px": camera.focal_px / shrink,
         "blur_px": float(np.hypot(camera.blur_px / shrink, smooth)),
     }  # fmt: skip
-    return pictures.with_scene(scene.model_copy(update={"camera": camera.model_copy(update=fewer)}))
+    return pictures.with_scene(scene.tried(camera=camera.tried(**fewer)))
 
 
 def most_likely(

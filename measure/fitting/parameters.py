@@ -105,7 +105,7 @@ class Parameters:
                 scene = with_number(scene, each.name, value)
             elif each.kind == "aim":
                 aim = aim + value * self.axes[each.where[0]]
-        return scene.model_copy(update={"camera": scene.camera.model_copy(update={"look_at": tuple(aim.tolist())})})
+        return scene.tried(camera=scene.camera.tried(look_at=tuple(aim.tolist())))
 
     def poses_at(self, values: np.ndarray, k: int) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
         """Sensor's pose (2,) and those of all lights of the k-th picture; polar angles may be beyond the pole."""

@@ -11,6 +11,7 @@ from measure.photo.noise import noise_sigma
 from measure.photo.patches import Patches, polynomials, smooth_patches
 from measure.photo.rounding import before_rounding
 from scenes import Noise
+from scenes.ranges import LEAST_SIGMA
 
 _GROUPS, _LEAST = 16, 30  # groups of patches of like level, and how many patches make one
 _CHUNK = 2**16  # pixels looked at at a time
@@ -63,8 +64,9 @@ class NoiseCurve:
     def noise(self) -> Noise:
         """The sensor's noise for the estimators; where it falls, the darkest level's for all."""
         rounded = 0.0 if self.bits is not None else self.step**2 / 12
-        sigma, gain = float(np.sqrt(self.dark + rounded)), max(self.gain, 0.0)
-        return Noise(sigma=sigma, bits=self.bits, gain=gain, dark_level=self.dark_level)
+        sigma = float(np.sqrt(self.dark + rounded))
+        sigma = max(sigma, LEAST_SIGMA) if sigma else 0.0  # of levels far below any sensor's
+        return Noise(sigma=sigma, bits=self.bits, gain=max(self.gain, 0.0), dark_level=self.dark_level)
 
 
 def noise_curve(image: np.ndarray, full: float | None = None) -> NoiseCurve:

@@ -22,6 +22,7 @@ from planner.uncertainty.groups import Group
 from planner.uncertainty.groups import Source as EngineInput
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import InvalidInput, Picture, Scene, status
+from scenes.arrays import finite
 from scenes.results import Shown, value
 
 CALIBRATION = "camera calibration"
@@ -62,8 +63,9 @@ class SceneBudget(Shown):
         return next(each for each in self.measurands if each.name == name)
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record a measurand and source (`Budget.as_rows`)."""
-        return [{"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
+        """One record a measurand and source: scene and poses (`Picture.row`), and the source's (`Budget.as_rows`)."""
+        where = self.picture.row
+        return [where | {"measurand": each.name, "unit": each.unit, **row} for each in self for row in each.as_rows()]
 
     def _line(self) -> str:
         return "; ".join(
@@ -137,6 +139,9 @@ def budget(
     ['sensor_distance', 'pixel noise', 'model error']
     """
     picture = Picture.of(scene, sensor, light)
+    variances, biases = (_checked(*told, picture) for told in (("variances", variances), ("biases", biases)))
+    if variances is not None and variances.min() < 0:
+        raise InvalidInput(f"variances must be at least 0, got {variances.min():g}")
     prediction = predict(picture)
     for each in prediction.measurands:
         if not np.isfinite(each.variance_object):
@@ -156,6 +161,13 @@ def budget(
         budgets.append(combined(each.name, each.unit, each.value_object, whole, by_name, p))
     statuses = statuses or tuple(each.status for each in told.measurands)
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets), statuses)
+
+
+def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:
+    count = len(picture.scene.quantities)
+    if values is not None and finite(values, name).shape != (count,):
+        raise InvalidInput(f"{name} must be one for each of {count} measurands, got shape {np.shape(values)}")
+    return None if values is None else finite(values, name)
 
 
 def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:

@@ -11,6 +11,7 @@ from planner.models.calibrated import calibrated
 from planner.models.errors import Errors
 from planner.models.paper import paper
 from scenes import InvalidInput
+from scenes.errors import given
 
 ModelName = Literal["paper", "calibrated", "bound"]
 DEFAULT_MODEL: ModelName = "calibrated"
@@ -26,5 +27,5 @@ def variance_model(name: str) -> Callable[[Pictures], Errors]:
         If there is no such model.
     """
     if not isinstance(name, str) or name not in _MODELS:
-        raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {name!r}")
+        raise InvalidInput(f"model must be one of {', '.join(get_args(ModelName))}, got {given(name)}")
     return _MODELS[name]

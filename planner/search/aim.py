@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from scenes import InvalidInput, Quantity
+from scenes.errors import given
 
 Objective = Literal["object", "image"]
 Over = Literal["minimax", "sum"]
@@ -75,5 +76,5 @@ class Aim:
 
 
 def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {value!r}")
+    if not isinstance(value, str) or value not in choices:
+        raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {given(value)}")

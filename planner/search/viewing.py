@@ -10,6 +10,8 @@ from scipy.spatial import KDTree
 
 from planner.imaging.projection import direction
 from scenes import InvalidInput
+from scenes.arrays import finite, number
+from scenes.errors import given
 
 _NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them on the rings above and below
 
@@ -40,8 +42,10 @@ class ViewingSpace:
     polar_deg: tuple[float, float] = (0.0, 180.0)
 
     def __post_init__(self) -> None:
-        if not 0.1 <= self.step_deg <= 90:
+        if not 0.1 <= number(self.step_deg, "step_deg") <= 90:
             raise InvalidInput(f"step must be between 0.1 and 90 degrees, got {self.step_deg}")
+        if finite(self.polar_deg, "polar range").shape != (2,):
+            raise InvalidInput(f"polar range must be two angles, got {given(self.polar_deg)}")
         if not 0 <= self.polar_deg[0] <= self.polar_deg[1] <= 180:
             raise InvalidInput(f"polar range must be two rising angles between 0 and 180, got {self.polar_deg}")
 

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import stats
 
 from planner.uncertainty.groups import Group, Source, members
+from scenes.arrays import number
 from scenes.errors import InvalidInput
 from scenes.results import Shown, value
 
@@ -232,7 +233,7 @@ def _check(sources: tuple[Source, ...], sensitivities: dict[str, float], value: 
         raise InvalidInput(f"sensitivities must be of known inputs, got {unknown[0]}")
     if not math.isfinite(value):
         raise InvalidInput(f"value must be a finite number, got {value}")
-    if not 0 < p < 1:
+    if not 0 < number(p, "p") < 1:
         raise InvalidInput(f"p must be between 0 and 1, got {p}")
 
 

@@ -26,6 +26,7 @@ from render.phenomena.shading import (
 )
 from render.phenomena.transport import CastShadow, FloorReflectance, Interreflection
 from scenes import InvalidInput, Picture, Scene
+from scenes.errors import given
 
 REGISTER: dict[str, Effect] = {
     effect.name: effect
@@ -82,6 +83,8 @@ def effects(
     InvalidInput
         If the scene has no settings, or an effect is unknown.
     """
+    if not isinstance(scene, Scene):
+        raise InvalidInput(f"scene must be a Scene, got {given(scene)}")
     asked = None if wanted == "auto" else named(wanted)
     if not scene.settings:
         raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")

@@ -550,12 +550,35 @@ def test_what_is_no_image_is_refused(what, use, request):
         use(ARRAYS[what])
 
 
-def test_denormal_images_are_dark_without_a_warning():
-    """Warnings are errors here."""
-    found = measure.distance(PICTURE * 1e-320, scenes.load("task1"), (30, 135))
+@pytest.mark.parametrize("scale", [1e-320, 1e-40])
+def test_images_of_less_than_any_scene_may_say_are_dark_without_a_warning(scale):
+    """Warnings are errors here; of 1e-40 grey levels the noise was once estimated, and was none that could be made."""
+    dark = (PICTURE + np.random.default_rng(1).standard_normal(PICTURE.shape)) * scale
+    found = measure.distance(dark, scenes.load("task1"), (30, 135))
     assert np.isnan(found.value_px)
     with pytest.raises(InvalidInput):
-        measure.measure_quadrilateral(PICTURE * 1e-320)
+        measure.measure_quadrilateral(dark)
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda: scenes.load(3), "scene must be a name or a path, got 3"),
+        (lambda: planner.ViewingSpace("15"), "step_deg must be a finite number, got '15'"),
+        (lambda: planner.ViewingSpace(15, (0, 10, 20)), "polar range must be two angles"),
+        (lambda: planner.pose_map(scenes.load("task1"), sensor=(30, 135), space=15), "space must be a ViewingSpace"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), p="x"), "p must be a finite number"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), variances=[1, 2]), "variances must be one"),
+        (lambda: planner.budget(scenes.load("task1"), (30, 135), (15, 315), variances=[-1]), "variances must be at"),
+        (lambda: planner.predict(scenes.load("task1"), (30, 135), (15, 315), 10**5000), "model must be one of"),
+        (lambda: measure.region_of_interest(scenes.load("task1"), (30, 135), estimators="canny"), "estimators must be"),
+        (lambda: render.effects("task1"), "scene must be a Scene, got 'task1'"),
+        (lambda: scenes.Pose(10**5000, 0), "polar_deg must be a finite number of degrees, got a whole number of too"),
+    ],
+)  # fmt: skip
+def test_absurd_arguments_are_refused_in_one_line(use, message):
+    with pytest.raises(InvalidInput, match=message):
+        use()
 
 
 def test_array_files(tmp_path):

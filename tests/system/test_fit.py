@@ -150,9 +150,10 @@ def _written(hidden, folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["fit", "bracket", "x.npy", "--sensor", "30,90", "--light", "30,90"], "scene must be one convex body"),
-        (["fit", "task1", "x.npy"], "photographs must be 256 x 240 px as the scene's camera, got 5 x 4"),
-        (["fit", "task1", "x.npy", "--free", "zoom"], "free must be some of focal, k1, got 'zoom'"),
+        (["fit", "bracket", "whole.npy", "--sensor", "30,90", "--light", "30,90"], "scene must be one convex body"),
+        (["fit", "task1", "x.npy"], "x.npy must be 256 x 240 px as the camera, got 5 x 4"),
+        (["measure", "x.npy", "task1", "--sensor", "30,90"], "x.npy must be 256 x 240 px as the camera, got 5 x 4"),
+        (["fit", "task1", "whole.npy", "--free", "zoom"], "free must be some of focal, k1, got 'zoom'"),
         (["fit", "task1", "x.npy", "-o", "x.txt"], "--output must end in .toml, got 'x.txt'"),
         (["predict", "task1", "--light", "30,90"], "--sensor must be given with --light, got none"),
     ],
@@ -160,6 +161,7 @@ def _written(hidden, folder):
 def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("x.npy", np.zeros((4, 5)))
+    np.save("whole.npy", np.zeros((240, 256)))
     with pytest.raises(scenes.InvalidInput, match=message):
         app(arguments, standalone_mode=False)
 

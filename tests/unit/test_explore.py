@@ -1,13 +1,17 @@
 """What the page of `ice explore` says, without a browser."""
 
 import asyncio
+import json
 import math
+import re
+import socket
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from aiohttp import ClientSession, CookieJar, web
 from aiohttp.test_utils import TestServer
+from yarl import URL
 
 import planner
 import scenes
@@ -18,6 +22,8 @@ from scenes.status import MEANINGS
 from validation.batch.work import Chunk, Clean, Found, Packed
 from validation.explore import answers, best, effects, preview, prove, save, session, sphere
 from validation.explore.gate import COOKIE, gate
+from validation.explore.messages import Message
+from validation.explore.server import serve
 from validation.explore.state import SENSOR, State
 
 
@@ -50,6 +56,31 @@ def test_states_of_messages(plate):
 def test_messages_that_are_none(plate, key, value, message):
     with pytest.raises(InvalidInput, match=message):
         State.of_message(plate, State.first(plate).to_message() | {key: value})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "message must be JSON, got '{'"),
+        ("[" * 9000, "message must be JSON"),
+        ("9" * 5000, "message must be JSON"),
+        ("[]", "message must be an object"),
+        ('{"type": ["state"]}', "type must be one of 'state'"),
+        ('{"type": "state", "number": "3"}', "number must be a whole number, got '3'"),
+        ('{"type": "state", "number": NaN}', "number must be a whole number, got nan"),
+        ('{"type": "save", "replace": "yes"}', "replace must be true or false, got 'yes'"),
+        ('{"type": "save", "path": "/etc/passwd"}', "path must be a known key"),
+    ],
+)
+def test_what_is_no_message_is_refused_in_one_line(text, message):
+    with pytest.raises(InvalidInput, match=re.escape(message)):
+        Message.of(text)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, -(10**5000)], ids="abcd")
+def test_a_pose_of_no_number_or_one_too_large_is_refused_in_one_line(task1, value):
+    with pytest.raises(InvalidInput, match="azimuth_deg must be a finite number of degrees"):
+        State.of_message(task1, State.first(task1).to_message() | {"sensor": [30, value]})
 
 
 def test_no_ratio_without_a_tolerance(task1, plate):
@@ -216,6 +247,20 @@ def test_save(name, tmp_path):
     assert scenes.load(other).settings[-1].sensor == Pose(22, 3)
 
 
+@pytest.mark.parametrize("there", [True, False], ids=["a file", "nothing"])
+def test_save_does_not_write_through_a_link_out_of_its_folder(tmp_path, task1, there):
+    folder, outside = tmp_path / "folder", tmp_path / "outside"
+    folder.mkdir()
+    (folder / "task1-explored.toml").symlink_to(outside)
+    if there:
+        outside.write_text("theirs")
+    with pytest.raises(save.Exists, match="must be a new file"):
+        save.save("task1", State.first(task1), folder)
+    with pytest.raises(InvalidInput, match="must be a file that can be written, got a link"):
+        save.save("task1", State.first(task1), folder, replace=True)
+    assert (outside.read_text() if there else outside.exists()) == ("theirs" if there else False)
+
+
 def test_save_to_where_nothing_can_be(tmp_path, task1):
     with pytest.raises(InvalidInput, match="must be a file that can be written"):
         save.save("task1", State.first(task1), tmp_path / "none")
@@ -253,6 +298,41 @@ def test_gate_of_this_machine():
     assert statuses(None, asked) == [200, 200, 403, 200, 403, 403]
 
 
+def first_line(port, request):
+    with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
+        connection.sendall(request)
+        return connection.recv(4096).split(b"\r\n")[0].decode()
+
+
+HOSTILE = {  # what is sent, and the status of the answer; without a token those of this machine come in
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1:99999\r\n\r\n": 403,
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1:\xb2\r\n\r\n": 403,
+    b"GET / HTTP/1.1\r\nHost: \xff\r\n\r\n": 403,
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: \xff\r\n\r\n": 403,
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: ice_explore=\xff\xfe\r\n\r\n": 200,
+    b"GET /?token=\xff HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n": 400,
+    b"GET http://127.0.0.1:99999/ HTTP/1.1\r\n\r\n": 400,
+    b"\x16\x03\x01 nonsense\r\n\r\n": 400,
+}
+
+
+@pytest.mark.parametrize("token", [None, "right"])
+def test_hostile_requests_are_answered_without_a_traceback(task1, tmp_path, caplog, token):
+    async def run():
+        stop, address = asyncio.Event(), asyncio.get_running_loop().create_future()
+        place = session.Place(task1, "task1", tmp_path)
+        serving = asyncio.create_task(serve(place, "127.0.0.1", 0, token, address.set_result, stop))
+        port = URL(await address).port
+        found = [await asyncio.to_thread(first_line, port, request) for request in HOSTILE]
+        stop.set()
+        await serving
+        return [int(line.split()[1]) for line in found]
+
+    wanted = [403 if token and status == 200 else status for status in HOSTILE.values()]
+    assert asyncio.run(run()) == wanted
+    assert not caplog.records
+
+
 def test_gate_with_a_token():
     asked = [
         ("/", {}), ("/?token=wrong", {}), ("/?token=right", {}), ("/", {"Cookie": f"{COOKIE}=right"}),
@@ -282,8 +362,8 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
         async def messages():
             for number in range(1, 31):
                 state = moved(State.first(task1), (15 + number, 270)).to_message()
-                yield {"type": "state", "state": state, "number": number}
-            yield {"type": "nonsense"}
+                yield json.dumps({"type": "state", "state": state, "number": number})
+            yield '{"type": "nonsense"}'
             await asyncio.wait_for(ready.wait(), 10)
 
         place = session.Place(task1, "task1", None)
@@ -295,7 +375,7 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
     assert answered[-1] == 30
     assert len(answered) <= 2
     assert sent[0]["type"] == "scene"
-    assert any("type must be state, best" in message.get("text", "") for message in sent)
+    assert any("type must be one of 'state', 'best'" in message.get("text", "") for message in sent)
 
 
 def test_work_can_be_stopped(task1):
@@ -322,11 +402,11 @@ def test_work_can_be_stopped(task1):
                 pass
 
         async def messages():
-            yield {"type": "prove"}
+            yield '{"type": "prove"}'
             await until("job", state="begun")
-            yield {"type": "render"}
+            yield '{"type": "render"}'
             await until("told")
-            yield {"type": "cancel"}
+            yield '{"type": "cancel"}'
             await until("job", state="stopped")
 
         await session.Session(session.Place(task1, "task1", None), Tools(), send).run(messages())

@@ -26,6 +26,7 @@ def results(task1):
         "Measurement": measure.distance(dark, task1, *POSES),
         "Measurements": measure.measure(dark, task1, *POSES, "gradient"),
         "SceneBudget": planner.budget(task1.model_copy(update={"uncertainty": known}), *POSES),
+        "Map": planner.pose_map(task1, sensor=POSES[0], space=planner.ViewingSpace(30), biased=False),
         "Budget": budget("<b>", "um", 200.0, [Input("repeats", 0.0, 3.0)], {"repeats": 1.0}),
     }
 
@@ -74,6 +75,27 @@ def test_rows(results):
     told = results["Prediction"].measurands[0]
     assert first["sigma"] == pytest.approx(math.sqrt(told.variance_object))
     assert first["plus"] == told.tolerance.plus
+
+
+def test_rows_say_of_which_scene_and_from_where_they_are(results):
+    """Each row with its own poses; None where nobody said where the light is."""
+    for kind in ("Measurement", "Measurements", "SceneBudget"):
+        for row in results[kind].as_rows():
+            assert list(row.values())[:5] == ["task1", 30.0, 135.0, 15.0, 315.0]
+    columns = ["scene", "sensor_polar", "sensor_azimuth", "light_polar", "light_azimuth"]
+    for kind in ("Prediction", "Plan", "Measurement", "Measurements", "SceneBudget", "Map"):
+        assert all(list(row)[:5] == columns for row in results[kind].as_rows())
+    assert list(results["Prediction"].as_rows()[3].values())[:5] == ["plate", 30.0, 80.0, 35.0, 335.0]
+    there = results["Map"]
+    rows = there.as_rows()
+    assert [(row["light_polar"], row["light_azimuth"]) for row in rows] == list(map(tuple, there.space.poses))
+    assert {(row["sensor_polar"], row["sensor_azimuth"]) for row in rows} == {POSES[0]}
+
+
+def test_lights_that_nobody_told_of_are_none(task1):
+    one, two = (scenes.Picture.of(scenes.load(name), POSES[0]).row for name in ("task1", "two_lights"))
+    assert (one["light_polar"], one["light_azimuth"]) == (None, None)
+    assert two["lights"] is None
 
 
 def test_to_frame_without_pandas(results, monkeypatch):

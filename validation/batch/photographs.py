@@ -20,6 +20,7 @@ from pydantic import Field, ValidationError
 from scenes import InvalidInput, Pose, Scene, photograph
 from scenes.errors import describe
 from scenes.files import read_toml
+from scenes.image_file import Size
 from scenes.model import Model
 from scenes.scene import Setting
 from validation.batch.campaign import Campaign
@@ -184,10 +185,10 @@ def _with_settings(scene: Scene, named: Sequence[tuple[str, Setting]]) -> Scene:
 
 def _readable(scene: Scene, wanted: list[list[Path]], progress) -> tuple[list[tuple[str, ...]], list[str]]:
     """Those files of each setting that are images of the camera's size; of the others why not."""
-    size, total, done = (scene.camera.height, scene.camera.width), sum(map(len, wanted)), 0
+    size, total, done = Size.of_camera(scene.camera), sum(map(len, wanted)), 0
     good, lost = [], []
     for files in wanted:
-        kept = []
+        kept: list[str] = []
         for path in files:
             try:
                 _read(path, size)
@@ -201,12 +202,8 @@ def _readable(scene: Scene, wanted: list[list[Path]], progress) -> tuple[list[tu
     return good, lost
 
 
-def _read(path: Path, size: tuple[int, int]) -> np.ndarray:
-    image = photograph.read(path).levels
-    if image.shape != size:
-        raise InvalidInput(
-            f"{path} must be {size[1]} x {size[0]} px as the camera, got {image.shape[1]} x {image.shape[0]}"
-        )
+def _read(path: Path, size: Size) -> np.ndarray:
+    image = photograph.read(path, size=size).levels
     if not np.isfinite(image).all():
         raise InvalidInput(f"{path} must be of finite grey levels, got NaN or infinity")
     return image
@@ -214,8 +211,8 @@ def _read(path: Path, size: tuple[int, int]) -> np.ndarray:
 
 def mean(scene: Scene, files: Sequence[str]) -> np.ndarray:
     """Mean photograph, grey levels (height, width): what there is in the place of a noise-free image."""
-    size = scene.camera.height, scene.camera.width
-    total = np.zeros(size)
+    size = Size.of_camera(scene.camera)
+    total = np.zeros(size[:2])
     for name in files:
         total += _read(Path(name), size)
     return total / len(files)
@@ -223,7 +220,7 @@ def mean(scene: Scene, files: Sequence[str]) -> np.ndarray:
 
 def exposures(scene: Scene, files: Sequence[str]) -> Callable[[np.random.Generator, int], np.ndarray]:
     """Takes photographs one after another: called as (rng, count), without making use of the first."""
-    left, size = iter(files), (scene.camera.height, scene.camera.width)
+    left, size = iter(files), Size.of_camera(scene.camera)
 
     def take(_rng: np.random.Generator, count: int) -> np.ndarray:
         return np.stack([_read(Path(next(left)), size) for _ in range(count)])

@@ -10,6 +10,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput
+from scenes.image_file import Size
 from scenes.photograph import read
 from validation.cli import recorded
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
@@ -52,7 +53,8 @@ def fit_command(
     check_file("--output", output, ".toml")
     check_file("--residuals", residuals, ".png")
     loaded = scenes.load(scene)
-    images = [read(path, gamma, channel) for path in photographs]
+    size = Size.of_camera(loaded.camera)
+    images = [read(path, gamma, channel, size=size) for path in photographs]
     import measure
 
     found = measure.fit(loaded, images, *poses, free=tuple(filter(None, free.split(","))), noise=noise)

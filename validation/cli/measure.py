@@ -11,6 +11,7 @@ import typer
 import scenes
 import scenes.photograph
 from scenes import InvalidInput
+from scenes.image_file import Size
 from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
@@ -97,7 +98,7 @@ def measure_command(
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
     known = scenes.load(scene)
-    picture = picture_file.read(file)
+    picture = picture_file.read(file, Size.of_camera(known.camera))
     found = measure.measure(picture, known, *poses, estimator, threshold)
     rows = measurands.facts(found)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}

@@ -50,7 +50,7 @@ def gate(token: str | None) -> Callable:
 
     @web.middleware
     async def middleware(request: web.Request, handler: Handler) -> web.StreamResponse:
-        refused = _refused(request, token)
+        refused = refusal(request, token)
         if refused:
             return web.Response(status=403, text=f"{refused}\n", headers=_HEADERS)
         if token and "token" in request.query and request.path == "/":
@@ -65,15 +65,17 @@ def gate(token: str | None) -> Callable:
     return middleware
 
 
-def _refused(request: web.Request, token: str | None) -> str:
+def refusal(request: web.Request, token: str | None) -> str:
     """Why not; empty if it may come in."""
+    try:
+        name, given = request.url.host or "", request.query.get("token") or request.cookies.get(COOKIE, "")
+    except ValueError:  # a port beyond 65535, a bracket that does not close
+        return f"host must be one that can be, got {request.host[:80]!r}"
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{request.host}":
-        return f"origin must be http://{request.host}, got {origin[:80]!r}"
+        return f"origin must be that of this page, got {origin[:80]!r}"
     if token is None:
-        name = request.url.host or ""
         return "" if is_loopback(name) else f"host must be a loopback address, got {name[:80]!r}"
-    given = request.query.get("token") or request.cookies.get(COOKIE, "")
-    if not hmac.compare_digest(given.encode(), token.encode()):
+    if not hmac.compare_digest(given.encode(errors="surrogateescape"), token.encode()):
         return "token must be the one that ice explore printed, got another or none"
     return ""

@@ -13,6 +13,8 @@ from scenes import InvalidInput, Pose, Scene
 from scenes.load import find, from_document
 from validation.explore.state import State
 
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+
 
 class Exists(InvalidInput):
     """A file is there already, and nobody said that it may be replaced."""
@@ -40,16 +42,24 @@ def save(source: str, state: State, directory: Path, *, replace: bool = False) -
     """
     origin = find(source)
     target = directory / f"{origin.stem.removesuffix('-explored')}-explored.toml"
-    if target.exists() and not replace:
-        raise Exists(f"{target} must be a new file, got one that exists")
     text = _moved(origin.read_text(encoding="utf-8"), origin.parent, directory)
     text = f"{text.rstrip()}\n\n{setting(state)}"
     _check(target, text)
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InvalidInput(f"{target} must be a file that can be written, got {error.strerror}") from None
+    _write(target, text, os.O_TRUNC if replace else os.O_EXCL)
     return target
+
+
+def _write(target: Path, text: str, how: int) -> None:
+    """Write a file of the directory itself: what a link there names is not ours, there already or not."""
+    try:
+        number = os.open(target, os.O_WRONLY | os.O_CREAT | how | _NO_LINK, 0o666)
+        with os.fdopen(number, "w", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise Exists(f"{target} must be a new file, got one that exists") from None
+    except OSError as error:
+        reason = "a link" if target.is_symlink() else error.strerror
+        raise InvalidInput(f"{target} must be a file that can be written, got {reason}") from None
 
 
 def setting(state: State) -> str:

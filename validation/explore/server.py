@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
 from aiohttp import WSMsgType, web
+from aiohttp.http_exceptions import HttpProcessingError
 
 from scenes import InvalidInput
 from validation.explore.gate import gate
@@ -61,14 +63,22 @@ def _sender(connection: web.WebSocketResponse) -> Callable:
     return send
 
 
-async def _messages(connection: web.WebSocketResponse) -> AsyncIterator[dict[str, Any]]:
+async def _messages(connection: web.WebSocketResponse) -> AsyncIterator[str]:
     async for message in connection:
         if message.type == WSMsgType.TEXT:
-            try:
-                told = json.loads(message.data)
-            except (ValueError, RecursionError):
-                told = None
-            yield told if isinstance(told, dict) else {}
+            yield message.data
+
+
+def _log() -> logging.Logger:
+    """Of errors of ours: aiohttp would print a traceback for each request that is no HTTP, which it answers by 400."""
+    log = logging.getLogger("validation.explore")
+    if _is_ours not in log.filters:
+        log.addFilter(_is_ours)
+    return log
+
+
+def _is_ours(record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError))
 
 
 async def serve(
@@ -87,15 +97,16 @@ async def serve(
         If the address cannot be listened at.
     """
     with open_tools() as tools:
-        runner = web.AppRunner(application(place, tools, token), access_log=None, shutdown_timeout=1.0)
+        runner = web.AppRunner(application(place, tools, token), access_log=None, logger=_log(), shutdown_timeout=1.0)
         await runner.setup()
         try:
             site = web.TCPSite(runner, host, port)
             try:
                 await site.start()
-            except OSError as error:
+            except (OSError, ValueError) as error:
+                reason = getattr(error, "strerror", None) or error
                 raise InvalidInput(
-                    f"--host and --port must be free to listen at, got {host}:{port} ({error.strerror})"
+                    f"--host and --port must be free to listen at, got {host}:{port} ({reason})"
                 ) from None
             address = runner.addresses[0]
             shown = f"[{address[0]}]" if ":" in address[0] else address[0]

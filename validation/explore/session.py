@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterable, Awaitable, Callable
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from scenes import InvalidInput, Scene
 from validation.batch import pool
 from validation.batch.work import Found, Task
 from validation.explore import answers, best, effects, preview, prove, save, sphere
+from validation.explore.messages import Message
 from validation.explore.state import State
 from validation.explore.tools import Tools
 
@@ -66,14 +67,14 @@ class Session:
         self._sphere: tuple[tuple, np.ndarray] | None = None
         self._clean: tuple[tuple, Any] | None = None
 
-    async def run(self, messages: Any) -> None:
-        """Serve until the messages end."""
+    async def run(self, messages: AsyncIterable[str]) -> None:
+        """Serve until the messages, texts, end."""
         await self._send(scene_message(self._scene, self.state))
         answering = asyncio.create_task(self._answers())
         try:
             async for message in messages:
                 try:
-                    await self._take(message)
+                    await self._take(Message.of(message))
                 except InvalidInput as error:
                     await self._tell(str(error))
         finally:
@@ -82,20 +83,17 @@ class Session:
                 task.cancel()
             await asyncio.gather(*left, return_exceptions=True)
 
-    async def _take(self, message: dict[str, Any]) -> None:
-        kind = message.get("type")
-        if kind == "state":
-            self.state = State.of_message(self._scene, message.get("state")).tolerable(self._scene)
-            self._ask(bool(message.get("rest")), int(message.get("number") or 0))
-        elif kind in ("best", "prove", "render"):
-            self._begin(kind)
-        elif kind == "cancel":
+    async def _take(self, message: Message) -> None:
+        if message.type == "state":
+            self.state = State.of_message(self._scene, message.state).tolerable(self._scene)
+            self._ask(message.rest, message.number)
+        elif message.type == "cancel":
             if self._job is not None:
                 self._job.cancel()
-        elif kind == "save":
-            await self._save(bool(message.get("replace")))
+        elif message.type == "save":
+            await self._save(message.replace)
         else:
-            raise InvalidInput(f"type must be state, best, prove, render, cancel or save, got {kind!r}")
+            self._begin(message.type)
 
     def _ask(self, rest: bool, number: int) -> None:
         if self._after is not None:

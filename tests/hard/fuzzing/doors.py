@@ -1,4 +1,4 @@
-"""Every way in: files, run directories, results, the command line, arrays."""
+"""Every way in: files, run directories, results, the command line, arrays, the page of `ice explore`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 import scenes
 import validation
 from scenes.load import BUNDLED
-from tests.hard.fuzzing import arrays, commands, directories, documents, files, uncertainties
+from tests.hard.fuzzing import arrays, commands, directories, documents, exploring, files, uncertainties
+from tests.hard.fuzzing import library as libraries
 
 
 @dataclass
@@ -81,5 +82,13 @@ def uncertain(rng: np.random.Generator, room: Room) -> str:
     return uncertainties.uncertain(rng, room.folder)
 
 
+def message(rng: np.random.Generator, room: Room) -> str:
+    return exploring.message(rng, room.folder)
+
+
+def library(rng: np.random.Generator, _room: Room) -> str:
+    return libraries.library(rng)
+
+
 _USUAL = (scene, mesh, image, campaign, lens, comparison, directory, command, array)
-DOORS = (*_USUAL, array, *_USUAL, uncertain)
+DOORS = (*_USUAL, array, *_USUAL, uncertain, message, library)
