@@ -26,6 +26,7 @@ from measure.fitting.photograph import Pixels, Shots
 from measure.photo import mtf as mtfs
 from measure.photo import recording
 from planner.features.circles import Rim, calibrated_circle
+from planner.features.projected_edges import projected_edges
 from planner.imaging.appearance import edge_contrast, side_signals
 from planner.imaging.emitters import GLANCE, emitters
 from planner.imaging.exchange import exchanged
@@ -44,6 +45,7 @@ from scenes.data_sheet import completed
 from scenes.measurands import Tolerance
 from scenes.parts import step, step_kernel
 from scenes.parts.surfaces import Torus
+from scenes.photograph import Photograph
 from tests.boards import SMALL, poses, told
 from validation.batch import work
 from validation.explore import session
@@ -133,28 +135,29 @@ def test_a_torus_hides_its_limb_only_where_it_stands_before_it(eye):
         expected |= {tuple(p) for p in points[front & free & beyond].round(6)}
         ahead += int(front.sum())
     assert found == expected
-    assert 0 < len(expected) < ahead  # some are hidden
+    assert expected
+    assert (len(expected) < ahead) == (eye[0] == 20)  # from outside some are hidden
 
 
 # --- searches
 
 
-def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor():
-    """Short edges, of which the ends take most: for each sensor the bound is below the best, and not far below."""
+@pytest.mark.parametrize("larger", [0.8, 1.0, 1.6])
+def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
+    """Short edges, whose ends take most, under a single place of both lights: below the best, and not far below."""
     scene = scenes.load("two_lights")
-    scene = changed(scene, camera={"focal_px": 0.3 * scene.camera.focal_px})
-    places, ratios = np.array([[40.0, 300.0], [40.0, 120.0]]), []
-    looks = _Looks(scene, places[:1], Aim.of(scene.quantities, "object"), planner.Constraints())
-    for polar in (20.0, 35.0, 50.0):
-        for azimuth in range(0, 360, 15):
-            sensor = np.array([polar, float(azimuth)])
-            known = looks.look(sensor)
-            values = [looks.best(known, share)[0] for share in ((0.0, 1.0), (0.3, 0.7), (1.0, 0.0))]
-            if np.isfinite(min(values)):
-                ratios.append(looks.bound(sensor) / min(values))
-    assert len(ratios) > 10
+    scene, aim = changed(scene, camera={"focal_px": larger * scene.camera.focal_px}), Aim.of(scene.quantities, "object")
+    place, ratios, lengths = np.array([[40.0, 300.0]]), [], []
+    looks = _Looks(scene, place, aim, planner.Constraints())
+    for sensor in np.array([[p, a] for p in (30.0, 45.0, 60.0) for a in range(0, 360, 15)], float):
+        known = looks.look(sensor)
+        for share in ((0.0, 1.0), (0.3, 0.7)) if known else ():
+            exact = planner.variances(with_shares(scene, share), sensor, (place[0], place[0]))
+            ratios.append(looks.bound(sensor) / min(looks.best(known, share)[0], float(exact)))
+            lengths.append(projected_edges(Pictures.of(scene, sensor)).usable.min())
+    assert min(lengths) < 6
     assert max(ratios) <= 1
-    assert max(ratios) > 0.9
+    assert max(ratios) > 0.5
 
 
 def test_levels_of_a_single_edge_that_are_cut_off_are_enough(task1):
@@ -295,9 +298,8 @@ def test_a_board_s_pose_takes_six_degrees_of_freedom():
         truth = SMALL.corners(pose)
         covariance = np.tile(np.diag([0.01, 0.02]) ** 2, (len(truth), 1, 1))
         board = told(truth + rng.normal(size=truth.shape) * [0.01, 0.02], covariance, SMALL.board)
-        corners, status = board.corners.copy(), board.status.copy()
-        corners[: 3 * i], status[: 3 * i] = np.nan, "misfit"
-        boards.append(replace(board, corners=corners, status=status))
+        lost = 3 * i
+        boards.append(replace(board, status=("outside",) * lost + board.status[lost:]))
     counts = [int(board.measured.sum()) for board in boards]
     assert len(set(counts)) == 4
     found = measure.calibrate_camera(boards, SMALL.square, SMALL.size[::-1], "k1,k2")
@@ -318,10 +320,10 @@ def test_lost_pictures_count_for_no_degree_of_freedom():
     one, two = scatter(2.0, 1.9, 1000, 9, share=3.0), scatter(1.1, 1.0, 500, 4, share=2.0)
     found = judged(one, two)
     assert found.gain == pytest.approx(2.0 * 3.0 / (1.1 * 2.0))
-    assert found.predicted == pytest.approx(1.9 * 3.0 / (1.0 * 2.0))
+    assert found.predicted_gain == pytest.approx(1.9 * 3.0 / (1.0 * 2.0))
     law = stats.f(990, 495)
     assert found.interval == pytest.approx(tuple(found.gain / law.ppf(p) for p in (0.975, 0.025)), rel=1e-12)
-    ratio = found.gain / found.predicted
+    ratio = found.gain / found.predicted_gain
     assert found.p_value == pytest.approx(2 * min(law.cdf(ratio), law.sf(ratio)), rel=1e-9)
 
 
@@ -453,10 +455,10 @@ class Alone:
     """Notices who comes in while somebody is."""
 
     def __init__(self):
-        self.inside = self.most = 0
+        self.inside = self.most = self.calls = 0
 
     def __call__(self, *_, **__):
-        self.inside += 1
+        self.inside, self.calls = self.inside + 1, self.calls + 1
         self.most = max(self.most, self.inside)
         time.sleep(0.03)
         self.inside -= 1
@@ -477,27 +479,27 @@ def test_one_thread_at_a_time_is_in_the_renderer(task1, monkeypatch, door):
     alone, nothing = Alone(), SimpleNamespace(image=SimpleNamespace(array=lambda: None))
     monkeypatch.setattr(work.variants, "use", alone if door == "variants.use" else lambda *_: None)
     monkeypatch.setattr(work, "render_setting", alone if door == "render_setting" else lambda *_: nothing)
-    monkeypatch.setattr(work.render, "shots", alone)
+    monkeypatch.setattr(work.render, "shots", alone if door == "render.shots" else lambda *_: None)
     monkeypatch.setattr(work, "measure_chunk", lambda *a: a[-1] and a[-1](None, 1))
     scene = changed(task1, jitter=scenes.Jitter(sensor_deg=0.1))
-    case = SimpleNamespace(scene=scene, picture=Picture.of(scene, (30, 135), (15, 315)))
+    case = SimpleNamespace(scene=scene, setting=scene.settings[0])
     monkeypatch.setattr(work, "_jitter", lambda *_: scene.jitter)
     task = work.Task(case, ((0, 1),), 1, "scalar_rgb")
     at_once(lambda: work.perform(task))
-    assert alone.most == 1
+    assert (alone.most, alone.calls) == (1, 3)
 
 
 def test_a_photograph_is_looked_at_by_one_thread_for_all(monkeypatch):
     """The threads of a measurement ask for the same: one of them works, once, the others wait for it."""
-    alone, calls = Alone(), []
-    monkeypatch.setattr(recording, "smooth_patches", lambda *_: calls.append(alone()))
+    alone = Alone()
+    monkeypatch.setattr(recording, "smooth_patches", alone)
     for name in ("scale_of", "curve_of", "is_compressed"):
         monkeypatch.setattr(recording, name, lambda *_: SimpleNamespace(limits=None, step=1.0))
     recording._told.cache_clear()
-    photo = scenes.Photograph(np.arange(64.0).reshape(8, 8))
+    photo = Photograph(np.arange(64.0).reshape(8, 8))
     at_once(lambda: recording._whole(photo))
     recording._told.cache_clear()
-    assert (alone.most, len(calls)) == (1, 1)
+    assert (alone.most, alone.calls) == (1, 1)
 
 
 def test_explore_renders_anew_when_a_light_or_the_sensor_moves():
@@ -526,6 +528,6 @@ def test_explore_renders_anew_when_a_light_or_the_sensor_moves():
         ]  # fmt: skip
         for state, number in states:
             assert (await here._rendered(state)).number == number
-            assert asked[-1] == state.picture(scene)
+            assert (asked[-1].sensor, asked[-1].lights) == (state.sensor, state.lights)
 
     asyncio.run(run())
