@@ -208,7 +208,9 @@ def test_correlations_are_of_the_columns_that_they_name(run):
 def of_terminal(made, title):
     """Headings and rows of the table whose title begins so; of headings on two lines the second."""
     shown = next(t for t in made.renderables if str(getattr(t, "title", "")).strip().startswith(title))
-    return [str(c.header).split("\n")[-1] for c in shown.columns], list(zip(*(c.cells for c in shown.columns)))
+    return [str(c.header).split("\n")[-1] for c in shown.columns], list(
+        zip(*(c.cells for c in shown.columns), strict=True)
+    )
 
 
 def interval(each):

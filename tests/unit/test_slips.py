@@ -1,4 +1,4 @@
-"""Slips of one word that no test had noticed: each against a small computation of its own, in a case without symmetry."""
+"""Slips of one word that no test had noticed: each against a small computation of its own, without symmetry."""
 
 import asyncio
 import math
@@ -16,8 +16,6 @@ from scipy import stats
 import measure
 import planner
 import scenes
-from measure.boards.chessboard import Board
-from measure.boards.fitting import PARAMETERS
 from measure.features.layout import BACKGROUND, polygon_layout
 from measure.features.optics import Optics
 from measure.fitting.likelihood import Problem
@@ -230,7 +228,7 @@ def test_monte_carlo_counts_its_degrees_of_freedom():
 
         found = monte_carlo(model, [Input("a", 0.0, 1.0)], seed, digits=1, block=40, most=80 + 40 * (seed % 3))
         blocks = [[float(v) for v in values if math.isfinite(v)] for values in seen]
-        whole = sum(blocks, [])
+        whole = [value for block in blocks for value in block]
         assert (found.draws, found.failed) == (len(whole), sum(map(len, seen)) - len(whole))
         assert (found.y, found.u) == pytest.approx((statistics.mean(whole), statistics.stdev(whole)), rel=1e-12)
         each = [(statistics.mean(b), statistics.stdev(b), *np.quantile(b, (0.025, 0.975))) for b in blocks]
@@ -254,7 +252,7 @@ def test_few_blocks_know_their_scatter_but_roughly(blocks, factor):
 def test_the_variance_of_a_modulation_transfer_is_that_of_its_derivatives():
     """Noise that differs from sample to sample of a blurred step: differences of the transfer by each of them."""
     place = np.arange(-11.9, 11.9, 0.125) + 0.02 * np.sin(np.arange(191))
-    seen = stats.norm.cdf(place - 0.3, scale=0.9)
+    seen = 0.8 * stats.norm.cdf(place - 0.3, scale=0.9)  # its whole rise is not 1
     variance = 1e-5 * (1 + np.arange(place.size) % 7) * np.where(place > 0, 4.0, 1.0)
     told = mtfs._response(10.0, place, seen, variance)
 
@@ -522,9 +520,9 @@ def test_explore_renders_anew_when_a_light_or_the_sensor_moves():
         one, two = first.lights
         states = [
             (first, 1), (replace(first, measurand=0, shown="ratio"), 1),
-            (replace(first, lights=(Pose(one.polar_deg + 1, one.azimuth_deg), two)), 2),
-            (replace(first, lights=(one, Pose(two.polar_deg, two.azimuth_deg + 1))), 3),
-            (replace(first, sensor=Pose(first.sensor.polar_deg, first.sensor.azimuth_deg + 1)), 4), (first, 5),
+            (replace(first, lights=(Pose(one.polar_deg + 1, one.azimuth_deg), two)), 2), (first, 3),
+            (replace(first, lights=(one, Pose(two.polar_deg, two.azimuth_deg + 1))), 4), (first, 5),
+            (replace(first, sensor=Pose(first.sensor.polar_deg, first.sensor.azimuth_deg + 1)), 6), (first, 7),
         ]  # fmt: skip
         for state, number in states:
             assert (await here._rendered(state)).number == number
