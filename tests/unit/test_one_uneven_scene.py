@@ -218,7 +218,7 @@ def test_the_picture_by_the_planner_is_that_of_the_formula(scene):
         wanted = scene.noise.dark_level + by_hand(scene, points, solid.normals[f])
         assert image[y.ravel()[some], x.ravel()[some]] == pytest.approx(wanted, rel=2e-3, abs=0.05)
         checked += some.sum()
-    assert image[y.ravel()[left], x.ravel()[left]] == pytest.approx(40.0, abs=1e-6)
+    assert image[y.ravel()[left], x.ravel()[left]] == pytest.approx(40.0, abs=1e-4)
     assert checked > 60
 
 

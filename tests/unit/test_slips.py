@@ -11,11 +11,15 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from scipy import stats
 
 import measure
 import planner
 import scenes
+from measure.boards.fitting import fit_crossings
+from measure.boards.saddle import response
+from measure.boards.windows import Windows
 from measure.features.layout import BACKGROUND, polygon_layout
 from measure.features.optics import Optics
 from measure.fitting.likelihood import Problem
@@ -41,10 +45,11 @@ from planner.uncertainty import Input, monte_carlo
 from scenes import Camera, Noise, Picture, Pose
 from scenes.data_sheet import completed
 from scenes.measurands import Tolerance
-from scenes.parts import step, step_kernel
+from scenes.parts import mesh, step, step_kernel
 from scenes.parts.surfaces import Torus
 from scenes.photograph import Photograph
 from tests.boards import SMALL, poses, told
+from validation import vary_check
 from validation.batch import work
 from validation.explore import session
 from validation.explore.state import State
@@ -275,7 +280,7 @@ def test_a_fixed_pattern_is_in_the_mean_of_many_photographs_too(task1):
     """What scatters from picture to picture over their number, the pattern as it is; two groups of 1 and 4."""
     noise = Noise(sigma=2.0, bits=8, gain=0.05, dark_level=30.0, prnu=0.02, dsnu=1.5)
     scene = changed(task1, camera={"width": 112, "height": 96, "focal_px": 350.0}, noise=noise)
-    pictures = [Picture.of(scene, (35, 120), (25, 300)), Picture.of(scene, (30, 200), (25, 300))]
+    pictures = [Picture.of(scene, (35, 120), (25, 100)), Picture.of(scene, (30, 200), (25, 100))]
     parameters = Parameters.of(tuple(pictures))
     pixels = tuple(Pixels.around(parameters.pictures_at(parameters.start(), k)) for k in (0, 1))
     blank = np.zeros((96, 112))
@@ -309,6 +314,24 @@ def test_a_board_s_pose_takes_six_degrees_of_freedom():
     assert found.rms_px == pytest.approx(math.sqrt((away**2).sum(1).mean()), rel=1e-9)
 
 
+def test_what_a_fitted_crossing_leaves_is_its_degrees_of_freedom(rng):
+    """100 crossings in unit noise, of windows of 200 and of 120 px: the mean square, and its number, 17 less."""
+    offset = np.stack(np.meshgrid(np.arange(-7, 8), np.arange(-7, 8)), -1).reshape(-1, 2).astype(float)[:200]
+    truth = np.column_stack([
+        rng.uniform(-0.4, 0.4, (100, 2)), rng.uniform(-0.1, 0.1, 100), rng.uniform(1.45, 1.75, 100), np.full(100, -0.2),
+    ])  # fmt: skip
+    places, bend = np.tile(offset, (100, 1, 1)), np.zeros((100, 2))
+    there = np.ones(places.shape[:2], bool)
+    there[::2, 120:] = False
+    levels = 100 + 60 * response(places, truth, bend).signs[..., 2] + rng.normal(size=there.shape)
+    windows = Windows(places, np.where(there, levels, 0.0), there, np.ones(100, bool))
+    found = fit_crossings(windows, truth, bend, 1e-4)
+    assert found.freedom.tolist() == [103, 183] * 50
+    for some, freedom in ((np.s_[::2], 103), (np.s_[1::2], 183)):
+        assert found.square[some].mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 50))
+        assert abs(found.square[some].mean() - freedom - 12) > 4 * math.sqrt(2 * freedom / 50)
+
+
 def scatter(measured, predicted, n, failed, share=1.0):
     return Scatter("width", predicted, predicted, measured, share, n, failed, (0.0, 9.0), "ok")
 
@@ -323,6 +346,28 @@ def test_lost_pictures_count_for_no_degree_of_freedom():
     assert found.interval == pytest.approx(tuple(found.gain / law.ppf(p) for p in (0.975, 0.025)), rel=1e-12)
     ratio = found.gain / found.predicted_gain
     assert found.p_value == pytest.approx(2 * min(law.cdf(ratio), law.sf(ratio)), rel=1e-9)
+
+
+def test_lost_pictures_are_not_in_the_interval_of_a_plan_s_scatter(task1, monkeypatch):
+    """7 of 40 pictures lost: the chi-square interval is that of 33 values, the variance theirs, in the object."""
+    rng, states = np.random.default_rng(3), np.array([["ok"]])
+    values = 12.5 + 0.01 * rng.normal(size=(40, 1))
+    values[4:11] = np.nan
+    known = SimpleNamespace(status=("ok",), covariance=np.array([[2e-4]]), covariance_image=np.array([[3e-2]]))
+    seen = SimpleNamespace(value=values, value_image=80 * values + 1, status=states)
+    monkeypatch.setattr(vary_check.render, "image", lambda *_: None)
+    monkeypatch.setattr(vary_check.render, "expose", lambda *_: None)
+    monkeypatch.setattr(vary_check.measure, "propagate", lambda *_: SimpleNamespace(measurands=known))
+    monkeypatch.setattr(vary_check.measure, "measure", lambda *_: seen)
+    for objective, scale, propagated in (("object", 1.0, 2e-4), ("image", 6400.0, 3e-2)):
+        plan = SimpleNamespace(scene=task1, objective=objective, over="minimax", model="calibrated")
+        chosen = SimpleNamespace(scene=task1, sensor=(30, 135), light=(15, 315))
+        found = vary_check._scatter(plan, chosen, 40, None, None)
+        good = values[np.isfinite(values)]
+        variance = scale * statistics.variance(good.tolist())
+        ends = [variance * 32 / stats.chi2.ppf(q, 32) for q in (0.975, 0.025)]
+        assert (found.n, found.failed, found.propagated) == (40, 7, propagated)
+        assert (found.measured, *found.interval) == pytest.approx((variance, *ends), rel=1e-9)
 
 
 def test_a_circle_s_pieces_have_two_ends_each():
@@ -355,6 +400,17 @@ def test_a_face_is_a_sliver_by_its_reach_beyond_the_edge_not_by_its_length():
     thin = layout.without_slivers(3.1)
     assert (thin.sides == BACKGROUND).all()
     assert thin.faces[0].max() < -1e6
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize(("apex", "planes"), [(1e-7, 1), (0.5, 2)])
+def test_a_sliver_of_a_mesh_is_told_by_its_height_over_the_other_triangle(order, apex, planes):
+    """Its own normal means nothing: an apex a hair off its long side and off the plane, whichever comes first."""
+    corners = [[0, 0, 0], [10, 0, 0], [3, 10, 0], [5, -apex, apex]]
+    faces = [[[0, 1, 2], [1, 0, 3]][k] for k in order]
+    made = trimesh.Trimesh(np.array(corners, float), faces, process=False)
+    assert made.face_adjacency_angles[0] > 0.7
+    assert len(set(mesh._planes(made).tolist())) == planes
 
 
 def test_half_of_an_uneven_tolerance_is_half_of_its_zone():
