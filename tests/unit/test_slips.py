@@ -280,7 +280,7 @@ def test_a_fixed_pattern_is_in_the_mean_of_many_photographs_too(task1):
     """What scatters from picture to picture over their number, the pattern as it is; two groups of 1 and 4."""
     noise = Noise(sigma=2.0, bits=8, gain=0.05, dark_level=30.0, prnu=0.02, dsnu=1.5)
     scene = changed(task1, camera={"width": 112, "height": 96, "focal_px": 350.0}, noise=noise)
-    pictures = [Picture.of(scene, (35, 120), (25, 100)), Picture.of(scene, (30, 200), (25, 100))]
+    pictures = [Picture.of(scene, (35, 120), (25, 200)), Picture.of(scene, (30, 200), (25, 200))]
     parameters = Parameters.of(tuple(pictures))
     pixels = tuple(Pixels.around(parameters.pictures_at(parameters.start(), k)) for k in (0, 1))
     blank = np.zeros((96, 112))
@@ -315,21 +315,21 @@ def test_a_board_s_pose_takes_six_degrees_of_freedom():
 
 
 def test_what_a_fitted_crossing_leaves_is_its_degrees_of_freedom(rng):
-    """100 crossings in unit noise, of windows of 200 and of 120 px: the mean square, and its number, 17 less."""
+    """200 crossings in unit noise, of windows of 200 and of 120 px: the mean square, and its number, 17 less."""
     offset = np.stack(np.meshgrid(np.arange(-7, 8), np.arange(-7, 8)), -1).reshape(-1, 2).astype(float)[:200]
     truth = np.column_stack([
-        rng.uniform(-0.4, 0.4, (100, 2)), rng.uniform(-0.1, 0.1, 100), rng.uniform(1.45, 1.75, 100), np.full(100, -0.2),
+        rng.uniform(-0.4, 0.4, (200, 2)), rng.uniform(-0.1, 0.1, 200), rng.uniform(1.45, 1.75, 200), np.full(200, -0.2),
     ])  # fmt: skip
-    places, bend = np.tile(offset, (100, 1, 1)), np.zeros((100, 2))
+    places, bend = np.tile(offset, (200, 1, 1)), np.zeros((200, 2))
     there = np.ones(places.shape[:2], bool)
     there[::2, 120:] = False
     levels = 100 + 60 * response(places, truth, bend).signs[..., 2] + rng.normal(size=there.shape)
-    windows = Windows(places, np.where(there, levels, 0.0), there, np.ones(100, bool))
+    windows = Windows(places, np.where(there, levels, 0.0), there, np.ones(200, bool))
     found = fit_crossings(windows, truth, bend, 1e-4)
-    assert found.freedom.tolist() == [103, 183] * 50
+    assert found.freedom.tolist() == [103, 183] * 100
     for some, freedom in ((np.s_[::2], 103), (np.s_[1::2], 183)):
-        assert found.square[some].mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 50))
-        assert abs(found.square[some].mean() - freedom - 12) > 4 * math.sqrt(2 * freedom / 50)
+        assert found.square[some].mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 100))
+        assert abs(found.square[some].mean() - freedom - 12) > 4 * math.sqrt(2 * freedom / 100)
 
 
 def scatter(measured, predicted, n, failed, share=1.0):
