@@ -280,7 +280,7 @@ def test_a_fixed_pattern_is_in_the_mean_of_many_photographs_too(task1):
     """What scatters from picture to picture over their number, the pattern as it is; two groups of 1 and 4."""
     noise = Noise(sigma=2.0, bits=8, gain=0.05, dark_level=30.0, prnu=0.02, dsnu=1.5)
     scene = changed(task1, camera={"width": 112, "height": 96, "focal_px": 350.0}, noise=noise)
-    pictures = [Picture.of(scene, (35, 120), (25, 200)), Picture.of(scene, (30, 200), (25, 200))]
+    pictures = [Picture.of(scene, (35, 120), (25, 300)), Picture.of(scene, (30, 200), (25, 300))]
     parameters = Parameters.of(tuple(pictures))
     pixels = tuple(Pixels.around(parameters.pictures_at(parameters.start(), k)) for k in (0, 1))
     blank = np.zeros((96, 112))
