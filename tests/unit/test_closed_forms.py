@@ -1,0 +1,129 @@
+"""Small pieces against closed forms, where no two axes, ends or signs are alike."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import planner
+from planner.imaging.bore import _form_factors
+from planner.imaging.emitters import nodes
+from planner.models import bias
+from render import curved
+from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
+from scenes.arrays import poses
+from scenes.parts import step, step_kernel
+from scenes.parts.surfaces import Cone
+
+LIGHTS = [
+    Light(distance=90.0, radius=3.0), Disc(kind="disc", distance=90.0, radius=4.0),
+    Bar(kind="bar", distance=90.0, length=12.0, width=5.0, turn_deg=25.0),
+    Ring(kind="ring", distance=90.0, inner_radius=2.0, outer_radius=5.0),
+    Backlight(kind="backlight", distance=90.0, half_side=7.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("light", LIGHTS, ids=lambda light: light.kind)
+def test_a_light_is_as_large_as_its_nodes_reach(light):
+    """Gauss nodes go nearly to the rim, and not beyond: half of the largest extent."""
+    far = np.linalg.norm(nodes(light, 10.0, 24).places, axis=1).max()
+    assert 0.96 * light.half_size < far <= light.half_size * (1 + 1e-12)
+
+
+def test_a_bar_s_length_is_to_the_right_and_its_width_down():
+    """Second moments of a turned rectangle: length^2 / 12 along, width^2 / 12 across."""
+    bar = nodes(LIGHTS[2], 10.0, 10)
+    turn = math.radians(25.0)
+    along, across = np.array([math.cos(turn), math.sin(turn)]), np.array([-math.sin(turn), math.cos(turn)])
+    x, weight = np.polynomial.legendre.leggauss(10)
+    weights = np.outer(weight, weight).ravel() / 4
+    assert weights @ (bar.places[:, :2] @ along) ** 2 == pytest.approx(12**2 / 12, rel=1e-9)
+    assert weights @ (bar.places[:, :2] @ across) ** 2 == pytest.approx(5**2 / 12, rel=1e-9)
+    assert bar.area == pytest.approx(60.0)
+    assert len(x) == 10
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_turned_part_has_the_volume_of_its_frusta(axis):
+    """A cone, a shoulder, a cylinder; 1 % for the facets. Its ends are flat, where the profile says."""
+    profile = ((1.0, 2.0), (4.0, 3.5), (4.0, 2.5), (9.0, 2.5))
+    solid = Turned(kind="turned", axis=axis, profile=profile).solid
+    frusta = [math.pi * (b[0] - a[0]) / 3 * (a[1] ** 2 + a[1] * b[1] + b[1] ** 2)
+              for a, b in itertools.pairwise(profile)]  # fmt: skip
+    corners = solid.triangles
+    volume = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert volume == pytest.approx(sum(frusta), rel=0.01)
+    k = "xyz".index(axis)
+    assert solid.vertices[:, k].min() == pytest.approx(1.0)
+    assert solid.vertices[:, k].max() == pytest.approx(9.0)
+    flat = np.abs(solid.normals[:, k]) > 1 - 1e-9
+    assert sorted(np.round(np.abs(solid.offsets[flat]), 6).tolist()) == [1.0, 4.0, 9.0]
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_crossing_far_from_its_edge_is_none_on_either_side(task1, monkeypatch, way):
+    """Further off than the locator's window: the bias is not known."""
+    plain = bias._zero
+
+    def zero(*arguments):
+        moved, slope = plain(*arguments)
+        return moved + way * 1.01 * task1.locator.window_px, slope
+
+    known = planner.predict(task1, (30, 135), (15, 315)).bias_image
+    monkeypatch.setattr(bias, "_zero", zero)
+    turned = task1.model_copy(update={"title": f"not known from before {way}"})
+    assert np.isfinite(known)
+    assert not np.isfinite(planner.predict(turned, (30, 135), (15, 315)).bias_image)
+
+
+def test_patches_of_a_bore_see_each_other_by_their_angle():
+    """cos cos / (pi r^2) of two places of a cylinder's wall, by their vectors; a quarter turn and another depth."""
+    radius = 0.7
+    between, *_ = _form_factors(radius)
+    factors = np.fft.ifft(between, axis=0).real
+    around, deep = factors.shape[:2]
+    area = radius * 2 * math.pi / around / deep
+    for turn, row, column in ((around // 2, 3, 3), (around // 4, 1, deep - 2), (around // 3, 0, 2)):
+        angle = 2 * math.pi * turn / around
+        here = np.array([radius, 0.0, (row + 0.5) / deep])
+        there = np.array([radius * math.cos(angle), radius * math.sin(angle), (column + 0.5) / deep])
+        way = there - here
+        far = np.linalg.norm(way)
+        cosines = (way @ [-1.0, 0, 0] / far) * (way @ [math.cos(angle), math.sin(angle), 0] / far)
+        assert factors[turn, row, column] == pytest.approx(cosines / (math.pi * far**2) * area, rel=0.02)
+    assert factors[around // 2, 1, deep - 2] > 1.2 * factors[around // 8, 1, deep - 2]
+
+
+def test_the_renderer_s_cone_lies_on_the_cone(monkeypatch):
+    """Every corner on it, its two ends at their heights, its triangles outwards."""
+    cone = Cone((1.0, 2.0, 3.0), (0.0, 0.6, 0.8), 2.0, (-1.0, 2.5), half_angle_deg=15.0)
+    monkeypatch.setattr(curved, "mesh", lambda _, corners, bsdf, normals: (corners, normals))
+    corners, normals = curved._cone(None, cone, {})
+    flat = corners.reshape(-1, 3)
+    assert np.abs(cone.values(flat)).max() < 1e-12
+    heights = (flat - cone.point) @ cone.axis
+    assert {round(float(h), 9) for h in heights} == {-1.0, 2.5}
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("ti,ti->t", facing, normals.reshape(corners.shape)[:, 0]) > 0).all()
+    area = np.linalg.norm(facing, axis=1).sum() / 2
+    wide, narrow = (2.0 + z * math.tan(math.radians(15.0)) for z in (2.5, -1.0))
+    assert area == pytest.approx(math.pi * (wide + narrow) * 3.5 / math.cos(math.radians(15.0)), rel=1e-3)
+
+
+@pytest.mark.parametrize("pair", [(-1.0, 10.0), (181.0, 10.0)])
+def test_polar_angles_are_from_0_to_180(pair):
+    """Azimuths may be any."""
+    with pytest.raises(InvalidInput, match="must have polar angles between 0 and 180"):
+        poses(np.array([[30.0, 10.0], pair]), "sensors")
+    assert poses(np.array([[0.0, -400.0], [180.0, 720.0]]), "sensors").shape == (2, 2)
+
+
+def test_the_last_line_of_the_kernel_says_why(tmp_path, monkeypatch):
+    """It prints of its own before."""
+    script = tmp_path / "kernel.py"
+    said = "noise\nof a solid body, got none\n"
+    script.write_text(f"import sys\nsys.stderr.write({said!r})\nsys.exit(2)\n")
+    monkeypatch.setattr(step_kernel, "__file__", str(script))
+    with pytest.raises(InvalidInput, match=r"object\.file must be of a solid body, got none: part\.step"):
+        step._asked(step.Path("part.step"), b"")
