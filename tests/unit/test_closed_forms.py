@@ -2,13 +2,17 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import planner
-from planner.imaging.bore import _form_factors
+import scenes
+from measure.estimators.profile import profile_kernel, top_kernel
+from planner.imaging.bore import _form_factors, bores
 from planner.imaging.emitters import nodes
+from planner.imaging.revolved import rings_of
 from planner.models import bias
 from render import curved
 from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
@@ -127,3 +131,54 @@ def test_the_last_line_of_the_kernel_says_why(tmp_path, monkeypatch):
     monkeypatch.setattr(step_kernel, "__file__", str(script))
     with pytest.raises(InvalidInput, match=r"object\.file must be of a solid body, got none: part\.step"):
         step._asked(step.Path("part.step"), b"")
+
+
+def test_a_bore_is_as_long_as_its_plate_and_as_wide_as_its_polygon():
+    """The widest free cylinder touches the middles of the rim's pieces: r cos(pi / n)."""
+    plate = scenes.load("plate")
+    (bore,) = bores(plate.solid)
+    pieces = len(bore.rim.edges)
+    assert bore.free_radius == pytest.approx(bore.rim.radius * math.cos(math.pi / pieces), rel=1e-6)
+    assert bore.length == pytest.approx(np.ptp(plate.solid.vertices[:, 2]), rel=1e-6)
+    assert len(bore.faces) == pieces
+
+
+def test_walls_that_are_told_along_opposite_axes_are_the_same_part():
+    """A shaft, one of its walls turned round: the same rings."""
+    solid = scenes.load("shaft").solid
+    plain = rings_of(solid)
+    first, *others = solid.curved
+    surface = first.surface
+    turned = {"axis": -surface.axis, "ends": (-surface.ends[1], -surface.ends[0])}
+    if surface.kind == "cone":
+        turned["half_angle_deg"] = -surface.half_angle_deg
+    found = rings_of(replace(solid, curved=(*others, replace(first, surface=replace(surface, **turned)))))
+    there = [(each.places, each.area) for each in (plain, found)]
+    assert np.sort(there[1][1]) == pytest.approx(np.sort(there[0][1]), rel=1e-9)
+    middles = [np.sort(places.mean(1) @ solid.curved[0].surface.axis) for places, *_ in there]
+    assert middles[1] == pytest.approx(middles[0], abs=1e-9)
+    assert len(found.own) == len(plain.own)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 2.1])
+def test_the_kernel_of_a_place_beside_a_pixel_is_that_of_the_moved_gaussian(angle):
+    """Second derivative across the edge of a Gaussian, its middle moved along the normal; scale 1.3."""
+    scale, normal = 1.3, np.array([math.cos(angle), math.sin(angle)])
+    kernel, radius = profile_kernel(scale, normal), math.ceil(5 * scale)
+    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
+    shifts = np.array([-0.4, 0.1, 0.6])
+    for row, shift in zip(top_kernel(kernel, shifts), shifts, strict=True):
+        dx, dy = x - shift * normal[0], y - shift * normal[1]
+        across = (dx * normal[0] + dy * normal[1]) / scale
+        wanted = np.exp(-(dx**2 + dy**2) / (2 * scale**2)) / (2 * math.pi * scale**2) * (across**2 - 1) / scale**2
+        assert row.reshape(x.shape) == pytest.approx(wanted, abs=2e-4 * np.abs(wanted).max())
+
+
+def test_records_of_a_plan_are_the_candidates(task1):
+    found = planner.plan(task1, step_deg=30, refined=False)
+    for row, each in zip(found.as_rows(), found.candidates, strict=True):
+        assert (row["variance"], row["variance_object"], row["variance_image"]) == (
+            each.variance, each.variance_object, each.variance_image,
+        )  # fmt: skip
+        assert (row["sensor_polar"], row["sensor_azimuth"]) == tuple(each.sensor)
+        assert (row["light_polar"], row["light_azimuth"]) == tuple(each.light)

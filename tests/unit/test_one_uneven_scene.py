@@ -297,6 +297,48 @@ def test_values_in_the_object_are_those_of_its_corners(scene, picture):
         assert each.ratio == pytest.approx(math.sqrt(each.variance_object) / zone)
 
 
+def test_the_first_measurand_s_numbers_are_under_its_names(scene, picture):
+    """Shortcuts of predictions, measurements and propagated noise; image and object are not alike here."""
+    for model in ("paper", "calibrated", "bound"):
+        found = planner.predict(picture, model=model)
+        first = found.measurands[0]
+        for name in ("value_image", "value_object", "variance_image", "variance_object"):
+            assert getattr(found, name) == getattr(first, name)
+        assert found.bias_image == pytest.approx(first.bias_image, nan_ok=True)
+        assert (found.value_px, found.variance_px2) == (first.value_image, first.variance_image)
+        assert found.variance_cm2 == pytest.approx(first.variance_object)
+        near = 0.1 if model == "bound" else 1e-9  # which is joint, its covariances are line by line
+        diagonal = np.diag(found.covariance), np.diag(found.covariance_object)
+        assert diagonal[0] == pytest.approx([each.variance_image for each in found.measurands], rel=near)
+        assert diagonal[1] == pytest.approx([each.variance_object for each in found.measurands], rel=near)
+        ratios = {each.name: each.ratio for each in found.measurands}
+        assert (found.limiting, found.worst_ratio) == (max(ratios, key=ratios.get), max(ratios.values()))
+    plain = changed(scene, camera={"lens": scenes.Lens()})
+    image = planner.image(plain, SENSOR, LIGHTS)
+    spread = measure.propagate(image, plain, SENSOR, LIGHTS, "gradient")
+    told = spread.measurands
+    assert spread.variance_px2 == pytest.approx(told.covariance_image[0, 0])
+    assert spread.variance_px2 == pytest.approx(planner.predict(plain, SENSOR, LIGHTS).variance_px2, rel=0.1)
+    assert (spread.value_px, spread.bias_px) == (told.value_image[0], told.bias_image[0])
+    assert told.value[0] == pytest.approx(12.5, abs=0.01)
+    found, each = (f(image, plain, SENSOR, LIGHTS, "gradient") for f in (measure.distance, measure.measure))
+    assert float(found.value_px) == pytest.approx(float(each.value_image[0]), rel=1e-12)
+    assert float(found.variance_px2) == pytest.approx(float(each.covariance_image[0, 0]), rel=1e-6)
+    assert np.linalg.norm(found.corners[1] - found.corners[0]) == pytest.approx(float(found.value_px), rel=1e-9)
+
+
+def test_a_fixed_pattern_matters_as_much_as_noise_of_its_size(scene):
+    """Four standard deviations of the distance under noise of dsnu alone; twice as much of twice the pattern."""
+    near = []
+    for dsnu in (1.0, 2.0):
+        uneven = changed(scene, noise={"prnu": 0.0, "dsnu": dsnu})
+        (found,) = (e for e in render.effects(uneven) if e.effect.name == "fixed_pattern")
+        noisy = changed(scene, noise={"sigma": dsnu, "bits": None, "gain": 0.0, "prnu": 0.0, "dsnu": 0.0})
+        near.append(found.influence.bias_px)
+        assert near[-1] == pytest.approx(4 * planner.predict(noisy, SENSOR, LIGHTS).variance_px2 ** 0.5, rel=0.02)
+    assert near[1] == pytest.approx(2 * near[0], rel=1e-3)
+
+
 # --- what must not change
 
 
