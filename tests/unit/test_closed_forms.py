@@ -19,6 +19,7 @@ from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
 from scenes.arrays import poses
 from scenes.parts import step, step_kernel
 from scenes.parts.surfaces import Cone
+from validation.report import map_figure
 
 LIGHTS = [
     Light(distance=90.0, radius=3.0), Disc(kind="disc", distance=90.0, radius=4.0),
@@ -182,3 +183,10 @@ def test_records_of_a_plan_are_the_candidates(task1):
         )  # fmt: skip
         assert (row["sensor_polar"], row["sensor_azimuth"]) == tuple(each.sensor)
         assert (row["light_polar"], row["light_azimuth"]) == tuple(each.light)
+
+
+@pytest.mark.parametrize(
+    ("pose", "place"), [((30.0, 0.0), (30, 0)), ((40.0, 90.0), (0, 40)), ((60.0, 210.0), (-30 * 3**0.5, -30))]
+)
+def test_a_pose_is_drawn_at_its_polar_angle_and_azimuth(pose, place):
+    assert map_figure._place(*pose) == pytest.approx(place, abs=1e-9)

@@ -16,7 +16,7 @@ import validation
 from scenes import Pose
 from validation import comparison
 from validation.batch import job, work
-from validation.report import export, page_tables, run_cells, table
+from validation.report import diagnostics, export, figures, page_tables, run_cells, table
 from validation.statistics import ALLOWANCE, LEVEL, SHARES
 
 METHODS = ("gradient", "canny@12", "canny@10")
@@ -321,6 +321,53 @@ def test_of_many_settings_those_farthest_from_their_prediction_are_shown(run, mo
     monkeypatch.setattr(run_cells, "_ROWS", 2)
     away = [abs(math.log(methods_of(here)[0]["ratio"])) for here in told]
     assert [row.index for row in run_cells.far(found)[0]] == sorted(range(SETTINGS), key=lambda i: -away[i])[:2]
+
+
+def test_residuals_are_in_their_own_standard_errors(run):
+    """ln of the ratio over sqrt(2 / (n - 1)) of the values that are not lost."""
+    found, told = run
+    wanted = []
+    for here in told:
+        main = methods_of(here)[0]
+        wanted.append(math.log(main["ratio"]) / math.sqrt(2 / (main["n"] - main["failed"] - 1)))
+    assert diagnostics.residuals(found) == pytest.approx(wanted)
+
+
+def test_standardised_values_are_counted_on_both_sides(run):
+    """Each setting's values less their mean over the predicted sigma: how many lie within one and two."""
+    found, told = run
+    store = SimpleNamespace(distances=lambda index, method: told[index].values[method])
+    made = diagnostics.Distances.of(found, store)
+    every = []
+    for here in told:
+        values = here.values["gradient"][np.isfinite(here.values["gradient"])]
+        every.append((values - values.mean()) / here.sigma["gradient"])
+    z = np.concatenate(every)
+    assert made.total == z.size
+    for sigmas in (1.0, 2.0):
+        assert made.inside(sigmas) == pytest.approx((np.abs(z) < sigmas).mean(), abs=0.01)
+
+
+def test_the_figure_shows_variances_and_their_intervals(run, monkeypatch):
+    """Points at (predicted, measured), bars from the one end of the interval to the other."""
+    found, told = run
+    drawn = []
+    monkeypatch.setattr(figures, "save", lambda figure, path: drawn.append(figure) or path)
+    figures._agreement(found, None)
+    for axis, factor in zip(drawn[0].axes, (None, 1.0), strict=True):
+        points = axis.containers[0].lines[0].get_xydata()
+        bars = axis.containers[0].lines[2][0].get_segments()
+        for point, bar, here in zip(points, bars, told, strict=True):
+            main = methods_of(here)[0]
+            scale = factor or main["propagated"]
+            assert point == pytest.approx([main["propagated"], scale * main["ratio"]])
+            assert bar[:, 1] == pytest.approx([scale * end for end in main["ratio_interval"]])
+    crosses = drawn[0].axes[0].lines
+    calibrated = next(line for line in crosses if str(line.get_label()).startswith("calibrated"))
+    assert calibrated.get_xdata() == pytest.approx([here.predicted["calibrated"] for here in told])
+    bound = next(line for line in crosses if str(line.get_label()).startswith("Cramer"))
+    assert bound.get_xdata() == pytest.approx([here.predicted["bound"] for here in told])
+    figures.plt.close(drawn[0])
 
 
 def test_two_runs_are_compared_by_what_is_not_lost(run):
