@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import planner
+import render
 import scenes
 from measure.estimators.profile import profile_kernel, top_kernel
 from planner.imaging.bore import _form_factors, bores
@@ -15,6 +16,7 @@ from planner.imaging.emitters import nodes
 from planner.imaging.revolved import rings_of
 from planner.models import bias
 from render import curved
+from render.phenomena import transport
 from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
 from scenes.arrays import poses
 from scenes.parts import step, step_kernel
@@ -190,3 +192,20 @@ def test_records_of_a_plan_are_the_candidates(task1):
 )
 def test_a_pose_is_drawn_at_its_polar_angle_and_azimuth(pose, place):
     assert map_figure._place(*pose) == pytest.approx(place, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["printed_label", "grey_floor", "two_lights"])
+def test_an_influence_is_never_negative(name):
+    """They are bounds of sizes: what moves the distance to the one side counts as what moves it to the other."""
+    for decision in render.effects(scenes.load(name)):
+        assert decision.influence.bias_px >= 0
+        assert decision.influence.variance >= 0
+
+
+def test_a_side_face_gives_half_of_what_a_floor_sends_and_an_upright_box_its_elevation():
+    """Bounds of form factors: sine squared of the highest vertex over the face's plane."""
+    box = scenes.Obstacle(corner=(3.0, -1.0, 0.0), size=(1.0, 2.0, 4.0)).solid
+    points, normals = np.array([[[0.0, 0.0, 0.0]]]), np.array([[[0.0, 0, 1], [-1.0, 0, 0]]])
+    found = transport._form_factor(box, points, normals)
+    assert found[0, 0, 0] == pytest.approx(16 / (9 + 1 + 16))
+    assert found[0, 1, 0] == 0
