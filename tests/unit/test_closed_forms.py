@@ -2,25 +2,32 @@
 
 import itertools
 import math
+import statistics
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import planner
 import render
 import scenes
 from measure.estimators.profile import profile_kernel, top_kernel
+from planner.combining import combined
 from planner.imaging.bore import _form_factors, bores
 from planner.imaging.emitters import nodes
 from planner.imaging.revolved import rings_of
 from planner.models import bias
-from render import curved
+from planner.search.aim import Aim
+from planner.search.separable import separable
+from render import curved, lights
 from render.phenomena import transport
 from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
 from scenes.arrays import poses
 from scenes.parts import step, step_kernel
 from scenes.parts.surfaces import Cone
+from validation import views_check
 from validation.report import map_figure
 
 LIGHTS = [
@@ -209,3 +216,70 @@ def test_a_side_face_gives_half_of_what_a_floor_sends_and_an_upright_box_its_ele
     found = transport._form_factor(box, points, normals)
     assert found[0, 0, 0] == pytest.approx(16 / (9 + 1 + 16))
     assert found[0, 1, 0] == 0
+
+
+def test_the_renderer_s_ring_is_the_planner_s():
+    """Tilted: its area, its inner rim further from the object than the outer one, its outside inwards and forwards."""
+    light = Ring(kind="ring", distance=90.0, inner_radius=2.0, outer_radius=5.0, tilt_deg=35.0)
+    triangles, made = lights._ring(light), nodes(light, 10.0, 12)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(normals, axis=1).sum() / 2
+    assert area == pytest.approx(made.area, rel=1e-3)
+    assert area == pytest.approx(math.pi * 21 / math.cos(math.radians(35.0)), rel=1e-3)
+    far = np.linalg.norm(triangles[..., :2], axis=-1)
+    slope = np.polyfit(far.ravel(), triangles[..., 2].ravel(), 1)[0]
+    there = np.polyfit(np.linalg.norm(made.places[:, :2], axis=1), made.places[:, 2], 1)[0]
+    assert slope == pytest.approx(math.tan(math.radians(35.0)), rel=1e-3)
+    assert there == pytest.approx(math.tan(math.radians(35.0)), rel=1e-6)
+    assert made.normals[:, 2] == pytest.approx(math.cos(math.radians(35.0)))
+
+
+@pytest.mark.parametrize("exposure", [205.0, 230.0, 260.0])
+def test_a_search_by_bounds_finds_what_is_best_where_levels_are_cut_off(task1, exposure):
+    """A near light: one end of an edge beyond the scale, the other not; against all pairs one by one."""
+    near = task1.light.model_copy(update={"distance": 25.0})
+    camera = task1.camera.model_copy(update={"exposure": exposure})
+    scene = task1.model_copy(update={"light": near, "camera": camera})
+    polar, azimuth = np.meshgrid([15.0, 40.0, 65.0], np.arange(0.0, 360.0, 40.0))
+    poses_ = np.column_stack([polar.ravel(), azimuth.ravel()])
+    table = separable(scene, poses_, poses_, "calibrated", Aim.of(scene.quantities, "image"))
+    exact = planner.variances(scene, poses_[:, None], poses_[None], objective="image")
+    below = 0
+    for which in range(len(table.strength)):
+        rows, columns, matrix = table.of_class(which)
+        bound = table.rows(rows, matrix)
+        value = exact[np.ix_(table.sensors[rows], columns)]
+        there = np.isfinite(value)
+        assert (bound[there] <= value[there] * (1 + 1e-6)).all()
+        below += int((bound[there] > 0.5 * value[there]).sum())
+    assert below > 20
+
+
+def test_pictures_are_combined_with_the_squares_of_their_weights():
+    """Two pictures of unlike scatter and one of them lost at times; the mean error in the object, sigma not squared."""
+    ok = SimpleNamespace(status="ok", name="width", unit="cm", value_object=5.0)
+    views = [SimpleNamespace(sensor=k, light=k, prediction=SimpleNamespace(measurands=(ok,))) for k in (0, 1)]
+    variances = np.array([[[4e-6]], [[1e-6]]])
+    both = combined(variances, np.array([["ok"], ["ok"]]), np.zeros((2, 1)))
+    assert both.weights.ravel() == pytest.approx([0.2, 0.8])
+    rng = np.random.default_rng(6)
+    values = [5.0 + 1e-4 + v * rng.normal(size=(1, 300, 1)) for v in (2e-3, 1e-3)]
+    values[1][0, 4:6] = np.nan
+    shots = {(k, k): views_check._Shot(values[k], variances[k] * (1.2, 0.9)[k]) for k in (0, 1)}
+    chosen = SimpleNamespace(views=views, combination=both)
+    ((row, joined),) = views_check._rows(None, chosen, shots)
+    wanted = 0.2 * values[0][0, :, 0] + 0.8 * values[1][0, :, 0]
+    good = wanted[np.isfinite(wanted)]
+    assert joined[np.isfinite(joined)] == pytest.approx(good)
+    assert (row.n, row.failed, row.pictures) == (298, 2, 2)
+    assert row.predicted == pytest.approx(1 / (1 / 4e-6 + 1 / 1e-6))
+    assert row.propagated == pytest.approx(0.04 * 4.8e-6 + 0.64 * 0.9e-6)
+    assert row.empirical == pytest.approx(statistics.variance(good.tolist()))
+    assert row.ratio == pytest.approx(row.empirical / row.predicted)
+    assert row.bias == pytest.approx(good.mean() - 5.0)
+    freedom = 297
+    ends = [row.ratio * freedom / stats.chi2.ppf(q, freedom) for q in (0.975, 0.025)]
+    assert row.ratio_interval == pytest.approx(ends)
+    told = views_check.judge([(row, joined)], 1.0)
+    assert told.verdict.bias.largest == pytest.approx(abs(row.bias) / math.sqrt(row.predicted))
+    assert told.verdict.agrees
