@@ -145,14 +145,14 @@ def test_a_torus_hides_its_limb_only_where_it_stands_before_it(eye):
 # --- searches
 
 
-@pytest.mark.parametrize("larger", [0.8, 1.0, 1.6])
+@pytest.mark.parametrize("larger", [0.9, 1.5])
 def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
     """Short edges, whose ends take most, under a single place of both lights: below the best, and not far below."""
     scene = scenes.load("two_lights")
     scene, aim = changed(scene, camera={"focal_px": larger * scene.camera.focal_px}), Aim.of(scene.quantities, "object")
     place, ratios, lengths = np.array([[40.0, 300.0]]), [], []
     looks = _Looks(scene, place, aim, planner.Constraints())
-    for sensor in np.array([[p, a] for p in (30.0, 45.0, 60.0) for a in range(0, 360, 15)], float):
+    for sensor in np.array([[p, a] for p in (30.0, 60.0) for a in range(195, 360, 15)], float):
         known = looks.look(sensor)
         for share in ((0.0, 1.0), (0.3, 0.7)) if known else ():
             exact = planner.variances(with_shares(scene, share), sensor, (place[0], place[0]))
@@ -315,21 +315,21 @@ def test_a_board_s_pose_takes_six_degrees_of_freedom():
 
 
 def test_what_a_fitted_crossing_leaves_is_its_degrees_of_freedom(rng):
-    """200 crossings in unit noise, of windows of 200 and of 120 px: the mean square, and its number, 17 less."""
-    offset = np.stack(np.meshgrid(np.arange(-7, 8), np.arange(-7, 8)), -1).reshape(-1, 2).astype(float)[:200]
+    """120 crossings in unit noise, of windows of 120 and of 80 px: the mean square, and its number, 17 less."""
+    offset = np.stack(np.meshgrid(np.arange(-7, 8), np.arange(-7, 8)), -1).reshape(-1, 2).astype(float)[40:160]
     truth = np.column_stack([
-        rng.uniform(-0.4, 0.4, (200, 2)), rng.uniform(-0.1, 0.1, 200), rng.uniform(1.45, 1.75, 200), np.full(200, -0.2),
+        rng.uniform(-0.4, 0.4, (120, 2)), rng.uniform(-0.1, 0.1, 120), rng.uniform(1.45, 1.75, 120), np.full(120, -0.2),
     ])  # fmt: skip
-    places, bend = np.tile(offset, (200, 1, 1)), np.zeros((200, 2))
+    places, bend = np.tile(offset, (120, 1, 1)), np.zeros((120, 2))
     there = np.ones(places.shape[:2], bool)
-    there[::2, 120:] = False
+    there[::2, 80:] = False
     levels = 100 + 60 * response(places, truth, bend).signs[..., 2] + rng.normal(size=there.shape)
-    windows = Windows(places, np.where(there, levels, 0.0), there, np.ones(200, bool))
+    windows = Windows(places, np.where(there, levels, 0.0), there, np.ones(120, bool))
     found = fit_crossings(windows, truth, bend, 1e-4)
-    assert found.freedom.tolist() == [103, 183] * 100
-    for some, freedom in ((np.s_[::2], 103), (np.s_[1::2], 183)):
-        assert found.square[some].mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 100))
-        assert abs(found.square[some].mean() - freedom - 12) > 4 * math.sqrt(2 * freedom / 100)
+    assert found.freedom.tolist() == [63, 103] * 60
+    for some, freedom in ((np.s_[::2], 63), (np.s_[1::2], 103)):
+        assert found.square[some].mean() == pytest.approx(freedom, abs=4 * math.sqrt(2 * freedom / 60))
+        assert abs(found.square[some].mean() - freedom - 12) > 4 * math.sqrt(2 * freedom / 60)
 
 
 def scatter(measured, predicted, n, failed, share=1.0):
