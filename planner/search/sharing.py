@@ -34,7 +34,8 @@ from scenes import Scene
 _EXACT = 32  # sensors whose best combination is evaluated exactly
 BETTER = 1 - 1e-9  # than which a value must be less to be better
 _AT_ONCE = 1 << 21  # contrasts in memory
-_ENDS = 0.85  # at least, of a line's first-order variance, is left by what is at its ends; 2 s / (sqrt(pi) length) goes
+_ENDS = 0.85  # of a line's first-order variance, at most, is what its ends are trusted to leave, and less of ...
+_UNEVEN = 2.0  # ... a short one: they are taken to take so many times as much as at even contrast
 
 
 class Alone(NamedTuple):
@@ -173,7 +174,9 @@ class _Looks:
         with np.errstate(all="ignore"):
             most = [np.nanmax(np.abs(part[..., 0, :] - part[..., 1, :]), 0, initial=0.0) for part in signals]
             ratio = self.scene.noise.variance / np.maximum(*most) ** 2
-            return _finite(self.aim(_ENDS * np.where(weights[1] > 0, weights[1] * ratio, 0.0).sum((-2, -1))))
+            first = np.where(weights[1] > 0, weights[1] * ratio, 0.0).sum(-1)
+            left = 1 - _UNEVEN * (1 - weights[0].sum(-1) / weights[1].sum(-1))
+            return _finite(self.aim(np.where(first > 0, np.clip(left, 0, _ENDS) * first, 0.0).sum(-1)))
 
     def best(self, known: tuple | None, share: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The least of what is minimised under mixtures with these shares, and the free lights' poses (2 F,).

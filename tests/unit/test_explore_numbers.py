@@ -1,0 +1,112 @@
+"""The numbers on the page of `ice explore`, of a scene with two lights and uneven tolerances, beside the planner's."""
+
+import math
+import statistics
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import planner
+import scenes
+from scenes import Pose, Tolerance
+from validation.batch.work import Chunk, Clean, Found, Packed
+from validation.explore import answers, prove, sphere
+from validation.explore.state import SENSOR, State
+
+
+@pytest.fixture(scope="module")
+def scene():
+    two = scenes.load("two_lights")
+    zones = Tolerance(plus=0.03, minus=0.01), Tolerance(plus=0.002, minus=0.05)
+    told = (m.model_copy(update={"tolerance": zone}) for m, zone in zip(two.measurands, zones, strict=True))
+    one, other = two.lights
+    return two.lit_by(one, other.model_copy(update={"distance": 80.0})).model_copy(update={"measurands": tuple(told)})
+
+
+@pytest.mark.parametrize("moving", [SENSOR, 0, 1])
+def test_the_sphere_is_the_prediction_with_that_thing_moved(scene, moving):
+    """Two unlike lights and the sensor, one of them at other places; standard deviations in the object."""
+    state = replace(State.first(scene), moving=moving)
+    places = np.array([[50.0, 270.0], [62.0, 285.0], [70.0, 200.0]])
+    found = np.concatenate(list(sphere.values(scene, state, places)))
+    for place, row in zip(places, found, strict=True):
+        at = Pose(*place)
+        sensor = at if moving == SENSOR else state.sensor
+        lights = tuple(list(at if i == moving else pose) for i, pose in enumerate(state.lights))
+        wanted = [math.sqrt(planner.variances(one, list(sensor), lights, objective="object")) for one in _alone(scene)]
+        assert row == pytest.approx(wanted, rel=1e-9)
+    assert np.isfinite(found).any()
+
+
+def _alone(scene):
+    return [scene.model_copy(update={"measurands": (each,)}) for each in scene.measurands]
+
+
+def test_the_sphere_is_found_anew_when_anything_else_moves(scene):
+    first = replace(State.first(scene), moving=0)
+    one, two = first.lights
+    away = Pose(one.polar_deg + 5, one.azimuth_deg)
+    assert sphere.key(replace(first, lights=(away, two))) == sphere.key(first)
+    assert sphere.key(replace(first, measurand=1, shown="ratio")) == sphere.key(first)
+    others = (
+        replace(first, lights=(one, away)), replace(first, sensor=away), replace(first, moving=1),
+        replace(first, moving=SENSOR),
+    )  # fmt: skip
+    assert len({sphere.key(each) for each in (first, *others)}) == 5
+
+
+@pytest.mark.parametrize("measurand", [0, 1])
+def test_what_is_said_of_a_place_is_the_planner_s(scene, measurand):
+    """Sigma in the object and px, 2 sigma over half of the zone, colours of the sphere alike."""
+    state = replace(State.first(scene), measurand=measurand, shown="ratio")
+    told = answers.to_message(answers.answer(scene, state))["measurands"][measurand]
+    each = planner.predict(scene, state.sensor, state.lights).measurands[measurand]
+    half = (0.02, 0.026)[measurand]
+    sigma = math.sqrt(each.variance_object)
+    assert (told["sigma"], told["sigma_px"]) == pytest.approx((sigma, math.sqrt(each.variance_image)))
+    assert (told["ratio"], told["tolerance"]) == pytest.approx((2 * sigma / half, half))
+    assert (told["value"], told["nominal"]) == pytest.approx((each.value_object, each.nominal))
+    sigmas = np.array([[sigma, 2 * sigma], [np.inf, np.nan]])
+    shown = sphere.to_message(scene, state, sigmas)
+    assert shown["values"] == [pytest.approx(2 * sigma * (1 + measurand) / half, rel=1e-3), None]
+    plain = sphere.to_message(scene, replace(state, shown="sigma"), sigmas)
+    assert plain["values"][0] == pytest.approx(sigma * (1 + measurand), rel=1e-3)
+
+
+def test_shares_of_a_variance_are_those_of_its_edges(scene):
+    """They add to 1; each is what is left out when only that edge is without error."""
+    state = State.first(scene)
+    told = answers.answer(scene, state)
+    assert sum(told.shares.values()) == pytest.approx(1.0)
+    assert list(told.shares.values()) == sorted(told.shares.values(), reverse=True)
+    assert told.limiting == max(told.shares, key=told.shares.get)
+
+
+def test_a_proof_is_in_standard_deviations(scene):
+    """Two measurands, some values lost: by `statistics`, the interval of what is left by SciPy."""
+    rng, about, propagated, columns = np.random.default_rng(4), [], {}, {}
+    for k, sigma in enumerate((0.002, 0.005)):
+        values = 7.0 + k + sigma * rng.normal(size=60)
+        values[5 : 9 + k] = np.nan
+        columns[f"gradient:{k}"] = values
+        propagated[f"gradient:{k}"] = (sigma**2, 7.0 + k, "ok")
+        about.append({"name": f"m{k}", "unit": "cm", "value": 7.0 + k, "calibrated": (1.1 * sigma) ** 2,
+                      "predicted_bias": 1e-4 * (k + 1)})  # fmt: skip
+    clean = Clean(Packed.of(np.zeros((2, 2))), propagated, {"measurands": about}, {})
+    pieces = [Found(None, {0: Chunk({n: v[s] for n, v in columns.items()}, {}, {})}) for s in (np.s_[:25], np.s_[25:])]
+    for k, (proof, sigma) in enumerate(zip(prove.proofs(scene, clean, pieces), (0.002, 0.005), strict=True)):
+        good = [float(v) for v in columns[f"gradient:{k}"] if math.isfinite(v)]
+        measured = statistics.stdev(good)
+        message = prove.to_message(proof)
+        wanted = {
+            "calibrated": 1.1 * sigma, "propagated": sigma, "measured": measured, "ratio": (measured / sigma) ** 2,
+            "bias": statistics.fmean(good) - 7.0 - k, "predicted_bias": 1e-4 * (k + 1), "mean": statistics.fmean(good),
+        }  # fmt: skip
+        assert {name: message[name] for name in wanted} == pytest.approx(wanted)
+        freedom = len(good) - 1
+        ends = [(measured / sigma) ** 2 * freedom / stats.chi2.ppf(q, freedom) for q in (0.975, 0.025)]
+        assert message["interval"] == pytest.approx(ends)
+        assert (message["n"], message["failed"], message["name"]) == (60, 4 + k, f"m{k}")
+        assert sum(message["counts"]) == len(good)
