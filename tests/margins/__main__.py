@@ -1,8 +1,8 @@
-"""python -m tests.margins [arguments of pytest]: which comparisons come within a factor 5 of their limits, unexplained?
+"""python -m tests.margins [arguments of pytest]: which comparisons within a factor 5 of their limits do not say why?
 
 Runs the tests with the recorder (`recorder.py`) and lists the worst margin of each such place. A comment `# margin: why`
-on the statement or just above it explains a place; what a test stands on for another reason than a tolerance (a bound that
-holds by its kind, chance of so many standard errors, the order of two numbers) says so there. Exits 1 if any place is left.
+on the statement or just above it explains a place: what stands for another reason than a tolerance (a bound that holds by
+its kind, chance of so many standard errors, the order of two numbers) says so there. Exits 1 if any place is left.
 `python -m tests.margins --read FILE` lists what a run has recorded, `--explained` those with a reason too.
 """
 
@@ -50,7 +50,9 @@ def listed(file: Path, explained: bool) -> int:
             print(f"{place[0]}:{place[1]}: {one['value']:.6g} against {one['limit']:.6g} ({one['ratio']:.2f})", end=" ")
             print(reasons[place] or one["test"].partition("::")[2])
     bare = sum(not reason for reason in reasons.values())
-    print(f"{len(worst)} places compare numbers, {len(near)} within a factor {_FACTOR} of the limit, {bare} unexplained")
+    print(
+        f"{len(worst)} places compare numbers, {len(near)} within a factor {_FACTOR} of the limit, {bare} unexplained"
+    )
     return int(bare > 0)
 
 

@@ -1,8 +1,8 @@
 """A pytest plugin that records how near each comparison of the tests comes to its limit.
 
 `pytest -p tests.margins.recorder --margins FILE ...`: of every place that compares numbers the worst margin, value over
-limit, is added to FILE, a line of JSON each. Asserts are rewritten before pytest rewrites them; `pytest.approx` and NumPy's
-comparisons are wrapped where tests call them. What compares no floating-point number is not recorded.
+limit, is added to FILE, a line of JSON each. Asserts are rewritten before pytest rewrites them; `pytest.approx` and the
+comparisons of NumPy are wrapped where tests call them. What compares no floating-point number is not recorded.
 """
 
 from __future__ import annotations
@@ -243,7 +243,7 @@ def _wrap_approx() -> None:
     for kind in kinds - {object}:
         if "__eq__" in vars(kind):
             kind.__eq__ = _wrapped(kind.__eq__, _approximately)
-            kind.__ne__ = _wrapped(lambda approx, actual: not approx == actual, _not_approximately)
+            kind.__ne__ = _wrapped(lambda approx, actual: not approx.__eq__(actual), _not_approximately)
 
 
 def _approximately(approx, actual):

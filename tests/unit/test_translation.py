@@ -94,7 +94,7 @@ def test_effects_are_decided_alike(name):
 def test_rendered_image_and_measurement_are_the_same(name):
     """Single precision knows a place to 5e-6 cm: 4e-5 px, so the same rays fall on the other side of an edge at times.
 
-    Where that makes one fine pixel more an edge's, all later ones get other random numbers (grey_floor): 64 rays at each,
+    Where that makes one fine pixel more an edge's, all later ones get other random numbers (grey_floor), 64 rays each:
     2e-5 of the contrast in the mean, 0.008 at most. An image moved by 0.3 px, 6e-4 and 0.15, is told from that.
     """
     scene, quality, (sensor, light) = SCENES[name], render.Quality(2, 4), POSES.get(name, ELSEWHERE)
