@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import platform
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_info
 
 from validation.batch import pool
@@ -22,7 +23,7 @@ _LAST_DIGITS = ("processor", "numpy", "blas", "embree")
 def here() -> dict[str, str | int]:
     """This machine: processor, the instruction sets that NumPy and Embree take on it, BLAS kernels, system, cores."""
     name, flags = _processor()
-    core = np._core._multiarray_umath
+    core: Any = importlib.import_module("numpy._core._multiarray_umath")  # what np.show_runtime() prints
     taken = [each for each in core.__cpu_baseline__ + core.__cpu_dispatch__ if core.__cpu_features__.get(each)]
     kernels = [library.get("architecture", "") for library in threadpool_info() if library["user_api"] == "blas"]
     return {
