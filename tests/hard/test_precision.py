@@ -37,7 +37,7 @@ def test_single_precision_is_safe_but_where_the_contrast_vanishes(task1):
 
 def test_figure(tmp_path):
     draw(tmp_path / "map.png", step_deg=10)
-    assert cv2.imread(str(tmp_path / "map.png")).std() > 10  # drawn, not blank
+    assert cv2.imread(str(tmp_path / "map.png")).std() > 10  # drawn, not blank  # margin: a blank picture has 0
 
 
 def test_a_focal_length_beyond_single_precision_is_refused():

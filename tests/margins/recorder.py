@@ -88,7 +88,8 @@ class _Compared(ast.NodeTransformer):
         match node:
             case ast.Compare(ops=ops) if all(type(op) in _OPERATORS for op in ops):
                 signs = ast.Constant("".join(_OPERATORS[type(op)] + " " for op in ops).rstrip())
-                more = [signs, ast.Constant(negated), ast.Constant(which), ast.Constant(line)]
+                between = len(ops) == 2 and not isinstance(node.comparators[0], ast.Constant)
+                more = [signs, *map(ast.Constant, (negated, which, between, line))]
                 called = ast.Call(ast.Name(_NAME, ast.Load()), more + [node.left, *node.comparators], [])
                 return ast.copy_location(called, node)
             case ast.BoolOp(op=op):
@@ -109,7 +110,7 @@ def _of(name: str, negated: bool, which: str) -> str:
     return which if (name == "all") != negated else "any"
 
 
-def compared(signs: str, negated: bool, which: str, line: int, *operands):
+def compared(signs: str, negated: bool, which: str, between: bool, line: int, *operands):
     """What the comparison gives; its margin is recorded."""
     signs = signs.split()
     result = True
@@ -118,7 +119,7 @@ def compared(signs: str, negated: bool, which: str, line: int, *operands):
         result = one if result is True else result & one if isinstance(one, np.ndarray) else result and one
     kinds = [_float(operand) for operand in operands]
     if all(kind is not None for kind in kinds) and any(kind for kind in kinds):
-        ratios, value, limit = _margins([_NOT[s] if negated else s for s in signs], operands)
+        ratios, value, limit = _margins([_NOT[s] if negated else s for s in signs], operands, between)
         held = np.asarray(result).all() != negated
         if ratios.size and (which != "held" or held):
             worst = np.argmin(ratios) if which == "any" else np.argmax(ratios)
@@ -147,11 +148,11 @@ def _float(operand) -> bool | None:
     return kind == "f" if kind in "fiub" else None
 
 
-def _margins(signs: list[str], operands) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value over limit, value and limit: of `low < x < high` from the middle between low and high."""
+def _margins(signs: list[str], operands, between: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value over limit, value and limit; of `low < x < high`, if x is no constant, from the middle of low and high."""
     with np.errstate(all="ignore"):
         numbers = [np.asarray(operand, float) for operand in operands]
-        if len(numbers) == 3 and signs[0][0] == signs[1][0]:
+        if between and signs[0][0] == signs[1][0]:
             low, value, high = numbers
             half = np.abs(high - low) / 2
             if np.isfinite(half).all():
