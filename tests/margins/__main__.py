@@ -2,7 +2,8 @@
 
 Runs the tests with the recorder (`recorder.py`) and lists the worst margin of each such place. A comment that begins
 with "margin:", on the statement or just above it, explains a place: what stands for another reason than a tolerance (a
-bound that holds by its kind, chance of so many standard errors, the order of two numbers) says so. Exits 1 if any is left.
+bound that holds by its kind, chance of so many standard errors, the order of two numbers) says so. It exits 1 if any
+is left.
 `python -m tests.margins --read FILE` lists what a run has recorded, `--explained` those with a reason too.
 """
 

@@ -24,8 +24,6 @@ from _pytest.assertion import rewrite
 TESTS = Path(__file__).resolve().parent.parent
 _NAME = "__compared_with_margin__"
 _OPERATORS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
-_NOT = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-_RESULT = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}
 _worst: dict[tuple[str, int], dict] = {}
 _inside = False  # a comparison that is part of a recorded one
 
@@ -119,7 +117,7 @@ def compared(signs: str, negated: bool, which: str, between: bool, line: int, *o
         result = one if result is True else result & one if isinstance(one, np.ndarray) else result and one
     kinds = [_float(operand) for operand in operands]
     if all(kind is not None for kind in kinds) and any(kind for kind in kinds):
-        ratios, value, limit = _margins([_NOT[s] if negated else s for s in signs], operands, between)
+        ratios, value, limit = _margins(signs, operands, between, negated)
         held = np.asarray(result).all() != negated
         if ratios.size and (which != "held" or held):
             worst = np.argmin(ratios) if which == "any" else np.argmax(ratios)
@@ -148,7 +146,7 @@ def _float(operand) -> bool | None:
     return kind == "f" if kind in "fiub" else None
 
 
-def _margins(signs: list[str], operands, between: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _margins(signs: list[str], operands, between: bool, negated: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Value over limit, value and limit; of `low < x < high`, if x is no constant, from the middle of low and high."""
     with np.errstate(all="ignore"):
         numbers = [np.asarray(operand, float) for operand in operands]
@@ -156,12 +154,14 @@ def _margins(signs: list[str], operands, between: bool) -> tuple[np.ndarray, np.
             low, value, high = numbers
             half = np.abs(high - low) / 2
             if np.isfinite(half).all():
-                return *_at_least_1d(np.abs(value - (low + high) / 2) / half), value, high
+                ratio = np.abs(value - (low + high) / 2) / half
+                return *_at_least_1d(1 / ratio if negated else ratio), value, high
         parts = [
-            (_ratio(*((a, b) if sign[0] == "<" else (b, a))), a, b)
+            (_ratio(*((a, b) if (sign[0] == "<") != negated else (b, a))), a, b)
             for sign, a, b in zip(signs, numbers, numbers[1:], strict=False)
         ]
-    return max(((*_at_least_1d(part[0]), *part[1:]) for part in parts), key=lambda part: np.nanmax(part[0], initial=0))
+    parts = [(*_at_least_1d(part[0]), *part[1:]) for part in parts]
+    return (min if negated else max)(parts, key=lambda part: np.nanmax(part[0], initial=0))
 
 
 def _at_least_1d(ratios: np.ndarray) -> tuple[np.ndarray]:
