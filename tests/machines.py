@@ -1,11 +1,12 @@
 """python -m tests.machines [--all] [arguments of pytest]: the tests on other processors than this one.
 
-Each pass has the environment of another machine: OpenBLAS's kernels and threads, the instruction sets that NumPy, OpenCV
-and the C library may take, and Embree's. Only what this processor has can be left out, so a newer one tries more. Without
---all the passes are two, of the tests in machines.txt; with it they are four, of all that `make test` runs.
+Each pass has the environment of another machine: OpenBLAS's kernels and threads, the instruction sets that NumPy,
+OpenCV and the C library may take, and Embree's. Only what this processor has can be left out, so a newer one tries more.
+Without --all the passes are two, of the tests in machines.txt; with it they are four, of all that `make test` runs.
 
-Embree takes the best that the processor has, and Mitsuba gives it a fixed configuration: "threads=%i,user_threads=%i"
-in libmitsuba.so. Here that text is another one in a copy, found by LD_LIBRARY_PATH; what Embree says it uses is checked.
+Embree takes the best that the processor has, for Mitsuba gives it a fixed configuration: libmitsuba.so holds the text
+"threads=%i,user_threads=%i". Here it is another one in a copy, found by LD_LIBRARY_PATH; what Embree says it uses is
+checked.
 """
 
 import argparse
