@@ -1,7 +1,7 @@
 """python -m tests.machines [--all] [arguments of pytest]: the tests on other processors than this one.
 
 Each pass has the environment of another machine: OpenBLAS's kernels and threads, the instruction sets that NumPy,
-OpenCV and the C library may take, and Embree's. Only what this processor has can be left out, so a newer one tries more.
+OpenCV and the C library may take, and Embree's. Only what this processor has can be left out, so newer ones try more.
 Without --all the passes are two, of the tests in machines.txt; with it they are four, of all that `make test` runs.
 
 Embree takes the best that the processor has, for Mitsuba gives it a fixed configuration: libmitsuba.so holds the text

@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 _FACTOR = 5
-_MARK = "# margin:"
+_MARK = "margin:"
 _ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -77,8 +77,9 @@ def _reason(file: str, first: int, last: int) -> str:
     above = first - 1
     while above and lines[above - 1].lstrip().startswith("#"):
         above -= 1
-    comments = [line.partition(_MARK)[2].strip() for line in lines[above:last] if _MARK in line]
-    return " ".join(comments)
+    before = " ".join(line.strip("# ") for line in lines[above : first - 1]).partition(_MARK)[2]
+    beside = (line.partition(_MARK)[2] for line in lines[first - 1 : last])
+    return " ".join(part.strip() for part in (before, *beside) if part)
 
 
 if __name__ == "__main__":
