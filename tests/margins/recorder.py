@@ -153,7 +153,7 @@ def _margins(signs: list[str], operands, between: bool, negated: bool) -> tuple[
         if between and signs[0][0] == signs[1][0]:
             low, value, high = numbers
             half = np.abs(high - low) / 2
-            if np.isfinite(half).all():
+            if np.isfinite(half).all() and low.all() and high.all():  # 0 < x < 1 says x is positive
                 ratio = np.abs(value - (low + high) / 2) / half
                 return *_at_least_1d(1 / ratio if negated else ratio), value, high
         parts = [
