@@ -116,7 +116,7 @@ def compared(signs: str, negated: bool, which: str, between: bool, line: int, *o
         one = _python(sign, left, right)
         result = one if result is True else result & one if isinstance(one, np.ndarray) else result and one
     kinds = [_float(operand) for operand in operands]
-    if all(kind is not None for kind in kinds) and any(kind for kind in kinds):
+    if None not in kinds and any(kinds) and not _counted(kinds, operands):
         ratios, value, limit = _margins(signs, operands, between, negated)
         held = np.asarray(result).all() != negated
         if ratios.size and (which != "held" or held):
@@ -144,6 +144,11 @@ def _float(operand) -> bool | None:
         return None
     kind = np.asarray(operand).dtype.kind
     return kind == "f" if kind in "fiub" else None
+
+
+def _counted(kinds: list[bool | None], operands) -> bool:
+    """Is it a count beside a whole number, such as a binomial limit?"""
+    return not all(kinds) and all((np.asarray(operand) % 1 == 0).all() for operand in operands)
 
 
 def _margins(signs: list[str], operands, between: bool, negated: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -53,7 +53,9 @@ def test_each_kind_of_comparison(seen, line, ratio):
     assert seen(line) == [ratio]
 
 
-@pytest.mark.parametrize("line", ["assert n < 4", "assert 'a' < 'b'", "assert b[b > 0.5].size", "assert x != 3"])
+@pytest.mark.parametrize(
+    "line", ["assert n < 4", "assert n < 4.0", "assert 'a' < 'b'", "assert b[b > 0.5].size", "assert x != 3"]
+)
 def test_what_has_no_margin_is_not_recorded(seen, line):
     assert seen(line) == []
 
