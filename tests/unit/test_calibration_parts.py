@@ -57,7 +57,7 @@ def test_blur_for_a_kappa(blur, scale):
 
 
 def test_variance_of_points(task1, rng):
-    """Of 4 sides x some 25 independent points x 40 images: within 9 %, 4 standard errors, of kappa^2 s_n^2 / C^2, as is the correlation."""
+    """Of 4 sides x some 25 independent points x 40 images: within 9 % of kappa^2 s_n^2 / C^2."""
     ratio = 0.02
     clean, layout = _square(14.0, ratio, task1)
     noisy = clean + 100.0 * ratio * rng.standard_normal((40, *clean.shape))
