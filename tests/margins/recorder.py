@@ -78,7 +78,7 @@ class _Compared(ast.NodeTransformer):
 
     def visit_Return(self, node):
         self.generic_visit(node)
-        node.value = node.value and self._stands_on(node.value, node.lineno, False, "all")
+        node.value = node.value and self._stands_on(node.value, node.lineno, False, "held")
         return node
 
     def _stands_on(self, node, line, negated, which):
@@ -86,7 +86,9 @@ class _Compared(ast.NodeTransformer):
         match node:
             case ast.Compare(ops=ops) if all(type(op) in _OPERATORS for op in ops):
                 signs = ast.Constant("".join(_OPERATORS[type(op)] + " " for op in ops).rstrip())
-                between = len(ops) == 2 and not isinstance(node.comparators[0], ast.Constant)
+                middle = node.comparators[0]
+                fixed = isinstance(middle, ast.Constant) or (isinstance(middle, ast.Name) and middle.id.isupper())
+                between = len(ops) == 2 and not fixed
                 more = [signs, *map(ast.Constant, (negated, which, between, line))]
                 called = ast.Call(ast.Name(_NAME, ast.Load()), more + [node.left, *node.comparators], [])
                 return ast.copy_location(called, node)
@@ -104,7 +106,7 @@ class _Compared(ast.NodeTransformer):
 
 
 def _of(name: str, negated: bool, which: str) -> str:
-    """Must all comparisons hold, or one of them? "held": one of several, record those that do."""
+    """Must all comparisons hold, or one of them? "held": not known, record those that do."""
     return which if (name == "all") != negated else "any"
 
 

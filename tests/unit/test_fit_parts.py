@@ -84,7 +84,7 @@ def test_neighbours_do_not_take_a_smooth_misfit_for_noise(problem, rng):
     values = by_neighbours(Shots(noisy, 1, None, (0,)), problem.pixels[0], signal, 4.0)
     told = curve(values[0], values[1], np.full(values[0].size, values[2]))
     assert told.dark + told.gain * 50 == pytest.approx(4.0, rel=0.1)
-    # margin: of a variance of 12 and noise of 4 the pixels' own part of the signal takes some; 4 is what is told
+    # margin: the order is said: twice the 4 that neighbours tell
     assert np.var(problem.pixels[0].of(noisy) - signal) > 8
 
 
