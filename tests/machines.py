@@ -50,6 +50,7 @@ class Machine:
         tunables = f"glibc.cpu.hwcaps={self.without_libc}" if self.without_libc else ""
         own = {
             "OPENBLAS_CORETYPE": self.core, "OPENBLAS_NUM_THREADS": self.threads, "OMP_NUM_THREADS": self.threads,
+            "OPENBLAS_THREAD_TIMEOUT": 10,  # idle threads sleep at once, for there are more of them than cores
             "NPY_DISABLE_CPU_FEATURES": " ".join(dispatched()[self.levels :]), "OPENCV_CPU_DISABLE": self.without,
             "GLIBC_TUNABLES": tunables, "LD_LIBRARY_PATH": folder,
         }  # fmt: skip
