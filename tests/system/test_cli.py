@@ -135,7 +135,7 @@ def test_calibrate_agrees_with_the_closed_form(tmp_path):
     curves = {curve["name"]: curve for curve in document["curves"]}
     # margin: the claim of the closed form, 10 %
     assert curves["gradient"]["kappa2"] == pytest.approx(document["closed_kappa2"], rel=0.1)
-    # margin: 20 images tell it to 6 % here; edge points as dense as pixels would be half off
+    # margin: 20 images tell it to 6 % here
     assert curves["gradient"]["correlation_px"] == pytest.approx(document["closed_correlation_px"], rel=0.15)
     assert 0.80 < curves["arrangement"]["efficiency"] < 1.1  # margin: 0.87, by 400 images; 20 tell it to 4 %
     # margin: the order is said: no other comes as near to the bound

@@ -129,7 +129,7 @@ def test_preview_is_the_picture(task1):
     assert drawn.shape == clean.shape
     apart = np.abs(drawn - clean)
     assert np.median(apart) < 2
-    assert (apart > 12).mean() < 0.05  # margin: the share of pixels at edges, 3 %, which the preview draws unblurred
+    assert (apart > 12).mean() < 0.05  # margin: the share of pixels near edges, 3 %
     # margin: the order is said, against 2 grey levels
     assert np.abs(255 - drawn - clean).mean() > 50  # a picture of the wrong brightness is another one
 

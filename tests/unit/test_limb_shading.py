@@ -125,7 +125,7 @@ def test_variance_against_noisy_images():
     assert abs(ratio / 1.3 - 1) > 4 * error  # margin: 30 % are 10 standard errors
     step = kappa2(SCALE, BLUR) * sigma**2 / profile.coefficients[0, 0] ** 2
     assert abs(np.var(places) / step - 1) > 4 * error
-    # margin: second order of the noise; 1.5 % of the shift's scatter
+    # margin: second order of the noise
     assert np.mean(places) == pytest.approx(-found.shift[0], abs=0.01)
 
 

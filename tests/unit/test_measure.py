@@ -199,7 +199,7 @@ def test_near_the_threshold_the_variance_would_be_wrong(quiet, monkeypatch):
     image, _ = picture(quiet, SENSOR, contrast_of(12.2))
     predicted = measure.propagate(image, quiet, SENSOR, estimator="canny")
     measured, linear, reported = beside_linear(quiet, image, SENSOR, predicted)
-    # margin: a tenth, so that it is no chance: 400 images tell the ratio to 2 %
+    # margin: a tenth, so that it is no rounding
     assert measured.var() / linear.var() > 1.1
     assert measured.var() / reported.mean() > 1.1  # margin: a tenth, so that it is no rounding
 

@@ -50,7 +50,7 @@ def test_shot_noise(rng):
     levels = np.array([45.0, 95.0, 150.0])
     for image in (noisy, np.rint(noisy)):
         rounded = (image is not noisy) / 12
-        # margin: the claim, 4 %, 3 standard errors of the patches
+        # margin: the claim, 4 %
         assert noise_curve(image).variance(levels) == pytest.approx(1.0 + 0.08 * levels + rounded, rel=0.04)
     assert noise_curve(clean + rng.standard_normal(SHAPE)).gain == 0
 

@@ -23,7 +23,7 @@ def test_noise(sigma, rng):
     """Of 28,500 pixels with edges, and on a slope: 2 %; nine tenths and eleven tenths of it are refused."""
     slope = np.add.outer(0.2 * np.arange(150), 0.3 * np.arange(190))
     for clean in (picture(), slope):
-        # margin: chance, 3 standard errors and more of the pixels away from edges
+        # margin: chance: 2 % is the claim
         assert noise_sigma(clean + sigma * rng.standard_normal(SHAPE)) == pytest.approx(sigma, rel=0.025)
 
 
