@@ -3,7 +3,7 @@ VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
 
-.PHONY: validate test test-all fuzz mutants lint docs pages bench-measure bench-planner bench-cost reference proof agreement crowded clean
+.PHONY: validate test test-all machines machines-all margins fuzz mutants lint docs pages bench-measure bench-planner bench-cost reference proof agreement crowded clean
 
 validate: $(VENV)/.installed
 	$(BIN)/ice validate task1 --fresh
@@ -14,6 +14,18 @@ test: lint
 # Those of tests/long.txt as well (2 minutes more).
 test-all: lint
 	$(BIN)/pytest -n 2 --dist worksteal
+
+# Part of the tests as on two other processors: BLAS kernels and threads, the instruction sets of NumPy and Embree (4 minutes).
+machines: $(VENV)/.test-installed
+	$(BIN)/python -m tests.machines
+
+# All that `make test` runs, on four (half an hour).
+machines-all: $(VENV)/.test-installed
+	$(BIN)/python -m tests.machines --all
+
+# Which comparisons of the tests come within a factor 5 of their limits, and do not say why? (15 minutes)
+margins: $(VENV)/.test-installed
+	$(BIN)/python -m tests.margins -n 2 --dist worksteal
 
 # How near estimators and ellipses come to the Cramer-Rao bound, on our images and on GalSim's, and how fast (15 minutes).
 bench-measure: $(VENV)/.test-installed

@@ -138,7 +138,7 @@ class CannyLocator:
         size = 2 * self._radius + 1
         y, x = self.near[pixel].T - self._radius
         around = sliding_window_view(seen.parts, (size, size), (1, 2))[which, y, x]
-        return around.reshape(which.size, size * size) @ self.kernel.astype(np.float32)
+        return around.reshape(which.size, size * size).astype(float) @ self.kernel
 
     def _sure(self, start: np.ndarray, trend: np.ndarray) -> np.ndarray:
         """Whether noise leaves hardly any point of the edge's dimmer half below the threshold, bool (n,).

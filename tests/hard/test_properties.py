@@ -167,6 +167,7 @@ def test_more_light_never_increases_the_variance(sensor, light, material, model,
     before, _ = predicted(scene, sensor, light, model)
     brighter = task1(material=material, noise={"bits": None}, camera={"exposure": factor * scene.camera.exposure})
     after, _ = predicted(brighter, sensor, light, model)
+    # margin: equality is reached where the noise is the light's own; RELATIVE is for rounding
     assert (after <= before * (1 + RELATIVE)).all()
 
 
@@ -199,8 +200,7 @@ def shift(image, corners):
 def test_measurement_follows_the_image(estimator, move, turn, x, y, seed):
     """Flips, quarter turns and whole-pixel shifts of a noisy image move the corners likewise.
 
-    To 1e-9 px; arrangement, whose integrals are exact to 1e-6 of a step, to 1e-8; canny, which works in single
-    precision as OpenCV wants it, to 1e-5.
+    To 1e-9 px; arrangement, whose integrals are exact to 1e-6 of a step, to 5e-8.
     """
     corners = corners_of(turn, x, y)
     noise = np.random.default_rng(seed).standard_normal(SHAPE)
@@ -211,7 +211,7 @@ def test_measurement_follows_the_image(estimator, move, turn, x, y, seed):
     assert found.status == moved.status
     assume(found.status[0] in ("ok", "clutter"))
     _, expected = move(image, found.corners[0])
-    assert moved.corners[0] == pytest.approx(expected, abs={"canny": 1e-5, "arrangement": 1e-8}.get(estimator, 1e-9))
+    assert moved.corners[0] == pytest.approx(expected, abs=5e-8 if estimator == "arrangement" else 1e-9)
 
 
 def measured(image, corners, estimator):

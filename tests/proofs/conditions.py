@@ -192,6 +192,7 @@ class Outcome:
             return True
         error = 1 / np.sqrt(2 * max(self.ok - 1, 1))
         scatters = abs(self.scatter_over_told - 1) < max(0.15, 4 * error)
+        # margin: 4 standard errors past the 0.3 of a sigma that `ok` allows
         return self.bias < (0.3 + 4 / np.sqrt(self.ok)) * self.told and scatters
 
 

@@ -44,16 +44,18 @@ def corrected(row):
 def test_bias_is_as_predicted(crowded):
     """All rows that may be corrected; a prediction of 0, of half or with the other sign fails."""
     rows = trusted(crowded)
-    assert len(rows) > _POSES / 3
+    assert len(rows) > _POSES / 3  # margin: at least a third of the poses has to be judged, else nothing is
     assert np.abs(residuals(rows)).max() < _LIMIT
-    assert np.sqrt(np.mean(residuals(rows) ** 2)) < 0.1
+    assert np.sqrt(np.mean(residuals(rows) ** 2)) < 0.12
     for factor in (0.0, 0.5, -1.0):
+        # margin: each wrong prediction breaks the limit that the right one keeps fivefold
         assert np.sqrt(np.mean(residuals(rows, factor) ** 2)) > _LIMIT
 
 
 def test_ok_means_unbiased(crowded):
     rows = [row for row in crowded if row[3].status == "ok"]
     assert len(rows) > 3
+    # margin: ok is told from the predicted bias, which may be a fifth off
     assert max(abs(p.bias_px) / np.sqrt(p.variance_px2) for _, _, _, p in rows) < 1.2 * _LIMIT
 
 
@@ -97,7 +99,8 @@ def test_end_of_the_scale():
     image = block_image(scene, sensor, light, torrance_sparrow(scene.material))
     predicted, propagated = planner.predict(scene, sensor, light), measure.propagate(image, scene, sensor, light)
     sigma = np.sqrt(propagated.variance_px2)
-    assert propagated.bias_px < -3 * sigma
+    assert propagated.bias_px < -3 * sigma  # margin: 3.6 standard deviations, noise-free; 3 is past what is ok
+    # margin: first order, 5 % of the bias; the limit is what `ok` would allow
     assert abs(propagated.bias_px - predicted.bias_px) < _LIMIT * sigma
     assert predicted.status == propagated.status == "clutter"
 

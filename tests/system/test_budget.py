@@ -68,8 +68,8 @@ def test_pictures_of_stations_scatter_as_stated() -> None:
     """60 stations: the interval holds at least 50 of them, which 95 % do in all but 3e-4 of all cases."""
     found = coverage(scenes.load("calibrated_rig"), 60, 3, "gradient")
     assert found["lost"] == 0
-    assert found["held"] >= 50 / 60
-    assert 0.7 < found["scatter_over_u"] < 1.3
+    assert found["held"] >= 50 / 60  # margin: chance: 49 or fewer of 60 in 3e-4 of all cases
+    assert 0.63 < found["scatter_over_u"] < 1.37  # margin: 4 standard errors
 
 
 def test_temperature_and_rounding() -> None:
@@ -101,6 +101,7 @@ def test_numbers_know_what_measurands_share() -> None:
     for each in found:
         assert numbers[each.name].s == pytest.approx(each.u)
     ratio = numbers["step"] / numbers["across"]
+    # margin: the order is said: 0.25, and independent errors would give more than 1
     assert ratio.s < 0.3 * numbers["step"].s / 40
 
 
@@ -116,7 +117,8 @@ def test_the_plan_moves_where_the_pose_dominates() -> None:
     scene = scenes.load("calibrated_rig")
     found = plan_capability(scene, refined=False)
     best, quiet = found.best.ratios[0], found.quiet.ratios[0]
-    assert best < 0.98 * quiet
+    assert best < 0.98 * quiet  # margin: the order is said; 2 % so that it is no rounding
+    # margin: the order of two plans: one is the least of all by what is compared
     assert found.quiet.budget.measurands[0].repeatability <= found.best.budget.measurands[0].repeatability
 
 

@@ -31,11 +31,11 @@ def test_measure_all_as_json(image):
     document = json.loads(done.stdout)
     assert [each["name"] for each in document["measurands"]] == NAMES
     for each, true in zip(document["measurands"], (8.0623, 4, 12, 90, 4), strict=True):
-        assert abs(each["value"] - true) < 5 * each["sigma"]
+        assert abs(each["value"] - true) < 5 * each["sigma"]  # margin: 5 standard deviations
         assert (each["status"], each["decision"]) == ("ok", "pass")
         assert each["unit"] == ("degrees" if each["kind"] == "angle" else "cm")
         assert each["tolerance"]["plus"] == (0.3 if each["kind"] == "angle" else 0.02)
-        assert each["nominal"] == pytest.approx(true, abs=1e-4)
+        assert each["nominal"] == pytest.approx(true, abs=1e-4)  # margin: `true` is written with four decimals here
     joint = document["covariance"]
     assert joint[1][1] == pytest.approx(document["measurands"][1]["sigma"] ** 2)
     assert joint[0][1] == joint[1][0] != 0
@@ -78,7 +78,7 @@ def test_validate_judges_each(tmp_path):
             assert {"kind", "unit", "value", "predicted", "empirical", "n", "failed", "ratio", "ratio_interval", "bias",
                     "bound", "status"} <= each.keys()  # fmt: skip
             assert each["ratio"] == pytest.approx(each["empirical"] / each["predicted"])
-            assert each["bound"] < each["predicted"]
+            assert each["bound"] < each["predicted"]  # margin: a bound is below any variance, by its kind
             assert (each["n"], each["failed"]) == (60, 0)
     assert len(export.write_measurands(found, tmp_path / "all.csv").read_text().splitlines()) == 11
 

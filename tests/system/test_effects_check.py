@@ -53,6 +53,7 @@ def test_bounds_hold_where_they_are_not_zero(task1):
     for name, scene in cases.items():
         (row,) = check(scene, wide, COARSE, task1.settings[4:5], only=(name,))
         assert row.holds, row
+        # margin: what is asked is that they are not zero
         assert abs(row.bias_px) > 0.02 or abs(row.variance) > 0.01, row
 
 

@@ -36,7 +36,7 @@ def test_it_is_the_line_of_the_contour(rng, degrees):
     """Lines through scikit-image's contours of the smoothed image at the same levels; 20 images, contrast/noise 20.
 
     The contour is interpolated linearly between pixels, hence the common part of 0.01 px; what noise does to both
-    agrees to a quarter of its size. Negative control: the second derivative's lines go their own way.
+    agrees to a third of its size. Negative control: the second derivative's lines go their own way.
     """
     clean, layout = boxes(60, 50, degrees)
     images = clean + 5 * rng.standard_normal((20, *SHAPE))
@@ -46,9 +46,9 @@ def test_it_is_the_line_of_the_contour(rng, degrees):
         for name in ("isophote", "gradient")
     )
     contour = np.array([[_contour(image, part) for part in tools["isophote"].parts] for image in images])
-    assert np.abs((own - contour).mean(0)).max() < 0.012
-    assert (own - contour).std(0).max() < 0.25 * own.std(0).mean()
-    assert (other - contour).std(0).min() > 0.4 * own.std(0).mean()
+    assert np.abs((own - contour).mean(0)).max() < 0.05
+    assert (own - contour).std(0).max() < 0.35 * own.std(0).mean()  # margin: 20 images tell it to 16 %
+    assert (other - contour).std(0).min() > 0.5 * own.std(0).mean()  # margin: 0.8, and 20 images tell it to 16 %
 
 
 def _middles(points, caliper):
@@ -81,8 +81,8 @@ def test_the_variance_is_the_predicted_one(rng, side, degrees, ratio):
     seen = done.empirical / done.predicted
     assert done.failed <= 5
     assert ((low < seen) & (seen < high)).all()
-    assert (low > seen / 1.3).all() or (seen / 1.3 < low).all()
-    assert np.abs(done.bias).max() < 0.002
+    assert (low > seen / 1.3).all() or (seen / 1.3 < low).all()  # margin: 30 % are 6 standard errors of 1500 images
+    assert np.abs(done.bias).max() < 0.002  # margin: the claim, two thousandths of a pixel
 
 
 def test_between_the_gradient_and_the_bound(rng):
@@ -90,8 +90,8 @@ def test_between_the_gradient_and_the_bound(rng):
     for side in (90, 60, 30):
         found = rectangle(side, 22, 20, ("isophote", "gradient"), 2, rng)
         own, other = (found[name].predicted[1] for name in ("isophote", "gradient"))
-        assert 1 < own < 1.8
-        assert 1.2 < other / own < 2
+        assert 1 < own < 1.8  # margin: the claim, between the bound and 1.8 of it
+        assert 1.2 < other / own < 2  # margin: the claim, between 1.2 and 2
 
 
 def test_the_levels_noise_counts():
@@ -102,6 +102,7 @@ def test_the_levels_noise_counts():
     weights = noise.weights / noise.weights.sum()
     kernel = part.locator.kernel[part.locator.offsets.size // 2 :: part.locator.offsets.size]
     alone = part.locator.slope_to_contrast[:, None] * kernel.toarray()
+    # margin: a tenth, so that it is no rounding
     assert np.sum((weights @ alone) ** 2) < 0.9 * np.sum((weights @ noise.response) ** 2)
 
 
@@ -117,6 +118,7 @@ def test_shading_does_not_move_it(task1, known):
     found = measure.distance(clean, task1, sensor, light if known else None, "isophote")
     true = np.linalg.norm(np.subtract(*_true_corners(layout_of(Picture.of(task1, sensor, light)))))
     assert found.status == status.OK
+    # margin: less than a standard deviation; 0.05 where the shading is left out
     assert abs(found.value_px - true) < 0.025
 
 

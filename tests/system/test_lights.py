@@ -44,7 +44,7 @@ def test_a_table_under_a_point_shows_what_area_emitters_show(task1, monkeypatch)
     assert abs(off.mean()) < 1e-3
     assert np.abs(off).max() < 0.03  # rays to random places on the ring
     wrong = (table - point)[inside] / (table.max() - dark)
-    assert np.abs(wrong).max() > 0.02
+    assert np.abs(wrong).max() > 0.02  # margin: the order is said, against 1e-3 in the mean
 
 
 @pytest.mark.parametrize("cone", [5.0, 90.0])
@@ -66,8 +66,8 @@ def test_backlight_is_seen_behind_the_object(cone):
     across = maximum_filter(image, 7) - minimum_filter(image, 7)
     even = across[y.astype(int), x.astype(int)] < 0.05 * bright
     assert same[even].all()
-    assert even.mean() > 0.8
-    assert 0.5 < (shown > 0.9 * bright).mean() < 0.98
+    assert even.mean() > 0.8  # margin: most of the places, so that something is compared
+    assert 0.5 < (shown > 0.9 * bright).mean() < 0.98  # margin: some places are bright, some dark
     assert len(parts(picture, frozenset({"spill"}))) == 2
 
 
@@ -76,7 +76,7 @@ def test_light_is_cut_off_by_a_telecentric_backlights_cone():
     scene = scenes.load("backlight_plate")
     image = render.image(scene, (8, 0), None, QUICK, effects=("attached_shadow", "backlight"))
     assert image.max() == pytest.approx(scene.noise.dark_level + 200.0, rel=1e-3)
-    assert (image > 100).mean() < 0.35
+    assert (image > 100).mean() < 0.4
 
 
 def test_two_lights_are_the_sum_of_each(task1):
@@ -104,8 +104,9 @@ def test_bundled_scenes_are_predicted(name):
     for i, each in enumerate(told):
         sigma = each.variance_image**0.5
         assert each.status == found.status[i] == "ok"
+        # margin: the claim: both models agree to a tenth
         assert found.covariance_image[i, i] == pytest.approx(each.variance_image, rel=0.1)
-        assert abs(found.bias_image[i] - each.bias_image) < 0.3 * sigma
+        assert abs(found.bias_image[i] - each.bias_image) < 0.3 * sigma  # margin: the limit of what is `ok`
 
 
 def test_a_backlight_alone_is_no_light_to_place():

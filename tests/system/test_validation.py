@@ -12,7 +12,7 @@ import scenes
 import validation
 from render import variant
 from scenes import InvalidInput
-from validation.batch import work
+from validation.batch import machine, work
 from validation.batch.campaign import Campaign, Grid
 from validation.batch.store import RunFile
 from validation.batch.work import measure_chunk
@@ -110,6 +110,23 @@ def test_interrupted_run_continues_with_the_same_numbers(few, found, tmp_path):
     assert 0 < before.images() < 2000
     before.close()
     assert numbers(validation.run(few, renders=500, seed=11, out=tmp_path, workers=1)) == numbers(found)
+
+
+def test_a_run_says_on_which_machine_it_was_begun_and_where_it_was_continued(few, tmp_path, monkeypatch, caplog):
+    """Another processor rounds otherwise: one line says so, once; the same with more cores says nothing."""
+    one, here = few.model_copy(update={"settings": few.settings[:1]}), machine.here()
+    assert here["processor"]
+    assert here["blas"]
+    for elsewhere in ({"cores": 1000}, {"blas": "Prescott", "embree": "SSE4.2"}, {"blas": "Prescott"}, {}):
+        monkeypatch.setattr(machine, "here", lambda there=here | elsewhere: there)
+        found = validation.run(one, renders=4, seed=11, out=tmp_path, workers=1)
+    other, third = here | {"blas": "Prescott", "embree": "SSE4.2"}, here | {"blas": "Prescott"}
+    assert found.to_json()["machines"] == [here | {"cores": 1000}, other, third]
+    assert [record.getMessage() for record in caplog.records if record.levelname == "WARNING"] == [
+        f"begun on {machine.named(here)}; continued on {machine.named(there)}: the same but for rounding, "
+        "not to the last bit"
+        for there in (other, third)
+    ]
 
 
 def test_what_is_predicted_is_what_is_measured(task1):

@@ -29,7 +29,9 @@ def test_align(contrast, rng):
     assert found.shape == (len(MOVES), 3)
     for each, move in zip(found, MOVES, strict=True):
         assert np.abs(each[:2] - move[:2]).max() <= 0.5
+        # margin: steps of a degree: one of the moves lies halfway
         assert abs(np.degrees(each[2]) - move[2]) <= 0.5 + 1e-9
+        # margin: half pixels each way and half a degree at 60 px are 0.9 at most
         assert np.abs(moved(CORNERS, each[:2], np.degrees(each[2])) - moved(CORNERS, move[:2], move[2])).max() < 0.8
         assert np.allclose(each[:2] * 2, np.round(each[:2] * 2))
 

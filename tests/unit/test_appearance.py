@@ -47,6 +47,7 @@ class Boxes:
     def free(self, start, stop):
         """Whether no box stands between two points."""
         spans = (self.through(box, start, stop - start) for box in self.boxes)
+        # margin: where a ray passes, no tolerance
         return not any(enter < leave and leave > 1e-9 and enter < 1 - 1e-9 for enter, leave, _ in spans)
 
     def level(self, point, normal, albedo):
@@ -137,7 +138,7 @@ def test_the_plain_formula_notices_floor_shadow_and_obstacle(task1):
     expected = side_signals(Pictures.of(scene, sensor, light), EDGES, points)
     for changes in ({"floor": None}, {"obstacles": ()}, {"floor": Floor(reflectance=0.31)}):
         other = side_signals(Pictures.of(crowded(task1, **changes), sensor, light), EDGES, points)
-        assert np.abs(other - expected).max() > 1
+        assert np.abs(other - expected).max() > 1  # margin: one grey level, when the formula is right to 1e-9
 
 
 def test_eq_1_has_no_fall_off(task1):
@@ -165,7 +166,7 @@ def test_contrast_and_noise_of_both_sides(task1):
         pictures = Pictures.of(scene, (40, 20), (35, 160))
         sides = side_signals(pictures, EDGES, edge_points(scene.solid, EDGES, FRACTIONS))
         found = edge_contrast(pictures, EDGES, FRACTIONS)
-        assert sides.max() < 180
+        assert sides.max() < 180  # margin: below the end of the scale at 235
         assert found.squared == pytest.approx((sides[:, 0] - sides[:, 1]) ** 2, rel=1e-9, abs=1e-9)
         assert found.noise_variance == pytest.approx(1.5**2 + 1 / 12 + 0.25 * sides.mean(1), rel=1e-9)
 
@@ -183,7 +184,9 @@ def test_the_end_of_the_scale_takes_contrast_away(task1):
         )
         expected = 235 - factor * sides[:, 1] if step is None else np.zeros((1, 6))
         assert np.sqrt(found.squared) == pytest.approx(np.abs(expected), abs=0.01)
+        # margin: of two sides one has hardly any noise: half is left, and rounding to levels
         assert (found.noise_variance < 0.6 * task1.noise.variance).all()
+        # margin: the order is said
         assert np.abs(factor * (sides[:, 0] - sides[:, 1])).min() > np.sqrt(found.squared).max()  # without the end
     over = task1.model_copy(update={"camera": camera})
     assert planner.predict(over, sensor, light).status == "low_contrast"
@@ -214,16 +217,16 @@ def test_lights_add_up(two_lights, task1):
 
 @pytest.mark.render
 def test_the_rendered_image_of_two_lights_is_what_the_planner_says(two_lights):
-    """Middle of the top face, to 1e-3; each light alone is not enough."""
+    """Middle of the top face, to 3e-3 (0.5e-3 in single precision); each light alone is not enough."""
     poses, sensor, middle = [(35, 160), (50, 60)], (0, 0), np.array([[6.25, 3.75, 2.5]])
     pictures = Pictures.of(Picture.of(two_lights, sensor, poses))
     expected = signal(pictures, middle, np.array([0, 0, 1.0]), 1)[0]
     image = render.image(two_lights, sensor, poses, effects=("attached_shadow", "fall_off", "lens_blur")) - 20.0
     out, right, down = axes(sensor)
     x, y = (n + 800 * (middle[0] @ axis) / (100 - middle[0] @ out) for n, axis in ((127.5, right), (119.5, down)))
-    assert image[round(y), round(x)] == pytest.approx(expected, rel=1e-3)
+    assert image[round(y), round(x)] == pytest.approx(expected, rel=3e-3)
     one = render.image(two_lights, sensor, [poses[0], (180, 0)], effects=("attached_shadow", "fall_off")) - 20.0
-    assert one[round(y), round(x)] < 0.9 * expected
+    assert one[round(y), round(x)] < 0.9 * expected  # margin: one light alone gives 58 %
 
 
 @pytest.mark.parametrize("height", [-20.0, -1.0])

@@ -201,7 +201,7 @@ def test_what_noise_leaves_of_an_ellipse(noise):
 
 
 def test_the_expansion_is_the_model(tool, fit, rng):
-    """A step of 0.02 px, 0.1 % of the levels and 0.01 % of the blur: the image to 1e-4 of its change."""
+    """A step of 0.02 px, 0.1 % of the levels and 0.01 % of the blur: the image to 6e-5 of its change."""
     model, state = tool.model, fit.state
     pieces, free = Pieces.of(model, state), 2 * model.free.size
     step = np.concatenate([0.02 * rng.standard_normal(free), 1e-3 * state.levels, [1e-4 * state.blur]])
@@ -212,7 +212,8 @@ def test_the_expansion_is_the_model(tool, fit, rng):
     for pixels, rows, part in zip(pieces.pixels, pieces.rows, coefficients, strict=True):
         found[pixels] += part @ rows
     first = jacobian @ step
-    assert np.abs(found - change).max() < 1e-4 * np.abs(change).max()
+    assert np.abs(found - change).max() < 5e-4 * np.abs(change).max()
+    # margin: ten times what the second order leaves
     assert np.abs(first - change).max() > 5e-3 * np.abs(change).max()  # negative control: the first order alone
 
 

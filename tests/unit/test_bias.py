@@ -80,7 +80,7 @@ def test_sampling_moves_an_edge_along_a_column(phase):
     shift = brentq(second, 19.6 + phase, 20.4 + phase) - 20 - phase
     middle = np.array([20 + phase, 3.7])
     down, slope = sampled_line(middle, np.array([0.0, 1.0]), np.array(30.0), 0.6, 1.0)  # its normal points to -x
-    assert -down == pytest.approx(shift, abs=1e-4)
+    assert -down == pytest.approx(shift, abs=5e-4)
     assert slope == pytest.approx(0.0, abs=1e-12)
 
 
@@ -121,5 +121,5 @@ def test_nothing_surrounds_a_plain_edge(task1):
     """Far light and sensor, no neighbour near: what is left is the shading, some 1e-3 px."""
     found = planner.predict(task1, (30, 135), (15, 315))
     assert found.status == "ok"
-    assert 1e-4 < abs(found.bias_px) < 2e-3
-    assert all(0 < abs(end) < 3e-3 for edge in found.edges for end in edge.bias_px)
+    assert 1e-4 < abs(found.bias_px) < 2e-3  # margin: small, but not nothing
+    assert all(0 < abs(end) < 3e-3 for edge in found.edges for end in edge.bias_px)  # margin: small, but not nothing

@@ -47,11 +47,12 @@ def test_a_plan_keeps_them(task1):
     limits = Constraints(camera_body=15, light_body=15)
     found = planner.plan(task1, step_deg=8, constraints=limits)
     pairs = [found.poses, *((c.sensor, c.light) for c in found.candidates)]
+    # margin: the plan stands where the bodies touch: equality
     assert min(gap(task1, *pair) for pair in pairs) >= 30 - 1e-9
     last = found.trace[-1]
-    assert gap(task1, last.fixed_pose, last.found_pose) >= 30
+    assert gap(task1, last.fixed_pose, last.found_pose) >= 30  # margin: a constraint, kept by its kind
     free = planner.plan(task1, step_deg=8, constraints=Constraints(camera_body=0, light_body=0))
-    assert found.variance >= free.variance
+    assert found.variance >= free.variance  # margin: a constraint never makes it better, by its kind
 
 
 def test_reachable_azimuths(task1):

@@ -57,13 +57,16 @@ def test_blur_for_a_kappa(blur, scale):
 
 
 def test_variance_of_points(task1, rng):
-    """Of 4 sides x some 25 independent points x 40 images: within 6 % of kappa^2 s_n^2 / C^2, as is the correlation."""
+    """Of 4 sides x some 25 independent points x 40 images: within 9 % of kappa^2 s_n^2 / C^2."""
     ratio = 0.02
     clean, layout = _square(14.0, ratio, task1)
     noisy = clean + 100.0 * ratio * rng.standard_normal((40, *clean.shape))
     variance, length = _points(noisy, layout, "gradient")
     scale = task1.locator.scale_px
-    assert variance == pytest.approx(kappa2(scale, task1.camera.blur_px) * ratio**2, rel=0.06)
+    assert variance == pytest.approx(
+        kappa2(scale, task1.camera.blur_px) * ratio**2, rel=0.09
+    )  # margin: 4 standard errors
+    # margin: chance, of 4 sides; a length of one pixel is 70 % off
     assert length == pytest.approx(2 * np.sqrt(np.pi) * scale, rel=0.3)
 
 
@@ -79,4 +82,5 @@ def test_variance_of_lines(task1, rng):
     variance, length = _lines(noisy, beside, "strip")
     assert length == pytest.approx(2 * np.sqrt(np.pi) * task1.locator.scale_px)
     least = ratio**2 / float(information_bound(np.array(1.0), 1.0, task1.camera.blur_px))
+    # margin: between the bound and what the strip loses, and chance
     assert 0.8 * least < variance * length < 1.6 * least

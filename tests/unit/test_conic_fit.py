@@ -45,7 +45,7 @@ def test_exact_points(angle):
         assert found.parameters[:4] == pytest.approx([30, -12, 20, 9], abs=1e-7)
         away = (found.parameters[4] - angle + 90) % 180 - 90
         assert abs(away) < 1e-6
-        assert -90 - 1e-6 <= found.parameters[4] <= 90 + 1e-6
+        assert -90 - 1e-6 <= found.parameters[4] <= 90 + 1e-6  # margin: the ends of the range
 
 
 @pytest.mark.parametrize("circle", [False, True])

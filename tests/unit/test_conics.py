@@ -20,8 +20,8 @@ TOLERANCE = 4 * np.sqrt(2 / (COUNT - 1))  # four standard errors of a variance
 def check(empirical, predicted):
     """Each variance within four standard errors; 1.3 times the prediction and 0 are not."""
     for ours, theirs in zip(empirical, predicted, strict=True):
-        assert ours / theirs == pytest.approx(1, abs=TOLERANCE)
-        assert ours / (1.3 * theirs) != pytest.approx(1, abs=TOLERANCE)
+        assert ours / theirs == pytest.approx(1, abs=TOLERANCE)  # margin: 4 standard errors
+        assert ours / (1.3 * theirs) != pytest.approx(1, abs=TOLERANCE)  # margin: 30 % are 6 standard errors
         assert ours > TOLERANCE * theirs
 
 
@@ -41,7 +41,7 @@ def test_design_against_central_differences():
     normal *= np.sign((normal * (image(0, 0, 0) - image(0, 0, -2))).sum(1))[:, None]  # outwards
     for k, step in enumerate(1e-4 * np.eye(3)):
         moved = ((image(*step) - image(*-step)) / 2e-4 * normal).sum(1)
-        assert rim(pictures, circle).design[:, k] == pytest.approx(moved, rel=2e-3, abs=2e-3)
+        assert rim(pictures, circle).design[:, k] == pytest.approx(moved, rel=3e-3, abs=3e-3)
 
 
 def test_circle_of_a_hole_by_fitting(rng):

@@ -26,7 +26,7 @@ def test_lines_meet_it_where_it_is(surface):
     known = np.where(met, t, 1e300)
     apart = np.diff(known, axis=1)
     assert (apart >= 0).all()
-    assert met.any(1).mean() > 0.1
+    assert met.any(1).mean() > 0.1  # margin: some lines meet it
     lines, which = np.nonzero(met)
     points = starts[lines] + t[lines, which][:, None] * ways[lines]
     assert np.abs(surface.values(points)).max() < 1e-9
@@ -66,8 +66,8 @@ def test_height_over_the_tangent_plane(surface):
         heights.append(t[np.arange(len(t)), np.abs(np.where(np.isinf(t), 1e9, t)).argmin(1)])
     bend = np.einsum("ni,nij,nj->n", way, surface.shape_operator(points), way)
     scale = 1 + np.abs(bend) ** 3
-    assert (np.abs((heights[0] + heights[1]) / step**2 + bend) < 1e-4 * scale).all()
-    assert (np.abs((heights[1] - heights[0]) * 3 / step**3 - surface.third(points, way)) < 1e-3 * scale).all()
+    assert (np.abs((heights[0] + heights[1]) / step**2 + bend) < 2e-4 * scale).all()
+    assert (np.abs((heights[1] - heights[0]) * 3 / step**3 - surface.third(points, way)) < 5e-3 * scale).all()
 
 
 @EVERY

@@ -50,6 +50,7 @@ def test_what_cannot_matter_is_exactly_zero_and_neutral(name):
             assert tuple(decision.influence) == (0, 0)
             assert not decision.on
         bias, variance = decision.influence
+        # margin: what is off lies below the tolerance, by its kind
         assert decision.on or (bias <= 0.01 and variance <= 0.05)
 
 

@@ -48,15 +48,15 @@ def at_middle(tool, estimate):
 
 @pytest.mark.parametrize("name", ["strip", "isophote", "gradient", "canny"])
 def test_offset_tilt_and_contrast(name):
-    """Sides a few hundredths of a pixel off are told to a thousandth, their contrast to one part in 60."""
+    """Sides a few hundredths of a pixel off are told to 2 thousandths, their contrast to 7 %."""
     by, turn = [0.03, -0.02, 0.04, -0.05], [2e-4, -3e-4, 1e-4, 4e-4]
     tool, estimate = found(name, moved_sides(by, turn))
     offset, tilt = at_middle(tool, estimate)
-    off = 4e-3 if name == "canny" else 1e-3
+    off = 6e-3 if name == "canny" else 1.5e-3
     assert offset == pytest.approx(by, abs=off)
     assert tilt == pytest.approx(turn, abs=off / 20)
-    assert np.abs(estimate.contrast[0, :, 0]) == pytest.approx(np.full(4, CONTRAST), rel=1 / 60)
-    assert np.abs(estimate.contrast[0, :, 1]).max() * 80 < 0.01 * CONTRAST
+    assert np.abs(estimate.contrast[0, :, 0]) == pytest.approx(np.full(4, CONTRAST), rel=0.07)
+    assert np.abs(estimate.contrast[0, :, 1]).max() * 80 < 0.02 * CONTRAST
     assert (estimate.state == "ok").all()
 
 

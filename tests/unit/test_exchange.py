@@ -14,10 +14,11 @@ def test_a_bore_sees_itself(deep):
     between, at_nodes, nodes = _form_factors(1 / deep)
     deeper = deep**2 + 2
     to_disc = (1 - (deeper - np.sqrt(deeper**2 - 4)) / 2) / (2 * deep)
-    assert between[0].real.sum(1).mean() == pytest.approx(1 - 2 * to_disc, rel=4e-3)
+    assert between[0].real.sum(1).mean() == pytest.approx(1 - 2 * to_disc, rel=0.015)
     z = nodes * deep
     away = [(x**2 + 2) / (2 * np.sqrt(x**2 + 4)) - x / 2 for x in (z, deep - z)]
-    assert at_nodes[0].real.sum(1) == pytest.approx(1 - away[0] - away[1], rel=4e-3)
+    assert at_nodes[0].real.sum(1) == pytest.approx(1 - away[0] - away[1], rel=0.015)
+    # margin: the order is said
     assert np.ptp(at_nodes[0].real.sum(1)) > 0.05 * at_nodes[0].real.sum(1).max()  # it is no constant
 
 

@@ -161,7 +161,8 @@ def test_preview_is_the_picture(task1):
     assert drawn.shape == clean.shape
     apart = np.abs(drawn - clean)
     assert np.median(apart) < 2
-    assert (apart > 12).mean() < 0.05
+    assert (apart > 12).mean() < 0.05  # margin: the share of pixels near edges, 3 %
+    # margin: the order is said, against 2 grey levels
     assert np.abs(255 - drawn - clean).mean() > 50  # a picture of the wrong brightness is another one
 
 
@@ -177,7 +178,7 @@ def test_best_from_here(task1):
     state = State.first(task1)
     found = best.best_from(task1, state)
     before, after = (answers.answer(task1, each).prediction.variance_object for each in (state, found))
-    assert after < 0.9 * before
+    assert after < 0.9 * before  # margin: a tenth better, so that it is no rounding
     with pytest.raises(InvalidInput, match="descent must begin where the measurand can be measured"):
         best.best_from(task1, moved(state, (90, 90)))
 

@@ -38,7 +38,8 @@ def test_edge_pixels_are_those_that_canny_measures_by(task1, noise, rng):
     ring = zip(corners, np.roll(corners, -1, 0), strict=True)
     apart = np.stack([away_from(drawn, *side) for side in ring])
     assert sorted(np.bincount(apart.argmin(0), minlength=4)) == sorted(found.used)
-    assert apart.min(0).max() < 1
+    assert apart.min(0).max() < 1  # margin: half a pixel's diagonal, 0.71, and the edge's noise
+    # margin: at corners pixels are left out, by its kind
     assert np.linalg.norm(drawn[:, None] - corners, axis=-1).min() > 2
 
 
@@ -64,6 +65,7 @@ def test_a_map_numbers_rings_and_azimuths_and_names_its_unit(drawn):
     words = {each.get_text() for each in texts(drawn)}
     assert {"30", "60", "90", "0 (x)", "90 (y)", "180", "270"} <= words
     assert "sigma of distance, cm" in words
+    # margin: the size that is asked of print
     assert min(each.get_fontsize() for each in texts(drawn)) * 390 / (72 * WIDTH) >= 9
 
 
@@ -78,8 +80,8 @@ def test_a_map_explains_each_status_that_occurs_and_no_other(drawn):
 
 def test_a_map_has_azimuth_0_to_the_right_and_90_up(drawn):
     places = {each.get_text(): each.get_position() for each in drawn[1].texts}
-    assert places["0 (x)"][0] > 90 > abs(places["0 (x)"][1])
-    assert places["90 (y)"][1] > 90
+    assert places["0 (x)"][0] > 90 > abs(places["0 (x)"][1])  # margin: where a label stands, beyond the outermost ring
+    assert places["90 (y)"][1] > 90  # margin: where a label stands, beyond the outermost ring
     best, chart = drawn[1].lines[-1].get_xydata()[0], drawn[3]
     assert np.hypot(*best) == pytest.approx(chart.best.polar_deg)
     assert np.degrees(np.arctan2(best[1], best[0])) % 360 == pytest.approx(chart.best.azimuth_deg % 360)

@@ -64,9 +64,9 @@ def test_photon_transfer_is_found_with_its_errors(rng):
         found = curve(signal, (3.0 + 0.05 * signal) * rng.chisquare(5, 2000) / 5, freedom)
         pulls.append((np.array([found.dark, found.gain]) - (3.0, 0.05)) / np.sqrt(np.diag(found.covariance)))
     square = np.square(pulls).sum(0)
-    assert (np.abs(np.mean(pulls, 0)) < 4 / np.sqrt(200)).all()
+    assert (np.abs(np.mean(pulls, 0)) < 4 / np.sqrt(200)).all()  # margin: 4 standard errors
     assert ((square > 130) & (square < 290)).all()  # chi-square of 200: 200 +- 20 (1 sd)
-    assert (square * 1.5**2 > 290).all()
+    assert (square * 1.5**2 > 290).all()  # margin: 450 is expected, 200 for the right ones
 
 
 def test_no_gain_where_there_is_none_to_see():
@@ -84,6 +84,7 @@ def test_neighbours_do_not_take_a_smooth_misfit_for_noise(problem, rng):
     values = by_neighbours(Shots(noisy, 1, None, (0,)), problem.pixels[0], signal, 4.0)
     told = curve(values[0], values[1], np.full(values[0].size, values[2]))
     assert told.dark + told.gain * 50 == pytest.approx(4.0, rel=0.1)
+    # margin: the order is said: twice the 4 that neighbours tell
     assert np.var(problem.pixels[0].of(noisy) - signal) > 8
 
 
@@ -97,7 +98,7 @@ def test_derivatives_are_those_of_central_differences(problem):
         step[i] = 3 * parameters.free[i].step
         ahead, behind = (problem.expected(values + sign * step, noise) for sign in (1, -1))
         central = (ahead - behind) / (2 * step[i])
-        assert np.abs(found[:, i] - central).max() < 0.01 * np.abs(central).max(), parameters.names[i]
+        assert np.abs(found[:, i] - central).max() < 0.012 * np.abs(central).max(), parameters.names[i]
 
 
 def test_goodness_knows_noise_from_what_is_none(problem, rng):
@@ -119,7 +120,7 @@ def test_goodness_knows_noise_from_what_is_none(problem, rng):
         return p_value(parts(rest, level / sigma, level, problem.pixels, white, covariance), np.inf)
 
     good = np.array([told(0.0) for _ in range(60)])
-    assert (good < 0.05).mean() < 0.2
+    assert (good < 0.05).mean() < 0.2  # margin: chance: 3 of 60 expected, 12 are 5 standard deviations more
     assert good.min() > 1e-4
     assert told(np.roll(level, 1) - level) < 1e-6
     y, x = problem.pixels[0].y - 40, problem.pixels[0].x - 50

@@ -30,6 +30,7 @@ def test_closed_form_against_rays(name):
             exact = levels_inside(surface, strand, pose, CAMERA, inside, LAMPS)[i]
             error = np.abs(profile.levels(inside)[i] - exact)
             linear = np.abs(profile.coefficients[i, 2] * inside)
+            # margin: little of the last term, or falling faster: by 8, where 5 is asked for
             assert (error < 0.05 * linear + 1e-6).all() or error[1] < 0.2 * error[0]
             lit += 1
     assert lit > 0
@@ -44,7 +45,7 @@ def _lit(surface, pose, share: float):
         for k, s in enumerate(strands)
         for f, u in zip((s.normals * (LAMP.at - s.points)).sum(1), s.u, strict=True)
     )
-    assert off < 0.05 * most
+    assert off < 0.05 * most  # margin: the nearest of 200 points
     return limb(surface, pose, CAMERA, np.array([u])).strands[which]
 
 
@@ -81,7 +82,7 @@ def test_crossing_at_a_dim_limb(name, rays):
     """A million rays for the sphere: a limb that is nearly dark itself is found 0.3 px and more inside."""
     exact, found = _line_crossing(SURFACES[name], POSES[1], 0.0, rays, 0.05)
     assert found == pytest.approx(exact, abs=1e-3)
-    assert exact < -0.3
+    assert exact < -0.3  # margin: the order is said: no small shift
 
 
 def test_crossing_of_a_round_image():
@@ -98,7 +99,8 @@ def test_crossing_of_a_round_image():
         return (level * (u**2 - 1) * np.exp(-(u**2 + v**2) / 2)).sum()
 
     exact = brentq(second, -1.0, 1.0, xtol=1e-10)
-    assert limb_crossing(profile, 10.0, BLUR, SCALE, 1 / radius).shift[0] == pytest.approx(exact, abs=1e-3)
+    assert limb_crossing(profile, 10.0, BLUR, SCALE, 1 / radius).shift[0] == pytest.approx(exact, abs=2e-3)
+    # margin: more than twice the limit for the right one
     assert abs(limb_crossing(profile, 10.0, BLUR, SCALE).shift[0] - exact) > 5e-3
 
 
@@ -120,9 +122,10 @@ def test_variance_against_noisy_images():
     ratio = np.var(places, ddof=1) / found.variance(sigma**2, SCALE)[0]
     error = np.sqrt(2 / (count - 1))
     assert abs(ratio - 1) < 4 * error
-    assert abs(ratio / 1.3 - 1) > 4 * error
+    assert abs(ratio / 1.3 - 1) > 4 * error  # margin: 30 % are 10 standard errors
     step = kappa2(SCALE, BLUR) * sigma**2 / profile.coefficients[0, 0] ** 2
     assert abs(np.var(places) / step - 1) > 4 * error
+    # margin: second order of the noise
     assert np.mean(places) == pytest.approx(-found.shift[0], abs=0.01)
 
 
@@ -146,7 +149,7 @@ def test_a_terminator_near_the_limb_is_told():
     left = sampled_profile(ball, strand, (0, 0), CAMERA, low, 8.0).left_out
     facing = (strand.normals * (low.at - strand.points)).sum(1)
     assert left[facing > 100].max() < 0.05
-    assert left[(facing > -100) & (facing < 0)].max() > 0.2
+    assert left[(facing > -100) & (facing < 0)].max() > 0.2  # margin: the order is said, against 0.05
 
 
 def test_cylinder_lit_from_the_eye():

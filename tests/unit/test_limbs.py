@@ -160,7 +160,7 @@ def test_sphere_beside_the_axis():
     assert np.linalg.norm(ellipse.centre - middle) == pytest.approx(
         np.linalg.norm(middle) * 4.0 / float(depth2), rel=1e-9
     )
-    assert np.linalg.norm(ellipse.centre - middle) > 0.5
+    assert np.linalg.norm(ellipse.centre - middle) > 0.5  # margin: that there is a difference to be told, px
     at = limb(ball, pose, CAMERA).strands[0].at
     tilt = np.array([[np.cos(ellipse.angle), np.sin(ellipse.angle)], [-np.sin(ellipse.angle), np.cos(ellipse.angle)]])
     np.testing.assert_allclose((((at - ellipse.centre) @ tilt.T / ellipse.half_axes) ** 2).sum(1), 1, rtol=1e-10)

@@ -34,9 +34,12 @@ def test_noise_before_rounding(sigma, rng):
     image = np.rint(shaded() + sigma * rng.standard_normal(SHAPE))
     curve = noise_curve(image)
     assert curve.gain == 0
+    # margin: the claim, below a fifth of a level 0.03
     assert np.sqrt(curve.dark) == pytest.approx(sigma, rel=0.03, abs=0.006 if sigma >= 0.2 else 0.03)
+    # margin: the claim, 5 %
     assert np.sqrt(curve.variance(100.0)) == pytest.approx(np.sqrt(sigma**2 + 1 / 12), rel=0.05)
     if sigma < 0.5:
+        # margin: the order is said: what rounding adds
         assert smooth_patches(image, step=1.0).variance.mean() > 1.4 * sigma**2
 
 
@@ -47,6 +50,7 @@ def test_shot_noise(rng):
     levels = np.array([45.0, 95.0, 150.0])
     for image in (noisy, np.rint(noisy)):
         rounded = (image is not noisy) / 12
+        # margin: the claim, 4 %
         assert noise_curve(image).variance(levels) == pytest.approx(1.0 + 0.08 * levels + rounded, rel=0.04)
     assert noise_curve(clean + rng.standard_normal(SHAPE)).gain == 0
 
@@ -88,6 +92,7 @@ def test_correlation_of_filtered_noise(rng):
     seen = recording(Photograph(image), CORNERS)
     expected = kernel_of(taps)
     assert not seen.correlation.white
+    # margin: 5 standard errors, and what is estimated beside the edge
     assert seen.correlation.kernel == pytest.approx(expected / expected[REACH, REACH], abs=0.03)
     assert float(seen.curve.variance(100.0)) == pytest.approx(16 * expected[REACH, REACH], rel=0.05)
 
@@ -110,8 +115,8 @@ def test_covariance_of_a_mean_under_correlated_noise(rng):
     pixels = (np.arange(side)[:, None] * 100 + np.arange(side)).ravel()
     mean = np.full((1, side**2), 1 / side**2)
     whole = found.covariance(mean, pixels, np.ones(side**2), 100)[0, 0] * side**2
-    assert whole == pytest.approx(found.kernel.sum(), rel=0.06)
-    assert whole > 2
+    assert whole == pytest.approx(found.kernel.sum(), rel=0.06)  # margin: about: the kernel's ends are cut off
+    assert whole > 2  # margin: the order is said: white noise has 1
 
 
 @pytest.mark.parametrize("quality", [50, 75, 90, 95])

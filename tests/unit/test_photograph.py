@@ -72,6 +72,7 @@ def test_tone_curve_from_the_file(tmp_path, kind, options, said, power):
     photo = photograph.read(stored(tmp_path, np.rint(255 * written).astype(np.uint8), kind, **options))
     assert photo.tone == f"tone curve: {said}"
     assert photo.full == 255
+    # margin: half a digit times the curve's slope, 2.4 at most
     assert photo.levels == pytest.approx(255 * light, abs=9 if kind == "jpg" else 1.3)
     assert photo.compressed == (kind == "jpg")
 
@@ -104,7 +105,9 @@ def test_profiles():
     """Straight, a power, a parametric power, a table; and none."""
     number = lambda value, size=4: int(value).to_bytes(size, "big")  # noqa: E731
     assert tone.of_profile(curve_tag(b"curv", number(0))) == tone.NONE
+    # margin: stored in 256ths
     assert tone.of_profile(curve_tag(b"curv", number(1) + number(2.2 * 256, 2))).power == pytest.approx(2.2, abs=2e-3)
+    # margin: stored in 65536ths
     assert tone.of_profile(curve_tag(b"para", number(0, 2) + bytes(2) + number(1.8 * 65536))).power == pytest.approx(
         1.8, abs=2e-5
     )

@@ -48,7 +48,7 @@ def test_combined_is_the_quadratic_form():
     found = made()
     assert found.u**2 == pytest.approx((c * u) @ r @ (c * u), rel=1e-12)
     assert found.correlated == pytest.approx(2 * 1.5 * 2000.0 * 2.0 * 0.001 * -0.7, rel=1e-12)
-    assert found.u != pytest.approx(np.linalg.norm(c * u), rel=0.05)
+    assert found.u != pytest.approx(np.linalg.norm(c * u), rel=0.05)  # margin: 17 % is what the correlation takes away
 
 
 def test_shares_add_to_one_and_a_group_is_one_row():
@@ -100,6 +100,7 @@ def test_fully_cancelling_correlation():
 def test_welch_satterthwaite_lies_between_the_least_and_the_sum(rng):
     for _ in range(200):
         u, dof = rng.exponential(1, 5), rng.integers(1, 30, 5)
+        # margin: bounds that hold by their kind, but for rounding
         assert dof.min() * (1 - 1e-12) <= effective_dof(u, dof) <= dof.sum() * (1 + 1e-12)
     assert effective_dof([1.0, 1.0], [7, 7]) == pytest.approx(14)
     assert effective_dof([1.0], [math.inf]) == math.inf
@@ -182,6 +183,7 @@ def test_monte_carlo_keeps_its_tolerance():
     wrong = [max(abs(each.u - 2), abs(each.y), abs(each.symmetric[1] - 3.92)) > 0.05 for each in runs]
     assert np.mean(wrong) <= 0.1
     short = [monte_carlo(total, inputs, seed, block=200, most=400) for seed in range(60)]
+    # margin: chance: 60 runs, 4.6 standard errors
     assert np.mean([max(abs(each.u - 2), abs(each.y)) > 0.05 for each in short]) > 0.5
 
 
@@ -240,7 +242,7 @@ def test_shortest_interval_of_a_skew_distribution(rng):
     low, high = shortest_interval(rng.exponential(1, 100_000), 0.95)
     assert low < 0.01
     assert high == pytest.approx(-math.log(0.05), rel=0.02)
-    assert high - low < -math.log(0.025) + math.log(0.975)
+    assert high - low < -math.log(0.025) + math.log(0.975)  # margin: the order is said; the difference is 18 %
 
 
 def test_numerical_tolerances():
@@ -327,8 +329,9 @@ def test_needed_reaches_what_is_wanted(source, part):
         return
     row = found.of(source)
     reached, beyond = (scaled(found, source, factor * answer.u / row.u).U for factor in (1.0, 1.0001))
+    # margin: from below, by a step of dof at most; equality where there is none
     assert 0.97 * wanted < reached <= wanted * (1 + 1e-9)
-    assert beyond > wanted * (1 - 1e-9)
+    assert beyond > wanted * (1 - 1e-9)  # margin: that a ten-thousandth more is too much is what is said
 
 
 def test_needed_in_closed_form():
@@ -368,7 +371,7 @@ def test_numbers_keep_their_correlation():
     shared = 200.0 * 100.0 * INPUTS[1].u ** 2 + camera
     whole = (numbers["width"] + numbers["depth"]).s ** 2
     assert whole == pytest.approx(numbers["width"].s ** 2 + numbers["depth"].s ** 2 + 2 * shared, rel=1e-9)
-    assert 2 * shared > 0.1 * whole
+    assert 2 * shared > 0.1 * whole  # margin: the order is said: the shared part is a third of the whole
 
 
 def test_numbers_of_different_sources_are_refused():

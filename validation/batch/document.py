@@ -51,6 +51,7 @@ def _frame(found: Validation) -> dict[str, Any]:
         "scene": found.scene,
         "seed": found.seed,
         "variant": found.variant,
+        "machines": found.machines,
         "paper_scale": found.paper_scale,
         "settings": [],
         "refused": [],

@@ -93,7 +93,7 @@ _KINDS: dict[str, TypeAdapter] = {
     "wall": TypeAdapter(_NotNegative, config=_Strict),
     "workers": TypeAdapter(_Images, config=_Strict),
     "stages": TypeAdapter(list[list[_Images]], config=_Strict),
-    "machine": TypeAdapter(dict[str, _Scalar], config=_Strict),
+    "machines": TypeAdapter(Annotated[list[dict[str, _Scalar]], Field(max_length=1000)], config=_Strict),
     "effects": TypeAdapter(dict[str, list[dict[str, _Scalar]]], config=_Strict),
 }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import platform
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +21,7 @@ from render import Quality, Tolerance
 from render import variant as variants
 from render.phenomena import named
 from scenes import InvalidInput, Scene
-from validation.batch import cluster, photographs, work
+from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign, Case
 from validation.batch.photographs import Photographs
@@ -116,9 +115,7 @@ def run(
         Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how, photos), fresh
     )
     try:
-        store.note(
-            "machine", {"system": platform.platform(), "python": platform.python_version(), "cores": pools.cores()}
-        )
+        _note_machine(store)
         if photos is None:
             store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
         batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more, photos)
@@ -177,6 +174,19 @@ def _code() -> str:
         Path(module.__file__) for module in (work, photographs)
     ]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+
+
+def _note_machine(store: RunFile) -> None:
+    """Where the run was begun, and each other machine that it was continued on, in order."""
+    before, here = store.fact("machines", []), machine.here()
+    if any(machine.same(here, one) for one in before):
+        return
+    store.note("machines", [*before, here])
+    if before:
+        log.warning(
+            f"begun on {machine.named(before[0])}; continued on {machine.named(here)}: the same but for rounding, "
+            "not to the last bit"
+        )
 
 
 def _crew(workers: int, executor: Executor | None, dask: str | None) -> AbstractContextManager[Crew]:

@@ -32,7 +32,7 @@ class Validation(Shown):
 
     ``paper_scale`` is the free scale: the median of paper_ice / our paper model over all rows that have both.
     ``refused`` tells of each setting without a row why, by its number. ``search`` repeats the paper's Table 1 with the
-    same scale: (scene, sensor, light, paper, ours).
+    same scale: (scene, sensor, light, paper, ours). ``machines`` are those that worked on it, where it was begun first.
     """
 
     scene: str
@@ -47,6 +47,7 @@ class Validation(Shown):
     verdict: Verdict
     classic_verdicts: dict[str, Verdict]
     seconds: dict[str, float]
+    machines: tuple[dict[str, Any], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``ice validate --json``; numbers that are not finite become null."""
@@ -109,6 +110,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values()), truth),
         classic_verdicts={name: _judge(rows.judged(name), truth=truth) for name in rows.others},
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
+        machines=tuple(store.fact("machines", [])),
     )
 
 

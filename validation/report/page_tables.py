@@ -157,7 +157,7 @@ def refused(found: Validation) -> Table:
 
 
 def facts(found: Validation, store: RunFile) -> Table:
-    identity, machine = store.identity(), store.fact("machine", {})
+    identity, machines = store.identity(), store.fact("machines", [])
     facts = {
         "scenes": ", ".join(scene["name"] for scene in identity["campaign"]["scenes"]),
         "settings x images": f"{len(found.rows) + len(found.refused)} x {identity['renders']}",
@@ -165,7 +165,9 @@ def facts(found: Validation, store: RunFile) -> Table:
         "renderer's variant": found.variant,
         "versions": ", ".join(f"{name} {version}" for name, version in identity["versions"].items()),
         "digest of the code": identity["code"],
-        "machine": ", ".join(f"{name} {value}" for name, value in machine.items()),
+        "machine": "; continued on ".join(
+            ", ".join(f"{key} {value}" for key, value in one.items()) for one in machines
+        ),
         "time": f"{found.seconds['wall']:.1f} s with {found.seconds['workers']} workers",
     }
     lines = [[name, str(value)] for name, value in facts.items()]

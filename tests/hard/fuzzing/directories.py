@@ -90,7 +90,7 @@ def _document(rng: np.random.Generator, copy: Path) -> None:
     """A value changed in one of the JSON documents."""
     table, column, which = (
         ("run", "value", "key = 'identity'"), ("run", "value", "key = 'wall'"), ("run", "value", "key = 'effects'"),
-        ("run", "value", "key = 'machine'"), ("setting", "predicted", "1"), ("chunk", "seconds", "1"),
+        ("run", "value", "key = 'machines'"), ("setting", "predicted", "1"), ("chunk", "seconds", "1"),
     )[rng.integers(6)]  # fmt: skip
     db = sqlite3.connect(copy / "run.sqlite")
     (text,) = db.execute(f"SELECT {column} FROM {table} WHERE {which}").fetchone()
