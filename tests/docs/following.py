@@ -10,7 +10,7 @@ import shlex
 from pathlib import Path
 
 from tests.docs.pages import Block, blocks
-from tests.docs.shell import ice
+from tests.commands import ice
 
 _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -44,9 +44,9 @@ def _console(block: Block, folder: Path, where: str) -> None:
         program, *arguments = shlex.split(command)
         assert program == "ice", where
         done = ice(*arguments, cwd=folder)
-        assert done.status == 0, f"{where}: {command}: {done.out}{done.err}"
-        same = doctest.OutputChecker().check_output(wanted, done.out, _FLAGS)
-        assert same or not wanted.strip(), f"{where}: {command} prints\n{done.out}"
+        assert done.returncode == 0, f"{where}: {command}: {done.stdout}{done.stderr}"
+        same = doctest.OutputChecker().check_output(wanted, done.stdout, _FLAGS)
+        assert same or not wanted.strip(), f"{where}: {command} prints\n{done.stdout}"
 
 
 def _python(block: Block, folder: Path, where: str, names: dict[str, object]) -> str:

@@ -13,7 +13,7 @@ from measure import calibration
 from scenes.load import BUNDLED
 from tests.boards import SMALL, poses
 from tests.docs.pages import DOCS, keys, told
-from tests.docs.shell import ice
+from tests.commands import ice
 from tests.hard.fuzzing.doors import Room
 from validation.cli.commands import COMMANDS
 from validation.explore import server
@@ -72,8 +72,8 @@ def folder(tmp_path_factory):
 def document(name, folder, page=DOCS / "json.md"):
     """What a command prints, strictly read, and the keys that the page tells of: all, and those of some cases only."""
     done = ice(name.split()[0], *ASKED[name], "--json", cwd=folder)
-    assert done.status in (0, 1, 130), done.err
-    return json.loads(done.out, parse_constant=lambda word: pytest.fail(word)), *told(page, f"ice {name}")
+    assert done.returncode in (0, 1, 130), done.stderr
+    return json.loads(done.stdout, parse_constant=lambda word: pytest.fail(word)), *told(page, f"ice {name}")
 
 
 def test_every_command_is_asked():

@@ -5,7 +5,7 @@ import pytest
 import measure
 import planner
 import scenes.photograph
-from tests.docs.shell import ice
+from tests.commands import ice
 from validation.batch.store import RunFile
 from validation.report import export
 
@@ -36,6 +36,6 @@ def test_options_are_looked_at_before_the_work(arguments, line, tmp_path, monkey
     monkeypatch.setattr(RunFile, "reopen", _work)
     monkeypatch.setattr(export, "find_spec", lambda _: None)
     done = ice(*arguments.split(), cwd=tmp_path)
-    assert (done.status, done.out) == (2, "")
-    assert done.err.startswith(line)
-    assert done.err.count("\n") == 1
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(line)
+    assert done.stderr.count("\n") == 1
