@@ -49,13 +49,26 @@ def test_closed_streams_of_a_process(asked, status):
     assert "Traceback" not in done.stderr
 
 
-def test_who_waits_for_the_first_step_is_told_at_once(monkeypatch, capsys):
-    """And then every three seconds what is done."""
+def test_who_waits_for_the_first_step_is_told_in_the_first_second(monkeypatch, capsys):
+    """And then every three seconds what is done; what is over before is not told of."""
+    with common.progress("part.stl", "steps", at_once=True):
+        pass
     now = [0.0]
     monkeypatch.setattr(common.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(common.threading, "Timer", _Over)
     with common.progress("part.stl", "steps", at_once=True) as shown:
         assert capsys.readouterr().err == "part.stl ...\n"
         for second in range(8):
             now[0] = float(second)
             shown("reading", second, 9)
     assert capsys.readouterr().err == "part.stl: reading, 3 of 9 steps\npart.stl: reading, 6 of 9 steps\n"
+
+
+class _Over:
+    """A timer whose time is over at once, if it is less than a second."""
+
+    def __init__(self, seconds, tell):
+        self.start = tell if seconds < 1 else list
+
+    def cancel(self):
+        pass

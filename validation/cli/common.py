@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ Report = Callable[[str, int, int], None]
 MOST_SEED = 2**63 - 1
 MOST_WORKERS = 1024
 _EVERY_S, _SOON_S = 10.0, 3.0  # between lines of progress where there is no terminal
+_FIRST_S = 0.7  # before the first
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene or a TOML file.")]
 Sensor = Annotated[str, typer.Option(metavar="P,A", help="Sensor pose: polar angle and azimuth, degrees.")]
@@ -120,16 +122,21 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterator[Report | None]:
     """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s.
 
-    ``at_once`` says already that work begins, and then a line every 3 s: for what is silent for long.
+    ``at_once`` says already in the first second that there is work, and then a line every 3 s.
     """
     if verbosity.quiet():
         yield None
         return
     errors = console(stderr=True)
     if not errors.is_terminal:
+        first = threading.Timer(_FIRST_S, lambda: print(f"{title} ...", file=sys.stderr, flush=True))
+        first.daemon = True
         if at_once:
-            print(f"{title} ...", file=sys.stderr, flush=True)
-        yield _lines(title, unit, at_once)
+            first.start()  # what is refused at once is one line
+        try:
+            yield _lines(title, unit, at_once)
+        finally:
+            first.cancel()
         return
     from validation.cli.bar import bar
 

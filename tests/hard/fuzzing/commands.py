@@ -44,7 +44,8 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--noise-seed": ("1", str(2**63 - 1)), "--effects": ("fall_off",), "--leave-out-px": ("1",), "--json": (),
     }),
     "measure": (["IMAGE"], {
-        "--near": ("5,6", "1e9,1", "x"), "--box": ("1,2,50,60", "9,9,1,1"), "--kind": ("tag", "dog"), "--all": (),
+        "--near": ("5,6", "1e9,1", "x"), "--mtf": ("OUT.png", "OUT.gif"),
+        "--box": ("1,2,50,60", "9,9,1,1"), "--kind": ("tag", "dog"), "--all": (),
         "--most": ("0", "3"), "-o": ("OUT.png", "OUT.gif", "FILE/x.png"), "--lens": ("SCENE",), "--json": (),
         "--estimator": ("gradient", "nobody"),
     }),
@@ -67,7 +68,13 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
     "compare": (["RUN", "RUN"], {"--level": ("0.5", "1"), "--json": ()}),
     "report": (["DAMAGED"], {"--out": ("FILE/x",), "--json": (), "--parquet": ()}),
     "calibrate": (["SCENE", "--images", "1"], {"--seed": ("1",), "-o": ("OUT.png",)}),
-    "cost": (["SCENE", "--seed", "-1"], {"--out": ("OUT",)}),
+    "cost": (["SCENE", "--seed", "-1"], {"--out": ("OUT",), "--budget": ("0s", "x", "1s")}),
+    "budget": (["SCENE"], {
+        "--sensor": _POSE, "--light": _POSE, "--p": ("0.5", "0.9999", "1"), "--reach": ("1e-300", "1e300"),
+        "--stations": ("1", "-1"), "--csv": ("OUT.csv", "FILE/x.csv"), "--seed": ("1",), "--json": (),
+    }),
+    "show": (["SCENE"], {"--sensor": _POSE, "-o": ("OUT.png", "OUT.gif", "FILE/x.png"), "--json": ()}),
+    "new": (["FILE"], {"--units": ("mm", "ell"), "-o": ("OUT.toml", "FILE/x.toml"), "--json": ()}),
     "calibrate-camera": (["IMAGE", "IMAGE", "FILE", "--square", "25"], {
         "--square": ("1e-9", "1e9"), "--square-sd": ("0.1",), "--units": ("cm", "ell"), "--shape": ("9x6", "2x2", "x"),
         "--model": ("none", "f,k1", "k4"), "--noise": ("1",), "-o": ("OUT.toml", "OUT.png"), "--scene": ("SCENE",),
