@@ -63,10 +63,11 @@ pages: $(VENV)/.installed
 	$(BIN)/python -m scenes.reference docs
 	$(BIN)/python -m validation.cli.reference docs
 
-# Store the run that the tests compare with anew, after a change of the measurement that was wanted.
+# Store the run and the documents that the tests compare with anew, after a change of the measurement that was wanted.
 reference: $(VENV)/.installed
 	ICE_VARIANT=scalar_rgb $(BIN)/ice validate tests/regression/reference.toml --renders 500 --seed 1 --workers 1 --fresh --out runs/reference
 	cp runs/reference/result.json tests/regression/reference.json
+	$(BIN)/python -m tests.regression.test_documents $$(mktemp -d)
 
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed

@@ -9,8 +9,8 @@ import re
 import shlex
 from pathlib import Path
 
-from tests.docs.pages import Block, blocks
 from tests.commands import ice
+from tests.docs.pages import Block, blocks
 
 _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

@@ -12,8 +12,8 @@ import trimesh
 from measure import calibration
 from scenes.load import BUNDLED
 from tests.boards import SMALL, poses
-from tests.docs.pages import DOCS, keys, told
 from tests.commands import ice
+from tests.docs.pages import DOCS, keys, told
 from tests.hard.fuzzing.doors import Room
 from validation.cli.commands import COMMANDS
 from validation.explore import server
