@@ -218,14 +218,14 @@ def _wrapped(function, measured):
     @functools.wraps(function)
     def call(*arguments, **options):
         global _inside
-        place, outer = _place(), _inside
-        if place and not outer:
-            _recorded(place, lambda: measured(*arguments, **options))
-        _inside = True
+        place, outer, _inside = _place(), _inside, True
         try:
-            return function(*arguments, **options)
+            result = function(*arguments, **options)
         finally:
             _inside = outer
+        if place and not outer and (result is None or np.all(result)):  # what a test asks to go another way is no claim
+            _recorded(place, lambda: measured(*arguments, **options))
+        return result
 
     return call
 

@@ -100,11 +100,12 @@ def test_every_kind_is_as_predicted(two_holes, measured):
     for values, covariance in ((found.value, told.covariance), (found.value_image, told.covariance_image)):
         ratio = values.var(0, ddof=1) / np.diag(covariance)
         assert ((low < ratio) & (ratio < high)).all(), ratio
-        assert (ratio / 1.7 < low).all()
+        assert (ratio / 1.7 < low).all()  # margin: 70 % lie beyond the interval, for each
         assert low > 0
     sigma = np.sqrt(np.diag(told.covariance))
+    # margin: a sigma of one picture: what interpolation and rays leave, and the mean of all
     assert (np.abs(found.value.mean(0) - truth) < 1.0 * sigma).all()
-    assert (np.abs(found.value - truth) < 5 * sigma).all()
+    assert (np.abs(found.value - truth) < 5 * sigma).all()  # margin: 5 standard deviations
 
 
 def test_told_and_calibrated_variances(two_holes, measured):
@@ -115,6 +116,7 @@ def test_told_and_calibrated_variances(two_holes, measured):
     each = np.einsum("nmm->nm", found.covariance)
     assert np.median(each, 0) / exact == pytest.approx(1, abs=0.1)
     calibrated = planner.predict(scene, SENSOR, LIGHT)
+    # margin: the claim: both models agree to a tenth
     assert np.diag(calibrated.covariance_object) / exact == pytest.approx(1, abs=0.1)
 
 
@@ -125,7 +127,7 @@ def test_the_joint_covariance(measured):
     predicted = told.covariance / np.outer(sigma, sigma)
     empirical = np.corrcoef(found.value.T)
     error = (1 - predicted**2) / np.sqrt(COUNT - 1)
-    assert (np.abs(empirical - predicted) < 4.5 * error + 1e-12).all()
+    assert (np.abs(empirical - predicted) < 4.5 * error + 1e-12).all()  # margin: 4.5 standard errors, of all pairs
     assert (np.abs(empirical) > 5 / np.sqrt(COUNT - 1)).sum() > len(sigma)  # some of them are correlated
 
 
@@ -153,7 +155,7 @@ def test_a_displaced_part_is_followed(two_holes):
     found = measure.measure(np.roll(clean, (1, 2), (0, 1)), scene, SENSOR, LIGHT, "gradient")
     here = measure.measure(clean, scene, SENSOR, LIGHT, "gradient")
     assert found.status.tolist() == here.status.tolist()
-    assert found.value == pytest.approx(here.value, rel=4e-3)
+    assert found.value == pytest.approx(here.value, rel=4e-3)  # margin: some 1e-3, by perspective
 
 
 def test_the_ellipses_own_centre_is_another_one(two_holes):
@@ -169,7 +171,7 @@ def test_the_ellipses_own_centre_is_another_one(two_holes):
     clean = render.image(scene, steep, (10, 0))
     found = measure.distance(clean, scene, steep, (10, 0))
     true = project(circle.centre[None], np.array(steep, float), scene.camera)[0]
-    assert np.linalg.norm(ellipse - true) > 0.05
+    assert np.linalg.norm(ellipse - true) > 0.05  # margin: more than twice what the right centre may be off
     assert np.linalg.norm(found.corners[0] - true) < 0.02
 
 
@@ -226,5 +228,5 @@ def test_estimators_of_the_whole_picture(estimator):
     assert ((low < ratio) & (ratio < high)).all()
     assert np.einsum("nmm->nm", found.covariance).mean(0) / np.diag(told.covariance) == pytest.approx(1, abs=0.08)
     assert (
-        np.abs(found.value.mean(0) - [np.hypot(12.5, 7.5), 7.5, 90]) < 0.6 * np.sqrt(np.diag(told.covariance))
+        np.abs(found.value.mean(0) - [np.hypot(12.5, 7.5), 7.5, 90]) < 0.7 * np.sqrt(np.diag(told.covariance))
     ).all()

@@ -31,7 +31,7 @@ def test_the_notch_of_the_bracket_is_empty():
     notch = [upright[0] + 2.0, 0, 4.0]
     dark, *lit = (level(bracket, (80, 270), (70, 270), point) for point in (notch, foot, upright))
     assert dark == 0
-    assert min(lit) > 50
+    assert min(lit) > 50  # margin: lit is 168, dark is 0
 
 
 def test_a_hollow_body_is_known_to_shade_itself():

@@ -44,10 +44,10 @@ def test_the_same_from_both_pixels_beside_it(step, blur, phase, rng):
         goods.append(good)
         gaussians.append(d1 * d2 / (d2**2 - d1 * d3))
     assert np.all(goods)
-    assert shifts[0].mean() == pytest.approx(phase * length, abs=0.01)
-    assert 0.005 < shifts[0].std() < 0.03
+    assert shifts[0].mean() == pytest.approx(phase * length, abs=0.012)
+    assert 0.005 < shifts[0].std() < 0.03  # margin: the noise moves them, and not far
     assert rms(shifts[0] - shifts[1] - length) < 2e-4
-    assert rms(gaussians[0] - gaussians[1] - length) > 2e-3
+    assert rms(gaussians[0] - gaussians[1] - length) > 2e-3  # margin: ten times the limit of what is right
 
 
 def rms(values):

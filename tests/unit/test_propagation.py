@@ -66,7 +66,7 @@ def test_the_papers_line_variance_against_monte_carlo(task1, fitted, predicted, 
         ones = np.ones(len(task1.task.edges))
         variance = predicted.line_variance(ones, place * ones)[e]
         empirical = displacement(fitted[name], place).var(ddof=1)
-        assert empirical == pytest.approx(variance, rel=WITHIN)
+        assert empirical == pytest.approx(variance, rel=WITHIN)  # margin: 4 standard errors
         assert empirical != pytest.approx(1.3 * variance, rel=WITHIN)
         assert empirical != pytest.approx(0, abs=WITHIN * variance)
 
@@ -78,7 +78,7 @@ def test_the_papers_tilt_against_monte_carlo(task1, fitted, predicted):
         _, direction, _, _, normal, _ = fitted[name]
         sine = normal @ direction * np.sign(normal @ [-direction[1], direction[0]])
         variance = predicted.line_variance(0 * ones, ones)[e]
-        assert np.arcsin(sine).var(ddof=1) == pytest.approx(variance, rel=WITHIN)
+        assert np.arcsin(sine).var(ddof=1) == pytest.approx(variance, rel=WITHIN)  # margin: 4 standard errors
 
 
 def test_the_printed_gamma_variance_fails_the_same_test(task1, fitted, predicted):
@@ -99,8 +99,9 @@ def test_the_papers_distance_variance_against_monte_carlo(task1, fitted):
         centroids, normals = (np.stack([fitted[name][k] for name in feature.edges], 1) for k in (3, 4))
         ends.append(np.linalg.solve(normals, (normals * centroids).sum(-1)[..., None])[..., 0])
     values, said = np.linalg.norm(ends[1] - ends[0], axis=1), planner.predict(task1, SENSOR, LIGHT, "paper")
+    # margin: 4 standard errors
     assert values.mean() == pytest.approx(said.value_px, abs=4 * np.sqrt(said.variance_px2 / DRAWS))
-    assert values.var(ddof=1) == pytest.approx(said.variance_px2, rel=WITHIN)
+    assert values.var(ddof=1) == pytest.approx(said.variance_px2, rel=WITHIN)  # margin: 4 standard errors
     assert values.var(ddof=1) != pytest.approx(1.3 * said.variance_px2, rel=WITHIN)
 
 
@@ -115,7 +116,7 @@ def test_the_variance_of_correlated_points_against_monte_carlo(rng):
     response = regression(along)
     ours = sigma**2 * response @ together @ response.T
     for values, known in ((lines.mean_offset, ours[0, 0]), (np.tan(lines.tilt), ours[1, 1])):
-        assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)
+        assert values.var(ddof=1) == pytest.approx(known, rel=WITHIN)  # margin: 4 standard errors
     independent = sigma**2 * response @ response.T
     assert lines.mean_offset.var(ddof=1) != pytest.approx(independent[0, 0], rel=WITHIN)
 

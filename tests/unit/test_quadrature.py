@@ -14,8 +14,9 @@ def test_a_gaussian_anywhere_on_a_piece(length):
     t, weight = rule(length, 1.0)
     middle = np.random.default_rng(0).uniform(-3, length + 3, 2000)
     found = np.exp(-((length * t - middle[:, None]) ** 2) / 2) @ weight * length / np.sqrt(2 * np.pi)
+    # margin: what the rule promises, a closed form's error; 30 % fewer nodes miss it
     assert np.abs(found - (ndtr(length - middle) - ndtr(-middle))).max() < 1.5e-7
-    assert t.size < 1.02 * length + 8
+    assert t.size < 1.02 * length + 8  # margin: a number of nodes
 
 
 def test_fewer_nodes_are_too_few():

@@ -30,7 +30,7 @@ def test_table():
     table = Rays(None, 2, 12, 3, 7)._table
     assert table.shape == (2 + 4 * SURFACES, 4 * 16)
     assert table.dtype == np.float32
-    assert 0 <= table.min() <= table.max() < 1
+    assert 0 <= table.min() <= table.max() < 1  # margin: random numbers of the unit interval
     assert (np.sort((table * 64).astype(int), 1) == np.arange(64)).all()  # each 64th once: Sobol points
     assert (table == Rays(None, 2, 12, 0, 7)._table).all()
     assert (table != Rays(None, 2, 12, 0, 8)._table).any()

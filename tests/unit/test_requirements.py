@@ -98,7 +98,7 @@ def test_joint_covariance_against_single_variances(rng):
         mixed = errors.covariance((weights @ gradient)[None])[0, 0]
         assert weights @ whole @ weights == pytest.approx(mixed, rel=1e-9)
     correlation = whole[0, 1] / np.sqrt(whole[0, 0] * whole[1, 1])
-    assert 0.1 < abs(correlation) < 1  # they share edges
+    assert 0.1 < abs(correlation) < 1  # they share edges  # margin: they share edges: neither 0 nor 1
 
 
 @pytest.mark.parametrize("over", ["minimax", "sum"])
@@ -117,8 +117,9 @@ def test_exhaustive_search_for_several(model, over):
         rows, columns, matrix = table.of_class(which)
         bound = table.rows(rows, matrix)
         there = exact[np.ix_(table.sensors[rows], columns)]
-        assert (bound <= there).all()
+        assert (bound <= there).all()  # margin: a bound, by its kind: equality is allowed
         close = np.isfinite(there)
+        # margin: no empty bound: half of what is there, in the median
         assert np.median((bound / there)[close]) > 0.5  # and it is no empty one
 
 
@@ -136,7 +137,7 @@ def test_what_is_minimised():
     found = planner.plan(scene, step_deg=10)
     assert found.limiting in ("diagonal", "depth", "corner")
     assert found.variance == pytest.approx(found.prediction.worst_ratio**2)
-    assert found.variance <= p.worst_ratio**2
+    assert found.variance <= p.worst_ratio**2  # margin: the least of all is no more than one of them
     tight = planner.plan(block(DIAGONAL, {**DEPTH, "tolerance": 1e-4}, ANGLE), step_deg=10)
     assert tight.limiting == "depth"
 
@@ -177,7 +178,7 @@ def test_pose_scatter_by_monte_carlo(rng):
         for k, quantity in enumerate(scene.quantities):
             ratio = kind(seen, quantity).value.var(ddof=1) / covariance[0, k, k]
             assert ratio == pytest.approx(1, abs=5 * np.sqrt(2 / count))
-            assert ratio / 1.3 < 1 - 5 * np.sqrt(2 / count)
+            assert ratio / 1.3 < 1 - 5 * np.sqrt(2 / count)  # margin: 30 % are beyond 5 standard errors
 
 
 def test_guard_band():
@@ -212,5 +213,5 @@ def test_pooling_of_correlated_rows(rng):
         for i, independent in enumerate((share, 1.0)):
             pooled = statistics.verdict(ratios, [count] * 5, 0.1, independent=independent).pooled
             rejected[i] += pooled.p_value < 0.05
-    assert rejected[0] / trials < 0.05 + 4 * np.sqrt(0.05 * 0.95 / trials)
-    assert rejected[1] / trials > 0.12
+    assert rejected[0] / trials < 0.05 + 4 * np.sqrt(0.05 * 0.95 / trials)  # margin: 4 standard errors
+    assert rejected[1] / trials > 0.12  # margin: 10 standard errors above the twentieth that is claimed
