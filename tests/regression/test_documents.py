@@ -1,7 +1,7 @@
 """Do the commands still print what they printed when it was stored, number for number?
 
 ``python -m tests.regression.test_documents FOLDER`` stores them anew, after a change that was wanted. The scene has no
-symmetry, so that whatever is taken for its neighbour - another axis, unit, end, key, column - is another number. How far
+symmetry, so that what is taken for its neighbour - another axis, unit, end, key, column - is another number. How far
 numbers may be off: closed forms by what another order of additions makes of them, searches by where a descent ends,
 renders by what another instruction set makes of a ray.
 """
