@@ -1,0 +1,45 @@
+"""Slips of one word in what effects are bounded by, in the helpers of users' tests, and in correlations."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import scenes
+from planner.imaging.pictures import Pictures
+from planner.models.texture import texture_errors
+from render.phenomena import shading
+from render.phenomena.register import REGISTER
+from render.testing import assert_measures
+from validation.statistics import correlation
+
+
+def stacked(scene, sensor, light):
+    """One picture, as the settings of a scene come to an effect."""
+    return Pictures.of(scene, np.array([sensor], float), np.array([light], float))
+
+
+def test_one_image_of_many_that_could_not_be_measured_fails_a_users_test():
+    found = SimpleNamespace(
+        value_px=np.array([10.0, np.nan, 10.0]), variance_px2=np.full(3, 0.01), status=np.array(["ok", "short", "ok"])
+    )
+    with pytest.raises(AssertionError, match="must be measured, got status"):
+        assert_measures(found, 10.0)
+
+
+def test_equal_columns_correlate_and_a_constant_one_does_not():
+    rows = [1.0, 2.0, 4.0]
+    assert correlation(rows, rows)["pearson"] == pytest.approx(1)
+    assert correlation(rows, [3.0, 3.0, 3.0]) is None
+    assert correlation([3.0, 3.0, 3.0], rows) is None
+    assert correlation(rows, [1.0, np.nan, 2.0]) is None
+
+
+def test_a_print_that_shortens_a_distance_counts_as_much_as_one_that_lengthens_it(monkeypatch):
+    pictures = stacked(scenes.load("printed_label"), (30, 135), (15, 315))
+    longer = REGISTER["texture"].influence(pictures).bias_px
+    monkeypatch.setattr(
+        shading, "texture_errors", lambda p: replace(found := texture_errors(p), printed=-found.printed)
+    )
+    assert REGISTER["texture"].influence(pictures).bias_px == longer > 1e-4
