@@ -39,9 +39,9 @@ def read_boards(
     shape: tuple[int, int] | None = None,
     noise: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-    size: tuple[str, tuple[int, int]] | None = None,
+    size: image_file.Size | None = None,
 ) -> Boards:
-    """Measure the board in each photograph; ``size`` is what asks for an image of that height and width, px, and these.
+    """Measure the board in each photograph; ``size`` is what they must have, else the first one's.
 
     Raises
     ------

@@ -8,6 +8,7 @@ from rich.console import Console
 
 import scenes
 import validation
+from scenes.status import MEANINGS
 from validation.report import guide, table
 
 pytestmark = pytest.mark.render
@@ -39,7 +40,7 @@ def test_only_columns_that_are_there_are_explained(found):
 
 def test_a_status_that_occurs_is_explained(found):
     rows = [replace(found.rows[0], main=replace(found.rows[0].main, status="misfit")), found.rows[1]]
-    assert "misfit: the image is not what the model says." in printed(replace(found, rows=rows))
+    assert f"misfit: {MEANINGS['misfit']}." in printed(replace(found, rows=rows))
 
 
 def test_results_in_the_scenes_unit(found):

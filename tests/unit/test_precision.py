@@ -8,6 +8,7 @@ import planner
 from planner.features.propagation import corner_covariance
 from planner.imaging.pictures import Pictures
 from planner.models.paper import paper
+from planner.search.viewing import ViewingSpace
 
 mp.mp.dps = 50
 
@@ -113,11 +114,15 @@ def test_whole_model(task1, sensor, light):
     assert abs(mp.mpf(float(fixed[0])) / exact - 1) < 1e-12
 
 
-class _One:
+class _One(ViewingSpace):
     """A viewing space of one direction."""
 
     def __init__(self, pose):
-        self.poses = np.array([pose], float)
+        object.__setattr__(self, "pose", pose)
+
+    @property
+    def poses(self):
+        return np.array([self.pose], float)
 
     def __len__(self):
         return 1

@@ -472,7 +472,7 @@ def test_a_budget_is_printed_row_by_row(stated, tmp_path):
         ]  # fmt: skip
         assert rows[: len(wanted)] == wanted
         places = budget_table.decimals(each.U)
-        assert budget_table.sentence(each, "width") == (
+        assert budget_table.sentence(each, "width", "ok") == (
             f"The width {each.name!r} is {each.value:.{places}f} cm +- {each.U:.{places}f} cm, k = {each.k:.1f}"
         )
         assert f"u_c = {u:.3g}, dof_eff = {dof:.0f}, k = {each.k:.3g}, U = {each.k * u:.3g} cm (95 %)" in (

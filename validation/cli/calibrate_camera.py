@@ -10,6 +10,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput
+from scenes.image_file import Size
 from validation.cli.common import Json, check_number, commands, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -66,7 +67,7 @@ def calibrate_camera_command(
     read_model(model)
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
-        seen = read_boards(boards, wanted, noise, shown, camera and (scene, (camera.height, camera.width)))
+        seen = read_boards(boards, wanted, noise, shown, camera and Size(camera.height, camera.width, scene))
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, square, seen.image_shape, model, square_sd)
