@@ -33,7 +33,7 @@ def test_a_new_scene_runs(part):
     scene = scenes.load("part.toml")
     assert scene.units == "mm"
     assert max(np.ptp(scene.solid.vertices, axis=0)) == pytest.approx(60)
-    assert 60 < min(scene.camera.field_of_view) < 180  # margin: degrees, as wide as it comes
+    assert 60 < min(scene.camera.field_of_view) < 180  # margin: the part's 60 mm, less than three times as wide
     (setting,) = scene.settings
     found = planner.predict(scene, setting.sensor, setting.light)
     assert found.status in ("ok", "clutter")
@@ -70,7 +70,7 @@ def test_a_new_scene_in_other_units(part, units):
     assert ice("new", part, "--units", units, "-o", "other.toml").exit_code == 0
     scene = scenes.load("other.toml")
     assert scene.units == units
-    assert 60 < min(scene.camera.field_of_view) < 180  # margin: degrees, as wide as it comes
+    assert 60 < min(scene.camera.field_of_view) < 180  # margin: the part's 60 mm, less than three times as wide
 
 
 def test_what_new_refuses(part):
