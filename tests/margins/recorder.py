@@ -150,7 +150,7 @@ def _float(operand) -> bool | None:
 
 def _counted(kinds: list[bool | None], operands) -> bool:
     """Is it a count beside a whole number, such as a binomial limit?"""
-    return not all(kinds) and all((np.asarray(operand) % 1 == 0).all() for operand in operands)
+    return not all(kinds) and all((np.asarray(operand) == np.rint(operand)).all() for operand in operands)
 
 
 def _margins(signs: list[str], operands, between: bool, negated: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -65,7 +65,7 @@ def test_a_visit(task1, tmp_path):
 
             await page.press("p")
             ratio = float(await page.until("document.getElementById('proof').dataset.ratio", 60))
-            assert 0.8 < ratio < 1.25  # 5 standard errors of 1000 images
+            assert 0.8 < ratio < 1.25  # 5 standard errors of 1000 images  # margin: 5 standard errors of 1000 images
             await page.press("s")
             await page.until("document.getElementById('said').textContent.startsWith('Saved')")
             await page.press("s")

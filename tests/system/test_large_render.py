@@ -24,10 +24,12 @@ def test_only_what_nothing_is_measured_by_gets_fewer_rays(name, monkeypatch):
     assert not np.array_equal(whole, sparse)
     off = np.abs(whole - sparse)
     near = large.near_required(picture, (slice(0, 240), slice(0, 256)), 1)
-    assert 0.005 < near.mean() < 0.5
+    assert 0.005 < near.mean() < 0.5  # margin: some pixels, not all
     contrast = np.ptp(whole)
+    # margin: chance of few rays: half a percent of the contrast, rms
     assert np.sqrt((off[near] ** 2).mean()) < 0.005 * contrast
-    assert off.max() < 0.12 * contrast
+    assert off.max() < 0.12 * contrast  # margin: chance of one ray at an edge that nothing is measured by
     if name != "plate":
         found = [measure.distance(image, scene, *poses, "gradient") for image in (whole, sparse)]
+        # margin: half a standard deviation, chance of few rays
         assert abs(found[0].value_px - found[1].value_px) < 0.5 * np.sqrt(found[0].variance_px2)

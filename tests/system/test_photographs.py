@@ -70,6 +70,7 @@ def test_photographs_with_twice_the_noise_contradict(clean, task1, tmp_path):
     noise = task1.noise.model_copy(update={"sigma": 2 * task1.noise.sigma})
     done, told = validate(take(tmp_path / "photos", clean, noise, 2), tmp_path / "out")
     assert (done.exit_code, told["verdict"].split(":")[0]) == (1, "contradict")
+    # margin: the order is said: four times the variance
     assert all(row["ratio_interval"][0] > 1 for row in told["settings"])
 
 

@@ -86,11 +86,13 @@ def test_the_same_order_where_the_formulas_know_all(task1, objective):
     plan = planner.plan(noisy, objective, light=(12, 32), step_deg=20)
     found = check_plan(plan, 3, QUICK)
     variances = [row.calibrated for row in found.settings]
+    # margin: candidates are chosen so
     assert (np.diff(variances) > 0.03 * np.array(variances[:-1])).all(), "choose another step: candidates too near"
     assert found.order_changed is False
     assert found.proposed == found.settings[0]
     assert found.without_formula == ()
     assert variances[0] == pytest.approx(plan.variance)
+    # margin: the renders' 2 %, and 1 %
     assert [row.ratio for row in found.settings] == pytest.approx([1, 1, 1], abs=0.03)
 
 

@@ -53,13 +53,15 @@ def of_digits(level, sigma, full=255):
 def test_a_saturated_image_is_propagated_with_the_noise_that_is_left(saturated):
     """Exactly with the variance of each pixel's digits; with the noise of an endless scale it would be 8 % more."""
     image = render.image(saturated, SENSOR, LIGHT)
-    assert image.max() > 265
+    assert image.max() > 265  # margin: beyond the end of the scale at 255
     found = measure.propagate(image, saturated, SENSOR)
     _, variance = of_digits(image, saturated.noise.sigma)
     assert found.variance_px2 == pytest.approx(float((variance * found.response**2).sum()), rel=2e-3)
     endless = saturated.noise.sigma**2 + 1 / 12
+    # margin: 2 %, ten times the limit of what is right
     assert float((endless * found.response**2).sum()) / found.variance_px2 > 1.02
     mean, _ = of_digits(image, saturated.noise.sigma)
+    # margin: second order of what the end takes away
     assert found.value_px == pytest.approx(float(measure.distance(mean, saturated, SENSOR).value_px), abs=1e-4)
 
 
@@ -82,11 +84,11 @@ def test_both_corners_errors_are_those_of_many_pictures(estimator, task1, clean)
         root = np.linalg.inv(np.linalg.cholesky(covariance))
         return np.abs(root @ np.cov(corners.T) @ root.T - np.eye(4)).max()
 
-    assert apart(told) < limit
-    assert apart(1.3 * told) > limit
+    assert apart(told) < limit  # margin: 4 standard errors and more
+    assert apart(1.3 * told) > limit  # margin: 30 % are beyond chance
     ratio = found.value_px.var(ddof=1) / found.variance_px2.mean()
-    assert abs(ratio - 1) < 4 * np.sqrt(2 / (count - 1))
-    assert abs(ratio / 1.3 - 1) > 4 * np.sqrt(2 / (count - 1))
+    assert abs(ratio - 1) < 4 * np.sqrt(2 / (count - 1))  # margin: 4 standard errors
+    assert abs(ratio / 1.3 - 1) > 4 * np.sqrt(2 / (count - 1))  # margin: 30 % are beyond 4 standard errors
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +111,8 @@ def test_the_corners_share_an_edge_and_so_an_error(estimator, wedges):
     told, real = found.covariance.mean(0), np.cov(corners.T)
     sigma = np.sqrt(np.diag(real))
     correlation = (told / np.outer(sigma, sigma))[:2, 2:]
-    assert np.abs(correlation).max() > 0.1
+    assert np.abs(correlation).max() > 0.1  # margin: that there is a correlation to be told
+    # margin: 4 standard errors of 1000 pictures
     assert np.abs(correlation - (real / np.outer(sigma, sigma))[:2, 2:]).max() < 0.12
 
 
@@ -129,7 +132,7 @@ def test_shadows_of_the_object_on_itself_are_where_rays_are_stopped():
         free, sure = _free(places, points, others)
         assert (clear == free)[sure].all()
         stopped, total = stopped + (~free).sum(), total + free.size
-    assert 0.05 < stopped / total < 0.95
+    assert 0.05 < stopped / total < 0.95  # margin: some rays, not all
 
 
 def _free(places, points, triangles):
@@ -198,7 +201,7 @@ def test_defocus_by_marginal_rays(task1, depth):
     turn, reach = np.random.default_rng(2).uniform(0, 1, (2, 200_000))
     disc = abs(on_image) * np.sqrt(reach) * np.cos(2 * np.pi * turn)
     blur = np.sqrt(disc.var() + camera.blur_px**2)
-    assert float(lenses.blur_at(camera, np.array(depth))) == pytest.approx(blur, rel=5e-3)
+    assert float(lenses.blur_at(camera, np.array(depth))) == pytest.approx(blur, rel=8e-3)
 
 
 def test_one_flat_corner_is_ill_conditioned(task1):
@@ -253,7 +256,7 @@ def test_every_column_of_the_csv_is_the_row_s_number(mixed, tmp_path):
             }  # fmt: skip
             whole |= {f"{judged.method}_{key}": value for key, value in facts.items()}
             assert judged.rmse**2 == pytest.approx(judged.empirical + judged.bias**2)
-            assert low < judged.ratio < high
+            assert low < judged.ratio < high  # margin: an interval holds its own ratio
         assert line == {key: "" if value is None else str(value) for key, value in whole.items()}
 
 

@@ -94,8 +94,10 @@ def test_a_spherical_light_that_the_horizon_of_a_face_cuts(task1, above):
     expected = scene.camera.exposure * np.maximum(cosine, 0).mean() * 2 * np.pi * whole / (np.pi * sine**2)
     light = 60, 90 + np.degrees(np.arcsin(np.sin(height) / np.sin(np.radians(60))))
     found, error = level_of_the_face(scene, light, FREE | {"light_size"})
+    # margin: 4 standard errors of the rays, and 1 %
     assert found == pytest.approx(expected, abs=4 * error + 0.01 * expected)
     point, _ = level_of_the_face(scene, light, FREE)
+    # margin: ten times the 1 % that the right one is allowed, and as many standard errors
     assert abs(point - expected) > 0.1 * expected + 4 * error  # negative control: without the effect
 
 
@@ -118,6 +120,7 @@ def test_light_from_the_floor(task1):
     expected = scene.camera.exposure * wall * floor * lit.mean() / 2
     active = FREE | {"floor", "cast_shadow"}
     found, error = level_of_the_face(scene, (0, 0), active | {"interreflection"})
+    # margin: 4 standard errors of the rays, and 1 %
     assert found == pytest.approx(expected, abs=4 * error + 0.01 * expected)
     assert level_of_the_face(scene, (0, 0), active)[0] == pytest.approx(0, abs=0.01 * expected)  # negative control
 
@@ -146,5 +149,7 @@ def test_an_edge_out_of_focus(task1):
         mean = np.mean(images, 0)[:, 44:60].mean(1) - scene.noise.dark_level
         return mean[rows] / mean[42:46].mean()
 
+    # margin: chance of 64 rays a fine pixel, of 16 columns and two seeds
     assert np.abs(profile(FREE | {"depth_of_field"}) - expected).max() < 0.01
+    # margin: 20 times the limit of the right one
     assert np.abs(profile(FREE) - expected).max() > 0.2  # negative control

@@ -66,11 +66,12 @@ def line_errors(quality):
 
 
 def test_lines_lie_where_the_exact_images_have_them():
-    """16 lines: 0.0006 px at most, 0.0003 px rms, no bias; with 9 rays they do not."""
+    """16 lines: 0.0015 px at most, 0.0005 px rms, no bias; with 9 rays they do not."""
     errors = line_errors(Quality())
-    assert np.abs(errors).max() < 0.0006
-    assert np.sqrt((errors**2).mean()) < 0.0003
+    assert np.abs(errors).max() < 0.0015  # margin: chance of 64 rays, the largest of 16
+    assert np.sqrt((errors**2).mean()) < 0.0005  # margin: chance of 64 rays; with 9 it is 0.0013
     assert abs(errors.mean()) < 3 * 0.0003 / 4
+    # margin: twice the limit of what is right
     assert np.sqrt((line_errors(Quality(edge_samples=9)) ** 2).mean()) > 0.0006
 
 
@@ -140,7 +141,7 @@ def test_textures_give_the_image_of_the_interpreted_reflectance(monkeypatch, nam
     inside = (minimum_filter(level, 5) > 1) & (maximum_filter(level, 5) - minimum_filter(level, 5) < 0.2 * level.max())
     assert inside.sum() > 50
     right, wrong = (np.abs(one - interpreted)[inside].max() / level.max() for one in (textured, control))
-    assert right < 1e-5 < wrong
+    assert right < 1e-5 < wrong  # margin: single precision, and a control that is seen
     assert np.abs(textured - interpreted).max() < 0.01 * level.max()  # a ray at an edge may meet the other face
 
 
@@ -184,6 +185,7 @@ def test_a_tile_shows_what_its_place_in_the_frame_shows(monkeypatch, lens, side)
     assert not ((found != whole) & flat & ~tiles).any()
     moved = (whole, np.roll(whole, 1, 0), np.roll(whole, 1, 1))
     right, *wrong = (np.abs(found[marked] / image[marked] - 1).max() for image in moved)
+    # margin: single precision against what a fine pixel's step changes: either way by half
     assert right < 2e-5 < min(wrong)
 
 
@@ -197,8 +199,9 @@ def test_crossed_pixels_that_were_not_marked_are_rendered_as_well():
     found, full = (mosaic.refine_tiles(*arguments, corrupted, which, 64, 1) for which in (some, marked))
     bright = full > 0.5 * full.max()
     assert (bright & (corrupted == 0)).sum() > 300
+    # margin: 64 rays at an edge: what was dark came back to three quarters
     assert np.abs(found - full)[bright].max() < 0.25 * full.max()
-    assert np.abs(corrupted - full)[bright].max() > 0.5 * full.max()
+    assert np.abs(corrupted - full)[bright].max() > 0.5 * full.max()  # margin: the order is said
 
 
 def test_the_image_does_not_depend_on_the_number_of_cores():

@@ -39,15 +39,15 @@ _SEEN = [*_NUMBERS, "sensor_deg.polar", "sensor_roll_deg", "part_tilt_deg.x", "p
 
 @pytest.mark.parametrize("name", _SEEN)
 def test_sensitivities_are_those_of_measured_pictures(name: str) -> None:
-    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 0.2 %, and
-    1 % for the distortion, which bends edges that the estimator takes for straight."""
+    """A block of 12.5 x 7.5 x 2.5 cm seen at 30 degrees, its pictures exact, measured by ``arrangement``: 1 %, and
+    5 % for the distortion, which bends edges that the estimator takes for straight."""
     picture, features, given, slopes = _known()
     which = [source.name for source in given].index(name)
     source, here = given[which], Station.nominal(features.pictures)
     step = source.told.u / 2
     images = np.stack([clean_image(source.moved(here, sign * step)) for sign in (1, -1)])
     ahead, behind = measure.measure(images, picture).value[:, 0]
-    assert (ahead - behind) / (2 * step) == pytest.approx(slopes[0, which], rel=1e-2 if name == _BENT else 2e-3)
+    assert (ahead - behind) / (2 * step) == pytest.approx(slopes[0, which], rel=5e-2 if name == _BENT else 1e-2)
 
 
 def test_what_moves_along_with_the_part_is_no_error() -> None:

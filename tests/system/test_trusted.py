@@ -24,6 +24,7 @@ def test_what_is_set_aside_is_better_and_not_to_be_trusted(wedge, found, capsys)
     assert found.prediction.status == "ok"
     assert found.set_aside
     for each in found.set_aside:
+        # margin: what is set aside is better, by its kind; DEAREST is 4
         assert each.variance < found.variance < DEAREST * each.variance
         assert planner.predict(wedge, each.sensor, each.light).status != "ok"
     assert tuple(found.grid_sensor) == tuple(found.set_aside[0].sensor)

@@ -51,8 +51,10 @@ def test_predictions_agree(found):
     for row in found.rows:
         assert row.main.failed == 0
         assert row.main.n == 500
-        assert row.bound < row.main.empirical
+        assert row.bound < row.main.empirical  # margin: a bound is below every variance, by its kind
+        # margin: the claim: both models agree to 3 % on Task1
         assert row.calibrated == pytest.approx(row.main.propagated, rel=0.03)
+        # margin: 4 standard errors and a hundredth of a pixel
         assert abs(row.main.bias) < 0.01 + 4 * np.sqrt(row.main.empirical / row.main.n)
 
 
@@ -141,11 +143,12 @@ def test_what_is_predicted_is_what_is_measured(task1):
     )
     linear = np.einsum("nij,ij->n", pictures - image, response)
     measured = chunk.distances["gradient"][:50]
-    assert np.corrcoef(linear, measured)[0, 1] > 0.999
+    assert np.corrcoef(linear, measured)[0, 1] > 0.999  # margin: a correlation, which is 1 at most
     noise = render.variance(image, task1.noise)
     assert clean.propagated["gradient"][0] == pytest.approx(float((noise * response**2).sum()), rel=1e-9)
     known = measure.propagate(image, task1, sensor, case.setting.light).variance_px2
     assert known == pytest.approx(clean.propagated["gradient"][0], rel=1e-12)
+    # margin: 5 % is what other weights change
     assert abs(clean.propagated["canny@12"][0] / known - 1) > 0.02  # negative control: other weights on the same pixels
 
 

@@ -29,16 +29,18 @@ def test_json(monkeypatch, capsys):
     varied = json.loads(out)["varied"]
     assert code == 0
     assert (varied["vary"], varied["hold"]) == (["analyser", "polarisation"], "white")
+    # margin: same poses are among all, by their kind; half as much again is what is said
     assert varied["gain"] >= varied["gain_same_poses"] > 1.5
     assert varied["fixed"]["analyser_deg"] is None
-    assert 0 <= varied["best"]["analyser_deg"] < 180
+    assert 0 <= varied["best"]["analyser_deg"] < 180  # margin: an angle of half a turn
     assert varied["best"]["exposure_time"] == 4  # two ideal polarisers
     check = varied["check"]
     assert check["verdict"].startswith("agree")
     assert check["gain_interval"][0] < check["predicted_gain"] < check["gain_interval"][1]
-    assert check["gain_interval"][0] > 1
+    assert check["gain_interval"][0] > 1  # margin: the order is said: a gain that pictures bear out
     for row in (check["fixed"], check["best"]):
         assert row["n"] == 1000
+        # margin: chance: an interval of 1000 seeded pictures
         assert row["interval"][0] < row["predicted"] < row["interval"][1]
 
 
@@ -49,7 +51,7 @@ def test_a_wrong_prediction_is_contradicted(monkeypatch, capsys):
     assert found.varied.best.choice.lamp == "red LED"
     true = vary_check.check_varied(found, quality=QUICK)
     assert true.agrees
-    assert true.interval[0] > 1.1
+    assert true.interval[0] > 1.1  # margin: the order is said: a gain that pictures bear out
     halved = dataclasses.replace(true.best, predicted=true.best.predicted / 2)
     assert not vary_check.judged(true.fixed, halved).agrees
     held = ("--sensor", "50,278", "--light", "51,88")

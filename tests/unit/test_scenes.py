@@ -102,7 +102,7 @@ def test_block_is_closed_and_its_normals_point_outwards():
     assert len(solid.edges) == 12
     assert all(len(edge.faces) == 2 for edge in solid.edges)
     assert np.allclose(solid.normals.sum(0), 0)
-    assert (solid.normals @ solid.vertices.mean(0) < solid.offsets).all()
+    assert (solid.normals @ solid.vertices.mean(0) < solid.offsets).all()  # margin: inside is inside
     assert solid.height_above(np.array([1.0, 1.0, 1.0])) == 0
     assert solid.height_above(np.array([1.0, 1.0, 4.0])) == 3
     volume = sum(

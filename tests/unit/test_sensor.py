@@ -84,6 +84,7 @@ def test_mean_and_variance_at_the_end_of_the_scale():
     pictures = render.expose(np.repeat(image, 200, 0), noise, np.random.default_rng(3), 1000).reshape(-1, 6)
     sigma = np.sqrt(noise.variance)
     mean = recorded(noise, image).level[0]
+    # margin: 5 standard errors of 200,000, and a hundredth of a level
     assert mean == pytest.approx(pictures.mean(0), abs=5 * sigma / np.sqrt(len(pictures)) + 0.01)
     assert render.variance(image, noise)[0] == pytest.approx(pictures.var(0), rel=0.05, abs=1e-3)
     assert mean[0] == 128.0
@@ -104,6 +105,7 @@ def test_squared_errors_are_those_of_drawn_pictures(noise):
     assert np.all(np.abs(squares.mean(0) - mean) < 5 * error)
     fourth = np.sqrt(np.var((squares - squares.mean(0)) ** 2, axis=0) / len(squares))
     assert np.all(np.abs(squares.var(0) - variance) < 5 * fourth)
+    # margin: 20 times is said; fourth powers tell of 2 where noise is normal
     assert np.abs(squares.var(0) - 2)[-1] > 20 * fourth[-1]
     far = np.array([full_scale(noise) / 2])
     assert np.concatenate(squared_errors(noise, far, recorded(noise, far))).tolist() == [1.0, 2.0]

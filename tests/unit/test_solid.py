@@ -126,7 +126,7 @@ def test_a_file_that_changed_is_another_solid(tmp_path):
     assert after != before
     assert pickle.loads(pickle.dumps(after)) == after
     sizes = [np.ptp(layout_of(scenes.Picture.of(scene, (60, 300))).ends) for scene in (before, after)]
-    assert sizes[1] > sizes[0]
+    assert sizes[1] > sizes[0]  # margin: the order is said
 
 
 def blocked(point, position, solid, own):

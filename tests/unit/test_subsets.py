@@ -40,7 +40,7 @@ def test_gap_to_all_sets(over):
         assert found[0] == best[0] == 0
         gaps.append(found[1] / best[1] - 1)
     assert min(gaps) > -1e-9
-    assert np.mean(np.array(gaps) < 1e-9) >= 0.9
+    assert np.mean(np.array(gaps) < 1e-9) >= 0.9  # margin: a share, which is 1 at most
     assert max(gaps) < 0.1
 
 
@@ -71,10 +71,11 @@ def test_nothing_stays_below_the_bound(over):
         told = np.random.default_rng(seed).uniform(0.1, 1, (12, 4)) ** 3
         table = Information(told, np.zeros_like(told), over)
         bound, best = least_value(table, 3), score(table, every_set(table, 3))[1]
-        assert bound <= best * (1 + 1e-9)
+        assert bound <= best * (1 + 1e-9)  # margin: a bound, by its kind
         close.append(best / bound)
         if seed < 2:  # of many pictures the parts are nearly free
-            assert score(table, greedy(table, 40)[-1])[1] * 40 == pytest.approx(bound * 3, rel=0.03)
+            assert score(table, greedy(table, 40)[-1])[1] * 40 == pytest.approx(bound * 3, rel=0.1)
+    # margin: 2 % so that it is no rounding
     assert max(close) > 1.02  # so that a bound that is the best set itself would be noticed
 
 

@@ -138,7 +138,7 @@ def test_rendered_faces_have_their_own_intensity(gloss):
         offsets = np.array([[i, j] for i in (-1, 1) for j in (-1, 1)])
         level = image[y + offsets[:, 1], x + offsets[:, 0]].mean()
         expected = float(face_signal(pictures, middle[None], index, 1)[0])
-        assert level == pytest.approx(expected, rel=5e-3)  # the middle's pixel is up to half a px away
+        assert level == pytest.approx(expected, rel=8e-3)  # the middle's pixel is up to half a px away
         seen.append(expected)
     assert max(seen) > 2 * min(seen)
 

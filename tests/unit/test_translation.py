@@ -108,7 +108,7 @@ def test_rendered_image_and_measurement_are_the_same(name):
     assert again.value_px == pytest.approx(float(found.value_px), abs=0.003)
     aside = np.abs(here - render.image(turned(scene, sensor, 0.3), sensor, light, quality, effects=effects)) / contrast
     assert aside.mean() > 1.1e-4
-    assert aside.max() > 0.04
+    assert aside.max() > 0.04  # margin: four times what is right may be off
 
 
 def turned(scene, sensor, pixels):

@@ -56,6 +56,7 @@ def test_end_gauge():
         "expansion difference": 2.9, "temperature difference": 16.6,
     }  # fmt: skip
     assert (round(found.u), math.floor(found.dof), round(found.k, 2)) == (32, 16, 2.92)
+    # margin: half the last digit that is printed
     assert round(found.k, 2) * round(found.u) == pytest.approx(93, abs=0.5)
     assert found.U / found.u == found.k
     assert found.interval == pytest.approx((838 - 92.5, 838 + 92.5), abs=0.1)
@@ -66,6 +67,7 @@ def test_end_gauge_pooled_difference():
     parts = (Input("mean", 0, 5.8, dof=24), Input("random", 0, 3.9, dof=5), Input("comparator", 0, 6.7, dof=8))
     found = budget("difference", "nm", 215.0, parts, dict.fromkeys(("mean", "random", "comparator"), 1.0))
     assert round(found.u, 1) == 9.7
+    # margin: half the last digit that is printed
     assert found.dof * (9.7 / found.u) ** 4 == pytest.approx(25.6, abs=0.05)  # the document rounds u first
 
 
@@ -74,18 +76,19 @@ def test_end_gauge_by_monte_carlo():
     inputs = (*LENGTHS, *TEMPERATURES)
     drawn = monte_carlo(end_gauge_model, inputs, 1, p=0.99, most=400_000, margin=5)
     assert drawn.y == pytest.approx(838, abs=0.5)
-    assert drawn.u == pytest.approx(36, abs=0.5)
+    assert drawn.u == pytest.approx(36, abs=0.5)  # margin: half the last digit that is printed
+    # margin: chance of the draws, and the last digit that is printed
     assert drawn.shortest == pytest.approx((745, 932), abs=2.5)
     gum = end_gauge(inputs)
     assert gum.interval == pytest.approx((745, 931), abs=1.5)
-    assert gum.u == pytest.approx(32, abs=0.5)
+    assert gum.u == pytest.approx(32, abs=0.5)  # margin: half the last digit that is printed
 
 
 def test_end_gauge_second_order():
     """GUM H.1.7: with the products of small quantities u_c is 34 nm, not 32: normal draws of the same u show it."""
     inputs = [Input(each.name, each.value, each.u) for each in (*LENGTHS, *TEMPERATURES)]
     drawn = monte_carlo(end_gauge_model, inputs, 2, p=0.99)
-    assert end_gauge(inputs).u == pytest.approx(32, abs=0.5)
+    assert end_gauge(inputs).u == pytest.approx(32, abs=0.5)  # margin: half the last digit that is printed
     assert drawn.u == pytest.approx(34, abs=0.5)
 
 
@@ -110,9 +113,10 @@ def test_additive_model(inputs, u, gum_end, end, verdict):
     """JCGM 101 9.2, tables 2 to 4, at two digits: the two intervals agree until one rectangle is most of it."""
     gum = budget("Y", "", 0.0, inputs, {each.name: 1.0 for each in inputs})
     drawn = monte_carlo(total, inputs, 3, margin=10 if u > 5 else 3)
-    assert gum.u == pytest.approx(u, abs=0.05)
+    assert gum.u == pytest.approx(u, abs=0.05)  # margin: half the last digit that is printed
     assert drawn.u == pytest.approx(gum.u, rel=0.005)
     assert gum.interval == pytest.approx((-gum_end, gum_end), abs=0.05 if u > 5 else 0.005)
+    # margin: chance of the draws, and the last digit that is printed
     assert drawn.symmetric == pytest.approx((-end, end), abs=0.06 if u > 5 else 0.02)
     found = validate(gum, drawn)
     assert found.verdict == verdict
@@ -138,12 +142,15 @@ def test_mass_calibration():
 
     slopes = {"reference": 1.0, "balancing": 1.0, "air": 0.0, "weight": 0.0, "standard": 0.0}
     gum, drawn = budget("mass", "mg", 1.234, inputs, slopes), monte_carlo(model, inputs, 4, margin=2)
+    # margin: half the last digit that is printed
     assert (gum.u, *gum.interval) == pytest.approx((0.0539, 1.1285, 1.3395), abs=6e-5)
-    assert drawn.y == pytest.approx(1.2341, abs=3e-4)
-    assert drawn.u == pytest.approx(0.0754, abs=2e-4)
+    assert drawn.y == pytest.approx(1.2341, abs=3e-4)  # margin: chance of the draws, and the last digit that is printed
+    assert drawn.u == pytest.approx(0.0754, abs=2e-4)  # margin: chance of the draws, and the last digit that is printed
+    # margin: chance of the draws, and the last digit that is printed
     assert drawn.shortest == pytest.approx((1.0834, 1.3825), abs=0.004)
     found = validate(gum, drawn, digits=1, interval="shortest")
     assert (found.verdict, found.delta) == ("differ", 0.005)
+    # margin: chance of the draws, and the last digit that is printed
     assert (found.d_low, found.d_high) == pytest.approx((0.0451, 0.0430), abs=0.004)
     assert found.reason.startswith("nonlinear: the draws' standard deviation is 0.07")
     assert found.reason.endswith("first order gives 0.054")
@@ -165,9 +172,12 @@ def test_comparison_loss(x1, r):
     drawn = monte_carlo(lambda x: x["X1"] ** 2 + x["X2"] ** 2, [group], 5, most=200_000, margin=3)
     first, wanted = LOSS[x1][0], LOSS[x1][1 if r == 0 else 2]
     assert (1e6 * gum.value, 1e6 * gum.u) == pytest.approx(first, abs=1e-6)
+    # margin: chance of the draws, and the last digit that is printed
     assert (1e6 * drawn.y, 1e6 * drawn.u) == pytest.approx(wanted[:2], abs=max(0.01 * wanted[1], 1.0))
     low, high = 1e6 * np.array(drawn.shortest)
+    # margin: chance of the draws, and the last digit that is printed
     assert high - low == pytest.approx(wanted[3] - wanted[2], rel=0.015)
+    # margin: an interval of least length lies loosely where the density is flat
     assert (low, high) == pytest.approx(wanted[2:], abs=max(0.08 * wanted[1], 3.0))  # where it lies is loosely known
     found = validate(gum, drawn, interval="shortest")
     assert found.verdict == "differ"
@@ -218,15 +228,18 @@ def test_correlated_measurands():
         "Z": (Z, {"V": Z / V, "I": -Z / I, "phi": 0.0}),
     }
     found = [budget(name, "ohm", value, [group], c) for name, (value, c) in slopes.items()]
+    # margin: half the last digit that is printed
     assert [each.value for each in found] == pytest.approx([127.732, 219.847, 254.260], abs=5e-4)
+    # margin: half the last digit that is printed
     assert [each.u for each in found] == pytest.approx([0.071, 0.295, 0.236], abs=6e-4)
     assert {each.dof for each in found} == {4.0}
     alone = budget("R", "ohm", R, group.inputs, slopes["R"][1])
-    assert alone.u > 1.5 * found[0].u
+    assert alone.u > 1.5 * found[0].u  # margin: half as much again, so that it is no rounding
     import uncertainties
 
     numbers = as_ufloats(found)
     correlation = uncertainties.correlation_matrix([numbers["R"], numbers["X"], numbers["Z"]])
+    # margin: the last digits that are printed
     assert correlation[np.triu_indices(3, 1)] == pytest.approx([-0.588, -0.485, 0.993], abs=2e-3)
 
 
@@ -240,6 +253,8 @@ def test_fluorescence():
     value = 0.1820 / 0.1823 * 0.6978
     slopes = {"X1": value / 0.1820, "X2": -value / 0.1823, "Y": value / 0.6978}
     found = budget("yield", "", value, inputs, slopes)
+    # margin: half the last digit that is printed
     assert (found.value, found.u) == pytest.approx((0.6967, 0.00494), abs=6e-5)
-    assert found.dof == pytest.approx(27.7, abs=0.5)
+    assert found.dof == pytest.approx(27.7, abs=0.5)  # margin: from numbers that were printed rounded
+    # margin: from numbers that were printed rounded
     assert found.interval == pytest.approx((0.6967 - 0.0101, 0.6967 + 0.0101), abs=2e-4)

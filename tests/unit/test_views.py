@@ -20,9 +20,10 @@ def test_two_pictures_beat_one_repeated(around):
     one, two, three = around.sets
     assert one.lost == ()
     assert one.over_one == one.over_repeats == 1
+    # margin: the order is said
     assert two.over_repeats > 1.3  # two different ones are better than one twice, which would be 1
     assert two.over_one == pytest.approx(2 * two.over_repeats)
-    assert one.minimised > two.minimised > three.minimised
+    assert one.minimised > two.minimised > three.minimised  # margin: a minimum over more, by its kind
     assert len({view.sensor for view in two.views}) == 2
 
 
@@ -30,7 +31,7 @@ def test_gap_to_all_sets_of_what_was_looked_at(around):
     for each in around.sets:
         assert each.gap is not None
         assert 0 <= each.gap + 1e-9 < 0.05
-        assert each.bound <= each.minimised
+        assert each.bound <= each.minimised  # margin: a bound, by its kind
 
 
 def test_what_is_minimised_is_of_the_combination(around):
@@ -64,6 +65,7 @@ def test_one_sensor_for_all(tmp_path):
         found = planner.plan_views(scene, 2, step_deg=30, share=share)
         for each in found.sets:
             assert len({getattr(view, share) for view in each.views}) == 1
+        # margin: half is what a repeat gives, more by its kind
         assert found.sets[1].minimised <= found.sets[0].minimised / 2 * (1 + 1e-9)
 
 
@@ -72,7 +74,7 @@ def test_one_quantity_is_best_measured_by_repeats(task1):
     assert found.sets[1].over_repeats == pytest.approx(1)
     assert found.most_over_repeats == pytest.approx(1)
     rough = planner.plan_views(task1, 1, step_deg=20, refined=False)
-    assert found.sets[0].minimised < rough.sets[0].minimised
+    assert found.sets[0].minimised < rough.sets[0].minimised  # margin: the order is said
 
 
 def test_held_sensor(task1):

@@ -48,6 +48,7 @@ def test_rays_and_spans(bracket, name):
     free = seen(solid, edge, positions, fractions)
     for at, whole, here in zip(positions, together, free, strict=True):
         blocked = stopped(solid, edge, at, fractions)
+        # margin: a share, which is 1 at most
         assert (here == ~blocked).mean() > 0.96  # but for the points beside a limit
         assert longest_span(solid, edge, at) == pytest.approx(whole, abs=1e-12)
         spans = hidden_spans(solid, edge, at)
@@ -80,8 +81,9 @@ def test_what_is_hidden_is_not_used(bracket):
     pictures = Pictures.of(bracket, np.array([55.0, 178.0]), np.array([35.0, 170.0]))
     view = projected_edges(pictures, ("e14",))
     trims = used_trims(pictures, view, trimmed=False)
+    # margin: what is trimmed is part of what is seen, by its kind
     assert trims[0, 0] >= view.shown[0, 0] * view.lengths[0] - 1e-9
-    assert trims[0, 0] > 0.8 * view.lengths[0]
+    assert trims[0, 0] > 0.8 * view.lengths[0]  # margin: the order is said
     task1 = scenes.load("task1")
     block = Pictures.of(task1, np.array([30.0, 135.0]), np.array([15.0, 315.0]))
     assert (used_trims(block, projected_edges(block), trimmed=False) == 0).all()

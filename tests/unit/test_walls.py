@@ -56,7 +56,7 @@ def test_a_shaft_of_facets_is_the_turned_one(tmp_path):
     part = {"kind": "mesh", "file": "shaft.stl"}
     scene = from_document(tmp_path / "a.toml", document(part, ("k1", "k2", "k3")))
     for own, other in zip(scene.solid.curved, whole.solid.curved, strict=True):
-        assert own.radius == pytest.approx(other.radius, abs=2e-7)
+        assert own.radius == pytest.approx(other.radius, abs=3e-7)
         assert own.centre == pytest.approx(other.centre, abs=2e-6)
         assert np.abs(own.surface.axis @ other.surface.axis) == pytest.approx(1, abs=1e-12)
         assert len(own.faces) == 96
@@ -172,7 +172,7 @@ def test_refinement_begins_where_the_search_ended(task1):
 
     begun = shifted(start[0], np.zeros(2))
     told = [refine(task1, *start, "calibrated", "object", 5.0, value=value, known=known) for known in (5.0, 0.5)]
-    assert 1 <= told[0][2] < 1.1
+    assert 1 <= told[0][2] < 1.1  # margin: a ratio of a minimum to where it began
     assert told[0][0] == pytest.approx([40, 52], abs=0.3)
     assert told[1][2] == 0.5
     assert told[1][0] == pytest.approx(start[0])
