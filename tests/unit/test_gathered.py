@@ -27,8 +27,9 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     )
     first = object()
     monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))
-    told = measurands._gathered(found, SimpleNamespace(scene=task1), lead)
-    assert told.first == (first, found, lead)
+    picture = SimpleNamespace(scene=task1)
+    told = measurands._gathered(found, picture, lead)
+    assert told.first == (first, found, picture, lead)
     assert told.units == ("cm",) * 3
     own = quantity.nominal if quantity.nominal is not None else 1.0
     assert told.nominal.tolist() == [own, 7.5, quantity.nominal if quantity.nominal is not None else 3.0]
