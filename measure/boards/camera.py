@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.special import chdtrc
 
 from measure.boards.adjustment import Adjusted, adjust, begin
@@ -161,11 +162,22 @@ def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: fl
     vague = not np.isfinite(covariance).all() or np.sqrt(covariance[0, 0]) > _VAGUE * values[0]
     state = status.ILL_CONDITIONED if vague else status.MISFIT if dispersion != 1.0 else status.OK
     all_residuals = np.concatenate(found.residuals)
-    matrix, coefficients = free.camera(values)
     return CameraCalibration(
         names=free.names, values=values, covariance=covariance,
-        lens=Lens(fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2], distortion=tuple(coefficients)),
+        lens=_lens(*free.camera(values)),
         image_shape=(int(image_shape[0]), int(image_shape[1])), poses=poses, pose_covariance=np.array(blocks),
         residuals=found.residuals, rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
         chi_square=found.chi_square, freedom=freedom, p_value=p_value, dispersion=float(dispersion), status=state,
     )  # fmt: skip
+
+
+def _lens(matrix: np.ndarray, coefficients: np.ndarray) -> Lens:
+    """The lens of a camera matrix (3, 3) and five coefficients, which boards alike may leave anywhere."""
+    try:
+        return Lens(fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2], distortion=tuple(coefficients))
+    except ValidationError:
+        said = ", ".join(f"{value:.3g}" for value in coefficients)
+        raise InvalidInput(
+            f"boards must be seen from directions that determine the lens, got distortion {said}: turn them more, "
+            "bring them near the picture's corners, or free less of it"
+        ) from None

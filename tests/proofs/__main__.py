@@ -9,6 +9,7 @@ from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
 from tests.proofs.crowded import crowded
 from tests.proofs.fits import fits
+from tests.proofs.installed import installed
 from tests.proofs.kill import kill
 from tests.proofs.large import large
 from tests.proofs.lights import lights
@@ -27,6 +28,7 @@ app.command()(boards)
 app.command()(conditions)
 app.command()(crowded)
 app.command()(fits)
+app.command()(installed)
 app.command()(kill)
 app.command()(large)
 app.command()(lights)

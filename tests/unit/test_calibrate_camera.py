@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 import measure
+from measure.boards import camera
 from scenes import InvalidInput
 from tests.boards import SMALL, poses, told
 
@@ -120,3 +121,11 @@ def test_what_is_no_calibration_is_refused(seen, change, match):
     given = {"boards": boards(seen, np.random.default_rng(1)), "square_size": 25.0, "image_shape": SHAPE} | change
     with pytest.raises(InvalidInput, match=match):
         measure.calibrate_camera(**given)
+
+
+def test_boards_that_leave_the_lens_anywhere_are_refused_in_one_line():
+    """Three alike, in the middle of the picture, gave a distortion of 1e10 and an internal error."""
+    with pytest.raises(
+        InvalidInput, match=r"boards must be .* the lens, got distortion 0, 1.25e\+06, 0, 0, -1.58e\+10"
+    ):
+        camera._lens(np.diag([900.0, 900.0, 1.0]), np.array([0, 1.247e6, 0, 0, -1.577e10]))
