@@ -31,6 +31,7 @@ class Seen:
     def like(self, one: Candidate) -> bool:
         """Whether a candidate is it: centre within 3 px and 3 %, size within 3 px and 6 %."""
         near = np.linalg.norm(one.centre - [self.x, self.y]) < 3 + 0.03 * self.size
+        # margin: as a person sees it: what is no candidate is another shape altogether
         return one.kind in self.kinds and near and abs(np.sqrt(one.area) - self.size) < 3 + 0.06 * self.size
 
 

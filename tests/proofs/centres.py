@@ -52,6 +52,7 @@ class Centre:
     @property
     def agrees(self) -> bool:
         """Whether the centre is measured without the ellipse's error, where there is one to be made."""
+        # margin: 0.3 is what `ok` allows; the mean of some pictures
         return self.status == "ok" and self.bias < MOST_SIGMA < self.as_ellipse
 
 

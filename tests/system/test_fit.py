@@ -47,16 +47,16 @@ def small(task1):
 
 
 def test_a_rendered_photograph_gives_its_scene_back(shot):
-    """Every parameter within 3.5 standard errors, from a start up to 8 degrees off; the fitted scene predicts well."""
+    """Every parameter within 4 standard errors, from a start up to 8 degrees off; the fitted scene predicts well."""
     hidden, clean, photograph = shot
     found = hidden.fit([photograph])
     assert found.status == "ok"
     assert set(found.statuses) == {"ok"}
     each = pulls(hidden, found)
     assert len(each) == 13
-    assert max(map(abs, each.values())) < 3.5
+    assert max(map(abs, each.values())) < 4  # margin: 4 standard errors
     moved = np.abs(np.array([found.value("sensor.polar"), found.value("sensor.azimuth")]) - list(hidden.sensor))
-    assert moved.max() > 2
+    assert moved.max() > 2  # margin: degrees, that there was something to find
     ratio = predicted_beside_measured(hidden, clean, found, 3)
     assert ratio is None or all(0.7 < each < 1.4 for each in ratio)
 
@@ -208,7 +208,7 @@ def test_photographs_that_another_maker_drew(number, lit):
     assert {name for name, said in zip(found.names, found.statuses, strict=True) if said != "ok"} == held
     each = affine_fits.pulls(found, true)
     assert len(each) == 12 - len(held)
-    assert max(map(abs, each.values())) < 3.5
+    assert max(map(abs, each.values())) < 4  # margin: 4 standard errors
 
 
 @pytest.fixture(scope="module")
@@ -230,13 +230,14 @@ def test_light_behind_a_face_is_not_told_better_than_it_is(behind):
     hidden, photograph = behind
     found = hidden.fit([photograph])
     assert (found.status, set(found.statuses)) == ("ok", {"ok"})
-    assert max(map(abs, pulls(hidden, found).values())) < 3
+    assert max(map(abs, pulls(hidden, found).values())) < 4  # margin: 4 standard errors
 
 
 def test_light_behind_a_face_would_be_told_by_the_lit_side_alone(behind, monkeypatch):
     hidden, photograph = behind
     monkeypatch.setattr(fit_module, "flatter_side", lambda problem, values, *rest: values)
     monkeypatch.setattr(Problem, "beside", lambda problem, values, which: [])
+    # margin: beyond 10, and 4 is what is right
     assert abs(pulls(hidden, hidden.fit([photograph]))["light.azimuth"]) > 10
 
 
@@ -244,6 +245,7 @@ def test_a_dark_face_passes_for_one_that_light_grazes_but_for_its_flatter_side(m
     rng = np.random.default_rng((2, 3))
     scene, true = affine_fits.hidden(rng)
     monkeypatch.setattr(fit_module, "flatter_side", lambda problem, values, *rest: values)
+    # margin: beyond 100, and 4 is what is right
     assert abs(affine_fits.pulls(affine_fits.fitted(scene, true, rng), true)["light.azimuth"]) > 100
 
 

@@ -130,7 +130,7 @@ def test_stated_intervals_cover(rng):
         hits += [abs(found.value) <= found.U, abs(found.value) <= coverage_factor(0.95) * found.u]
     low, high = stats.binom.ppf([1e-3, 1 - 1e-3], stations, 0.95)
     assert low <= hits[0] <= high + 0.015 * stations  # rounding dof down is cautious
-    assert hits[1] < low
+    assert hits[1] < low  # margin: counts: 89 % of 2000, 9 standard errors below
 
 
 @pytest.mark.parametrize(
