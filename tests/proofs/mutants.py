@@ -3,10 +3,9 @@
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
 examples of its own module and the tests that read the code, then the unit tests that call the changed function and
-others of the module, the quickest first (``tests.proofs.reach``), then the other test files that speak most of the
-names that the module defines. Killed is what makes one of them fail that passes on clean code: up to the one that
-killed they are run there, too, and what fails there is no kill. What survives is printed with its line: a test is
-missing, or the mutant is equivalent.
+others of the module, the quickest first (``tests.proofs.reach``), then what the commands print, then the other test
+files that speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean
+code, where it is run, too. What survives is printed with its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -38,6 +37,7 @@ from tests.proofs.slips import SLIPS, places, slipped
 ROOT = Path(__file__).parents[2]
 SOURCES = ("scenes", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
+DOCUMENTS = "tests/regression/test_documents.py"  # what all commands print
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
@@ -56,7 +56,7 @@ OPERATORS = tuple(
 )
 _FILES = 3  # test files that a mutant meets after the unit tests
 _UNIT_S = 20  # processor seconds of the unit tests
-_LIMIT_S = 30  # of all together
+_LIMIT_S = 60  # of all together
 _FIRST_S = 15  # of all together where only the unit tests are asked
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
@@ -176,7 +176,7 @@ def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_firs
     before = path.read_text(encoding="utf-8")
     after, line = changed(mutant, root)
     asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
-    asked += [] if is_first else nearest(mutant.file, root)
+    asked += [] if is_first else [DOCUMENTS, *nearest(mutant.file, root)]
     limit = _FIRST_S if is_first else _LIMIT_S
     path.write_text(after, encoding="utf-8")
     try:
@@ -187,8 +187,7 @@ def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_firs
         return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
     if code in (0, 5):
         return "survived", ""
-    last = next((n for n, test in enumerate(asked, 1) if by.startswith(test)), 0 if by else len(asked))
-    clean, wrong = _tested([mutant.file, *asked[:last]], root, 2 * limit)
+    clean, wrong = _tested([by] if by else [mutant.file, *asked], root, limit)
     return ("killed", by) if clean in (0, 5) else ("no baseline", wrong)
 
 
