@@ -20,7 +20,7 @@ def test_measured_variance_is_that_of_noise_and_poses_together(task1, tmp_path):
     found = run(scene, RENDERS, out=tmp_path, workers=1, quality=Quality(2, 1, 16))
     measured, predicted = found.rows[0].main.empirical, found.rows[0].main.propagated
     low, high = stats.chi2.ppf([5e-4, 1 - 5e-4], RENDERS - 1) / (RENDERS - 1)
-    assert low < measured / predicted < high
+    assert low < measured / predicted < high  # margin: chance: a chi-square interval of 99.9 %
     spread = float(planner.pose_spread(scene, np.array([list(task1.settings[0].sensor)])).variance[0])
     assert not measured / (predicted - spread) < high  # negative control: the noise alone
 

@@ -42,6 +42,7 @@ LIGHTS = [
 def test_a_light_is_as_large_as_its_nodes_reach(light):
     """Gauss nodes go nearly to the rim, and not beyond: half of the largest extent."""
     far = np.linalg.norm(nodes(light, 10.0, 24).places, axis=1).max()
+    # margin: a bound that holds by its kind: Gauss nodes lie within
     assert 0.96 * light.half_size < far <= light.half_size * (1 + 1e-12)
 
 
@@ -67,6 +68,7 @@ def test_a_turned_part_has_the_volume_of_its_frusta(axis):
               for a, b in itertools.pairwise(profile)]  # fmt: skip
     corners = solid.triangles
     volume = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    # margin: of 48 corners to a circle: (2 pi / 48)^2 / 6 = 0.0029
     assert volume == pytest.approx(sum(frusta), rel=0.01)
     k = "xyz".index(axis)
     assert solid.vertices[:, k].min() == pytest.approx(1.0)
@@ -229,7 +231,7 @@ def test_the_renderer_s_ring_is_the_planner_s():
     far = np.linalg.norm(triangles[..., :2], axis=-1)
     slope = np.polyfit(far.ravel(), triangles[..., 2].ravel(), 1)[0]
     there = np.polyfit(np.linalg.norm(made.places[:, :2], axis=1), made.places[:, 2], 1)[0]
-    assert slope == pytest.approx(math.tan(math.radians(35.0)), rel=1e-3)
+    assert slope == pytest.approx(math.tan(math.radians(35.0)), rel=2e-3)  # 10 degrees would be 0.7
     assert there == pytest.approx(math.tan(math.radians(35.0)), rel=1e-6)
     assert made.normals[:, 2] == pytest.approx(math.cos(math.radians(35.0)))
 
@@ -250,7 +252,7 @@ def test_a_search_by_bounds_finds_what_is_best_where_levels_are_cut_off(task1, e
         bound = table.rows(rows, matrix)
         value = exact[np.ix_(table.sensors[rows], columns)]
         there = np.isfinite(value)
-        assert (bound[there] <= value[there] * (1 + 1e-6)).all()
+        assert (bound[there] <= value[there] * (1 + 1e-6)).all()  # margin: a bound that holds by its kind
         below += int((bound[there] > 0.5 * value[there]).sum())
     assert below > 20
 

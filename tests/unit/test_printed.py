@@ -617,6 +617,7 @@ def test_a_camera_s_tables_files_and_json_are_its_numbers(calibrated, tmp_path):
     assert headings == ["", "value", "+- (1 sigma)", "unit"]
     for row, name, value, s in zip(rows, found.names, found.values, sd, strict=True):
         assert row[0] == name
+        # margin: two digits of sigma are printed: half of the last is 0.05 of it
         assert float(row[1]) == pytest.approx(value, abs=0.06 * s)
         assert row[2:] == [f"{s:.2g}", "px" if name in ("fx", "fy", "cx", "cy") else ""]
     headings, rows = cells(camera_table.boards(found, seen, "mm"))
