@@ -12,15 +12,15 @@ from validation import picture_file
 pytestmark = pytest.mark.render
 
 
-def test_400_tries(tmp_path, capfd):
+def test_240_tries(tmp_path, capfd):
     """No finding; every door refuses something, and most of them let something in."""
     before = fuzzing.peak_memory()
-    found = fuzzing.run(400, seed=20261121, folder=tmp_path)
+    found = fuzzing.run(240, seed=20261121, folder=tmp_path)
     capfd.readouterr()  # what the image libraries say of corrupted files
     assert not found.failures
-    assert sum(found.outcomes.values()) == 400
+    assert sum(found.outcomes.values()) == 240
     for door in {door.__name__ for door in DOORS}:
-        assert found.outcomes[f"{door}: refused"] > 5
+        assert found.outcomes[f"{door}: refused"] > 2
     answers = {door.split(":")[0] for door in found.outcomes if not door.endswith("refused")}
     assert answers >= {"mesh", "image", "campaign", "comparison", "directory", "command", "array"}
     assert fuzzing.peak_memory() < max(fuzzing.MOST_MEMORY, before + 1)

@@ -24,7 +24,7 @@ def ice(*arguments):
 
 def compare_with_reference(campaign, directory):
     """What ``ice compare`` says of a new run."""
-    made = ice("validate", campaign, "--renders", 500, "--seed", 1, "--workers", 1, "--out", directory)
+    made = ice("validate", campaign, "--renders", 250, "--seed", 1, "--workers", 1, "--out", directory)
     assert made.returncode in (0, 1), made.stderr
     return ice("compare", REFERENCE, directory)
 
