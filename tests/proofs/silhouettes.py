@@ -38,7 +38,7 @@ class Silhouette:
     @property
     def agrees(self) -> bool:
         """Whether every place is within `LIMIT_PX`."""
-        return self.largest < LIMIT_PX  # margin: rays of a grid, 1/1024 px apart: the limit is one of its steps
+        return self.largest < LIMIT_PX  # margin: rays 1/1024 px apart: half a step, and one is allowed
 
 
 def cone_of(scene: Scene) -> Scene:
