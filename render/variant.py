@@ -69,11 +69,9 @@ def use(name: str):
     Raises
     ------
     InvalidInput
-        If this build of Mitsuba lacks the variant, or it cannot be activated here.
+        If Mitsuba cannot be loaded, its build lacks the variant, or it cannot be activated here.
     """
-    with _silent():
-        import mitsuba
-
+    mitsuba = _loaded()
     if name not in mitsuba.variants():
         raise InvalidInput(f"{OVERRIDE} must be one of {', '.join(mitsuba.variants())}, got {name!r}")
     if mitsuba.variant() == name:
@@ -86,6 +84,17 @@ def use(name: str):
             f"{OVERRIDE} must be a variant that works here, got {name!r} ({str(error).splitlines()[0]})"
         ) from None
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
+    return mitsuba
+
+
+def _loaded():
+    """The module; where a library of the system is missing, libatomic on some, Dr.Jit ends in a NameError."""
+    try:
+        with _silent():
+            import mitsuba
+    except (ImportError, NameError) as error:
+        cause = error.__cause__ or error.__context__ or error
+        raise InvalidInput(f"mitsuba must be loadable, got {str(cause).splitlines()[0]} (see README)") from None
     return mitsuba
 
 

@@ -1,5 +1,6 @@
 """The choice of the renderer's variant, with libraries that are missing or broken."""
 
+import builtins
 import os
 import subprocess
 import sys
@@ -71,3 +72,20 @@ def test_planner_and_measure_load_without_the_renderer():
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
     code = "import sys, planner; sys.exit('cv2' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_a_missing_library_of_the_system_is_named_in_one_line(monkeypatch):
+    """As Dr.Jit does it: a NameError about itself while an ImportError is handled."""
+
+    def load(name, *rest):
+        if name == "mitsuba":
+            try:
+                raise ImportError("libatomic.so.1: cannot open shared object file")
+            except ImportError:
+                raise NameError("name '_drjit_ext' is not defined")  # noqa: B904
+        return real(name, *rest)
+
+    real = builtins.__import__
+    monkeypatch.setattr(builtins, "__import__", load)
+    with pytest.raises(InvalidInput, match=r"mitsuba must be loadable, got libatomic\.so\.1: cannot open"):
+        variant.use("scalar_rgb")
