@@ -77,8 +77,7 @@ def test_canny_weighs_its_pixels_by_the_length_they_stand_for(rng):
         equal.append(np.transpose([fit_lines(found).tilt for found in points]))
     linear, ours, equal = (np.concatenate(part).var(0) for part in (linear, ours, equal))
     assert abs((ours / linear).mean() - 1) < 0.01  # margin: 5 standard errors
-    # margin: an inequality: one weight for all costs 1.5 %, a third of it would do
-    assert (equal / linear).mean() - (ours / linear).mean() > 0.005  # of the same noise
+    assert (equal / linear).mean() - (ours / linear).mean() > 0.005  # margin: the order is said, of the same noise
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
