@@ -28,7 +28,7 @@ def ice(*arguments: object, cwd: Path | None = None) -> Done:
     with (
         contextlib.chdir(cwd or Path.cwd()),
         mock.patch.object(sys, "argv", ["ice", *map(str, arguments)]),
-        mock.patch.object(entry.signal, "signal"),
+        mock.patch.object(entry, "signal"),  # the tests' own handlers stay
         mock.patch.dict(os.environ, COLUMNS="160"),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
