@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 
-def check(*names: str) -> None:
-    """See that each name is that of the package beside this file.
+def check(beside: str, *names: str) -> None:
+    """See that each name is that of the package beside the one whose file asks.
 
     Raises
     ------
@@ -16,7 +16,7 @@ def check(*names: str) -> None:
         If it is another file's, named in one line with the package's own.
     """
     for name in names:
-        package, found = Path(__file__).with_name(name) / "__init__.py", _file(name)
+        package, found = Path(beside).parents[1] / name / "__init__.py", _file(name)
         if found is not None and Path(found).resolve() != package.resolve():
             raise ImportError(
                 f"{name} must be {package}, got {found}, which stands before it on Python's path: rename it"

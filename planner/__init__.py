@@ -2,7 +2,7 @@
 
 import ice_vision
 
-ice_vision.check("scenes")
+ice_vision.check(__file__, "scenes")
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
