@@ -292,7 +292,7 @@ def test_a_fixed_pattern_is_in_the_mean_of_many_photographs_too(task1):
     expected = []
     for k, count in enumerate((1, 4)):
         signal = problem.signal(values, k)
-        assert 40 < signal.max() < 230  # away from both ends of the scale
+        assert 40 < signal.max() < 230  # away from both ends of the scale  # margin: the picture's own brightest level
 
         expected.append((2.0**2 + 1 / 12 + 0.05 * signal) / count + 1.5**2 + (0.02 * signal) ** 2)
     assert problem.variance(values, noise) == pytest.approx(np.concatenate(expected), rel=1e-9)
