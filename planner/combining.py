@@ -10,6 +10,7 @@ import numpy as np
 from planner.forecast import mildest
 from planner.models.bias import MOST
 from planner.prediction import Prediction
+from scenes.status import is_trusted
 
 _FURTHER = 1e-6  # of each variance: a further, independent error without which a joint covariance may be singular
 
@@ -102,13 +103,13 @@ def combined(covariances: np.ndarray, status: np.ndarray, biases: np.ndarray) ->
         bias = np.where(lost, np.nan, np.where(used, weights * biases, 0.0).sum(0))
         off = np.abs(bias) > MOST * np.sqrt(np.diag(covariance))
     told = [mildest(map(str, each[own] if own.any() else each)) for each, own in zip(status.T, used.T, strict=True)]
-    told = ["clutter" if state == "ok" and moved else state for state, moved in zip(told, off, strict=True)]
+    told = ["clutter" if is_trusted(state) and moved else state for state, moved in zip(told, off, strict=True)]
     return Combination(used, weights, _marked(covariance, lost), gains, _marked(jointly, lost), bias, tuple(told))
 
 
 def _used(measured: np.ndarray, status: np.ndarray) -> np.ndarray:
     """Of each quantity the pictures in which it is ok, or all that measure it if there are none; bool (V, M)."""
-    fine = measured & (status == "ok")
+    fine = measured & is_trusted(status)
     return np.where(fine.any(0), fine, measured)
 
 

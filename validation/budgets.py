@@ -80,7 +80,7 @@ def pictured(found: SceneBudget, count: int, seed: int, estimator: str | None = 
         rows.append({
             "name": each.name, "unit": each.unit, "value": float(good.mean()), "u": float(good.std(ddof=1)),
             "held": float(held.mean()), "n": len(good), "failed": count - len(good),
-            "warned": int((state != "ok").sum()),
+            "warned": int((~is_trusted(state)).sum()),
         })  # fmt: skip
     return {"stations": count, "chain": "a picture of each draw by the closed form of plain scenes", "measurands": rows}
 

@@ -14,6 +14,7 @@ import scenes
 from scenes import Edge, InvalidInput, Scene, Solid
 from scenes.load import from_document
 from scenes.parts import mesh
+from scenes.status import is_trusted
 from scenes.units import in_unit
 
 _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
@@ -127,7 +128,7 @@ def _setting(scene: Scene) -> tuple[tuple[bool, float], dict[str, list[float]]]:
     first = None
     for sensor, light in zip(*np.unravel_index(variance.ravel().argsort()[:_TRIED], variance.shape), strict=True):
         poses = {"sensor": list(map(float, _SENSORS[sensor])), "light": list(map(float, _LIGHTS[light]))}
-        clear = np.isfinite(variance[sensor, light]) and planner.predict(scene, *poses.values()).status == "ok"
+        clear = np.isfinite(variance[sensor, light]) and is_trusted(planner.predict(scene, *poses.values()).status)
         if clear:
             return (False, float(variance[sensor, light])), poses
         first = first or ((True, float(variance[sensor, light])), poses)

@@ -192,7 +192,7 @@ def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:
 
 def _judged(rows: list[CheckedSetting], reason: str, seconds: float) -> PlanCheck:
     """Places by the pictures: ``ok`` first, then what is doubtful, by variance; what cannot be measured has none."""
-    order = sorted(range(len(rows)), key=lambda i: (np.isinf(rows[i].propagated), rows[i].status != status.OK,
+    order = sorted(range(len(rows)), key=lambda i: (np.isinf(rows[i].propagated), not status.is_trusted(rows[i].status),
                                                     rows[i].propagated))  # fmt: skip
     ranked = [
         replace(row, rank_after=None if np.isinf(row.propagated) else order.index(i) + 1) for i, row in enumerate(rows)

@@ -164,10 +164,12 @@ def budget(
 
 
 def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:
-    count = len(picture.scene.quantities)
-    if values is not None and finite(values, name).shape != (count,):
-        raise InvalidInput(f"{name} must be one for each of {count} measurands, got shape {np.shape(values)}")
-    return None if values is None else finite(values, name)
+    if values is None:
+        return None
+    count, numbers = len(picture.scene.quantities), finite(values, name)
+    if numbers.shape != (count,):
+        raise InvalidInput(f"{name} must be one for each of {count} measurands, got shape {numbers.shape}")
+    return numbers
 
 
 def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:

@@ -10,6 +10,7 @@ from planner.search.constraints import Constraints
 from planner.search.looked import Pool, information
 from planner.search.refinement import refine
 from planner.search.subsets import Information, better
+from scenes.status import is_trusted
 
 _SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a descent
 
@@ -33,7 +34,7 @@ def descend(
     a shorter descent is tried.
     """
     sensor, light = pool.poses[row, :2], pool.poses[row, 2:]
-    cluttered = np.array([each.status != "ok" for each in pool.closely[row].measurands])
+    cluttered = np.array([not is_trusted(each.status) for each in pool.closely[row].measurands])
 
     def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
         errors = variance_model(pool.model)(Pictures.of(pool.scene, s[None], k[None]))

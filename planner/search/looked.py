@@ -13,6 +13,7 @@ from planner.search.constraints import Constraints
 from planner.search.exhaustive import Report
 from planner.search.subsets import Information
 from scenes import Scene
+from scenes.status import is_trusted
 
 _ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is looked at
 _AT_A_TIME = 20_000  # pairs
@@ -81,7 +82,7 @@ class Pool:
         """What the rows `seen` tell."""
         told = [self.closely[row].measurands for row in self.seen]
         values = information(np.array([[each.variance_object for each in row] for row in told]), self.aim)
-        fine = np.array([[each.status == "ok" for each in row] for row in told])
+        fine = np.array([[is_trusted(each.status) for each in row] for row in told])
         return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.aim.over)
 
     def expected(self) -> Information:

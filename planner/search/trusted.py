@@ -16,6 +16,7 @@ from planner.prediction import predict
 from planner.search.candidates import Candidate, edges_of
 from planner.search.poses import as_array, as_poses
 from scenes import Scene
+from scenes.status import is_trusted
 
 DEAREST = 4.0  # times the least variance that is paid for it: standard deviations are twice as large
 
@@ -63,4 +64,4 @@ def trusted(
 def untrusted(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str) -> int:
     """How many measurands of a setting are not ``ok``."""
     told = predict(scene, tuple(map(float, sensor)), as_poses(light), model)
-    return sum(each.status != "ok" for each in told.measurands)
+    return sum(not is_trusted(each.status) for each in told.measurands)

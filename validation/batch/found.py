@@ -67,6 +67,6 @@ def row_status(clean: str, others: dict[str, int], images: int) -> str:
     >>> row_status("ok", {"short": 1}, 100), row_status("ok", {"short": 1, "low_contrast": 2}, 100)
     ('ok', 'low_contrast')
     """
-    if clean != "ok" or sum(others.values()) <= statistics.STRAY * images:
+    if not statuses.is_trusted(clean) or sum(others.values()) <= statistics.STRAY * images:
         return clean
     return max(others, key=others.get)

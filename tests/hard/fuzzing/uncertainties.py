@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
-import os
-import sys
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 
 from scenes import InvalidInput
 from scenes.load import BUNDLED
-from validation.cli import main as entry
+from tests import commands
 
 _NUMBERS = (
     "1e300", "1e12", "-1", "nan", "inf", "5e-324", "1e-30", "0", "1e3", "{sd = 1e12, dof = 1e12}",
@@ -52,21 +48,9 @@ def uncertain(rng: np.random.Generator, folder: Path) -> str:
 def printed(arguments: list[str], stream: io.TextIOWrapper | None) -> tuple[int, str, str]:
     """Exit status of ``ice ARGUMENTS`` in this process, and what it printed; ``stream`` is its standard output."""
     err = io.StringIO()
-    with (
-        mock.patch.object(sys, "argv", ["ice", *arguments]),
-        mock.patch.object(entry.signal, "signal"),
-        mock.patch.dict(os.environ, COLUMNS="160"),
-        contextlib.redirect_stdout(stream),
-        contextlib.redirect_stderr(err),
-    ):
-        try:
-            entry.main()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        if stream is None:
-            sys.stdout.close()  # what took the place of the closed one
+    code = commands.status(arguments, stream, err)
     text = "" if stream is None else stream.buffer.getvalue().decode(stream.encoding)
-    return status, text, err.getvalue()
+    return code, text, err.getvalue()
 
 
 def _scene(rng: np.random.Generator) -> str:
