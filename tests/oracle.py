@@ -24,29 +24,53 @@ def shaded_image(faces, shape, blur):
     blur : float
 
     Gauss-Legendre quadrature of both integrals on panels of at most half a pixel that end at the face's outline, so
-    that the integrand is smooth: about 1e-6 of the contrast.
+    that the integrand is smooth: about 1e-6 of the contrast. Along x the panels that are whole lie at the same places
+    in each line, so that what they send to the pixels is one matrix.
     """
     picture = np.zeros(shape)
     for corners, shade in faces:
         corners = np.asarray(corners, float)
-        lines, weights = scan_lines(corners)
+        lines, weights = scan_lines(corners, _FEW, _FEW_WEIGHTS)
         left, right = spans(corners, lines)
-        panels = max(int(np.ceil(2 * np.max(right - left))), 1)
-        t = (np.arange(panels)[:, None] + (1 + _FEW) / 2).ravel() / panels
-        x = left[:, None] + (right - left)[:, None] * t
-        value = shade(x, lines[:, None]) * (right - left)[:, None] * np.tile(_FEW_WEIGHTS / 2, panels) / panels
-        reach, nearest = int(np.ceil(7 * blur)) + 1, np.rint(x).astype(int)
-        rows = np.zeros(lines.size * (shape[1] + 1))  # one pixel more for what falls outside
-        first, lower = np.arange(lines.size)[:, None] * (shape[1] + 1), ndtr((nearest - reach - 0.5 - x) / blur)
-        for step in range(-reach, reach + 1):
-            pixel, upper = nearest + step, ndtr((nearest + step + 0.5 - x) / blur)
-            place = first + np.where((pixel >= 0) & (pixel < shape[1]), pixel, shape[1])
-            rows += np.bincount(place.ravel(), (value * (upper - lower)).ravel(), rows.size)
-            lower = upper
-        rows = rows.reshape(lines.size, -1)[:, :-1]
+        rows = _whole_panels(left, right, lines, shade, shape[1], blur)
+        first, last = np.ceil(2 * left) / 2, np.floor(2 * right) / 2  # of the whole panels, where there are any
+        narrow = first > last
+        rows += _one_panel(left, np.where(narrow, right, first), lines, shade, shape[1], blur)
+        rows += _one_panel(np.where(narrow, right, last), right, lines, shade, shape[1], blur)
         away = lines - np.arange(shape[0])[:, None]
         picture += (ndtr((away + 0.5) / blur) - ndtr((away - 0.5) / blur)) * weights @ rows
     return picture
+
+
+def _whole_panels(left, right, lines, shade, width, blur):
+    """What the panels between half pixels send to each line's pixels, (lines, width)."""
+    ends = np.arange(np.ceil(2 * left.min()), np.floor(2 * right.max()) + 1) / 2
+    if ends.size < 2:
+        return np.zeros((lines.size, width))
+    x = (ends[:-1, None] + (1 + _FEW) / 4).ravel()
+    inside = (ends[:-1] >= left[:, None]) & (ends[1:] <= right[:, None])
+    value = np.where(np.repeat(inside, _FEW.size, 1), shade(np.broadcast_to(x, (lines.size, x.size)), lines[:, None]), 0)
+    return value * np.tile(_FEW_WEIGHTS / 4, ends.size - 1) @ _sent(x, width, blur)
+
+
+def _sent(x, width, blur):
+    """The share of light at x (n,) that each pixel gets, (n, width)."""
+    edges = ndtr((np.arange(width + 1) - 0.5 - x[:, None]) / blur)
+    return edges[:, 1:] - edges[:, :-1]
+
+
+def _one_panel(left, right, lines, shade, width, blur):
+    """The same of one panel a line, which may begin and end anywhere within a pixel."""
+    x = left[:, None] + (right - left)[:, None] * (1 + _FEW) / 2
+    value = shade(x, lines[:, None]) * (right - left)[:, None] * _FEW_WEIGHTS / 2
+    reach, nearest, rows = int(np.ceil(7 * blur)) + 1, np.rint(x).astype(int), np.zeros((lines.size, width + 1))
+    lower = ndtr((nearest - reach - 0.5 - x) / blur)
+    for step in range(-reach, reach + 1):
+        pixel, upper = nearest + step, ndtr((nearest + step + 0.5 - x) / blur)
+        place = np.where((pixel >= 0) & (pixel < width), pixel, width)  # one pixel more for what falls outside
+        np.add.at(rows, (np.arange(lines.size)[:, None], place), value * (upper - lower))
+        lower = upper
+    return rows[:, :-1]
 
 
 def pinhole(points, pose, camera):
@@ -81,16 +105,18 @@ def block_image(scene, sensor, light, gloss=None):
     def shading(normal, corner):
         def shade(x, y):
             u, v = ((p - (n - 1) / 2) / camera.focal_px for p, n in ((x, camera.width), (y, camera.height)))
+            if not gloss:  # the same, a component at a time
+                depth = (corner - eye) @ normal / (u * (right @ normal) + v * (down @ normal) - out @ normal)
+                way = u * (right @ (lamp - eye)) + v * (down @ (lamp - eye)) - out @ (lamp - eye)
+                distance2 = (lamp - eye) @ (lamp - eye) - 2 * depth * way + depth**2 * (1 + u**2 + v**2)
+                return white * max((lamp - corner) @ normal, 0) * scene.light.distance**2 / distance2**1.5
             ray = -out + u[..., None] * right + (v + 0 * u)[..., None] * down
             point = eye + ray * ((corner - eye) @ normal / (ray @ normal))[..., None]
-            away = lamp - point
+            away, back = lamp - point, eye - point
             distance = np.linalg.norm(away, axis=-1)
+            back = back / np.linalg.norm(back, axis=-1, keepdims=True)
             fall_off = (scene.light.distance / distance) ** 2
-            if gloss:
-                back = eye - point
-                back = back / np.linalg.norm(back, axis=-1, keepdims=True)
-                return camera.exposure * fall_off * gloss(normal, away / distance[..., None], back)
-            return white * np.maximum(away @ normal, 0) / distance * fall_off
+            return camera.exposure * fall_off * gloss(normal, away / distance[..., None], back)
 
         return shade
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import ndtr
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_FAR = 9  # standard deviations
 
 
 def polygon_image(
@@ -32,7 +33,9 @@ def polygon_image(
     return background + contrast * blur * weight @ span
 
 
-def scan_lines(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def scan_lines(
+    corners: np.ndarray, nodes: np.ndarray = _NODES, weights: np.ndarray = _WEIGHTS
+) -> tuple[np.ndarray, np.ndarray]:
     """Quadrature nodes and weights along y on panels in which no side moves by more than half a pixel along x or y."""
     breaks = np.unique(corners[:, 1])
     way = np.abs(np.roll(corners, -1, 0) - corners)
@@ -44,12 +47,15 @@ def scan_lines(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         edges.append(np.linspace(a, b, int(np.ceil(2 * steepest * (b - a))) + 1)[:-1])
     edges = np.append(np.concatenate(edges), breaks[-1])
     half = np.diff(edges)[:, None] / 2
-    return (edges[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
+    return (edges[:-1, None] + half * (1 + nodes)).ravel(), (half * weights).ravel()
 
 
 def _ramp(u: np.ndarray) -> np.ndarray:
-    """Integral of the standard normal distribution function."""
-    return u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
+    """Integral of the standard normal distribution function; beyond 9 its asymptote, which is exact in doubles."""
+    found, near = np.maximum(u, 0.0), np.abs(u) < _FAR
+    u = u[near]
+    found[near] = u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
+    return found
 
 
 def spans(corners: np.ndarray, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
