@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special, stats
 
 from scenes.status import OK, counted, is_trusted
 
@@ -44,7 +44,7 @@ def ratio_intervals(ratios: np.ndarray, counts: np.ndarray, level: float = 0.95)
     freedoms, which = np.unique(counts[some] - 1, return_inverse=True)
     low, high = np.zeros(ratios.shape), np.full(ratios.shape, np.inf)
     low[some], high[some] = (
-        ratios[some] * freedoms[which] / stats.chi2.isf(p, freedoms)[which] for p in (tail, 1 - tail)
+        ratios[some] * freedoms[which] / special.chdtri(freedoms, p)[which] for p in (tail, 1 - tail)
     )
     return low, high
 
@@ -58,7 +58,7 @@ def _p_values(ratios: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The same for each of many; NaN where there is no ratio."""
     freedom = np.where((counts >= 2) & np.isfinite(ratios), counts - 1.0, np.nan)
     x = ratios * freedom
-    return np.minimum(1.0, 2 * np.minimum(stats.chi2.cdf(x, freedom), stats.chi2.sf(x, freedom)))
+    return np.minimum(1.0, 2 * np.minimum(special.chdtr(freedom, x), special.chdtrc(freedom, x)))
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ def bias_p_value(difference: ArrayLike, n: ArrayLike, allowance: float = ALLOWAN
     """
     root = np.sqrt(n)
     away = np.abs(difference) * root
-    return np.minimum(stats.norm.sf(away - allowance * root) + stats.norm.sf(away + allowance * root), 1.0)
+    return np.minimum(special.ndtr(allowance * root - away) + special.ndtr(-away - allowance * root), 1.0)
 
 
 def _pooled(ratios: np.ndarray, freedoms: np.ndarray, level: float) -> Pooled:
@@ -288,7 +288,7 @@ def _pooled(ratios: np.ndarray, freedoms: np.ndarray, level: float) -> Pooled:
 
 def bias_test(difference: np.ndarray, counts: np.ndarray, level: float) -> Bias:
     """Judge the mean errors of several rows; parameters as of `bias_p_value`, at least one row."""
-    shown = np.abs(difference) + stats.norm.isf(0.05) / np.sqrt(counts) < ALLOWANCE
+    shown = np.abs(difference) + special.ndtri(0.95) / np.sqrt(counts) < ALLOWANCE
     return Bias(
         rows=difference.size,
         allowance=ALLOWANCE,

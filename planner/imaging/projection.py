@@ -26,8 +26,21 @@ class Frame(NamedTuple):
 
 def direction(poses: np.ndarray) -> np.ndarray:
     """Unit vector from the origin to each pose, shape (..., 3)."""
-    polar, azimuth = np.moveaxis(np.radians(poses), -1, 0)
-    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+    sine, cosine = _turns(poses)
+    return _vectors(sine[..., 0] * cosine[..., 1], sine[..., 0] * sine[..., 1], cosine[..., 0])
+
+
+def _turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sines and cosines of poses' angles, each shape (..., 2)."""
+    angles = np.radians(poses)
+    return np.sin(angles), np.cos(angles)
+
+
+def _vectors(x: np.ndarray, y: np.ndarray, z: np.ndarray | float) -> np.ndarray:
+    """Vectors (..., 3) of their components: `numpy.stack` for the many calls with a single pose."""
+    found = np.empty((*np.shape(x), 3))
+    found[..., 0], found[..., 1], found[..., 2] = x, y, z
+    return found
 
 
 def frame(poses: np.ndarray) -> Frame:
@@ -36,10 +49,12 @@ def frame(poses: np.ndarray) -> Frame:
     They are derivatives of the direction by the angles, so they exist at the poles too, where "the object's
     z axis up" says nothing.
     """
-    polar, azimuth = np.moveaxis(np.radians(poses), -1, 0)
-    down = np.stack([np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)], -1)
-    right = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], -1)
-    return Frame(right, down, -direction(poses))
+    sine, cosine = _turns(poses)
+    up, aside, level, ahead = sine[..., 0], sine[..., 1], cosine[..., 0], cosine[..., 1]
+    return Frame(
+        _vectors(-aside, ahead, 0.0), _vectors(level * ahead, level * aside, -up),
+        -_vectors(up * ahead, up * aside, level),
+    )
 
 
 def camera_frame(camera: Camera, poses: np.ndarray) -> Frame:
@@ -102,13 +117,17 @@ def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarr
     """The same from the image's middle, px: what is small against the image keeps its digits in differences."""
     axes = camera_frame(camera, poses)
     beside = (points - np.array(camera.look_at)) @ np.stack([axes.right, axes.down], -1)
-    away = depth(points, poses, camera)[..., None]
+    away = _along(points, camera, axes)[..., None]
     return camera.focal_px * beside / np.where(away > 0, away, np.nan)
 
 
 def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Distance of points (..., n, 3) from the sensor along its axis, cm, shape (..., n)."""
-    return camera.distance + np.einsum("...ni,...i->...n", points - np.array(camera.look_at), frame(poses).forward)
+    return _along(points, camera, frame(poses))
+
+
+def _along(points: np.ndarray, camera: Camera, axes: Frame) -> np.ndarray:
+    return camera.distance + np.einsum("...ni,...i->...n", points - np.array(camera.look_at), axes.forward)
 
 
 def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
@@ -120,7 +139,7 @@ def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarra
 def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Derivative of `project_ideal` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
     axes = camera_frame(camera, poses)
-    z = depth(points, poses, camera)[..., None, None]
+    z = _along(points, camera, axes)[..., None, None]
     screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
     beside = (points - np.array(camera.look_at)) @ np.moveaxis(screen[..., 0, :, :], -2, -1)
     return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)

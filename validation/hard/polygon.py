@@ -25,9 +25,8 @@ def polygon_image(
     corners = np.asarray(corners, float)
     lines, weights = scan_lines(corners)
     left, right = spans(corners, lines)
-    x = np.arange(width)
-    span = _ramp((x + 0.5 - left[:, None]) / blur) - _ramp((x - 0.5 - left[:, None]) / blur)
-    span -= _ramp((x + 0.5 - right[:, None]) / blur) - _ramp((x - 0.5 - right[:, None]) / blur)
+    x = np.arange(width + 1) - 0.5
+    span = np.diff(_ramp((x - left[:, None]) / blur) - _ramp((x - right[:, None]) / blur), axis=1)
     away = lines - np.arange(height)[:, None]
     weight = (ndtr((away + 0.5) / blur) - ndtr((away - 0.5) / blur)) * weights
     return background + contrast * blur * weight @ span
