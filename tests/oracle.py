@@ -49,7 +49,8 @@ def _whole_panels(left, right, lines, shade, width, blur):
         return np.zeros((lines.size, width))
     x = (ends[:-1, None] + (1 + _FEW) / 4).ravel()
     inside = (ends[:-1] >= left[:, None]) & (ends[1:] <= right[:, None])
-    value = np.where(np.repeat(inside, _FEW.size, 1), shade(np.broadcast_to(x, (lines.size, x.size)), lines[:, None]), 0)
+    level = shade(np.broadcast_to(x, (lines.size, x.size)), lines[:, None])
+    value = np.where(np.repeat(inside, _FEW.size, 1), level, 0)
     return value * np.tile(_FEW_WEIGHTS / 4, ends.size - 1) @ _sent(x, width, blur)
 
 
