@@ -52,7 +52,8 @@ def frame(poses: np.ndarray) -> Frame:
     sine, cosine = _turns(poses)
     up, aside, level, ahead = sine[..., 0], sine[..., 1], cosine[..., 0], cosine[..., 1]
     return Frame(
-        _vectors(-aside, ahead, 0.0), _vectors(level * ahead, level * aside, -up),
+        _vectors(-aside, ahead, 0.0),
+        _vectors(level * ahead, level * aside, -up),
         -_vectors(up * ahead, up * aside, level),
     )
 
