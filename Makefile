@@ -85,7 +85,7 @@ crowded: $(VENV)/.test-installed
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e .
-	$(BIN)/python -m compileall -q measure planner render scenes validation
+	$(BIN)/python -m compileall -q imaging measure planner render scenes validation
 	touch $@
 
 $(VENV)/.test-installed: $(VENV)/.installed

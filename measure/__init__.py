@@ -2,7 +2,7 @@
 
 import ice_vision
 
-ice_vision.check(__file__, "scenes", "planner")
+ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.kinds import on_plane
+from imaging.features.measurand import measurands
+from imaging.features.seen import unit_normals
+from imaging.geometry.lens import image_centre
+from imaging.pictures import Pictures
 from measure.features.layout import layout_of
 from measure.quantities import found_in_images, values
-from planner.features.kinds import on_plane
-from planner.features.measurand import measurands
-from planner.features.seen import unit_normals
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
 from scenes import Picture
 
 
@@ -22,7 +22,7 @@ def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
     picture : Picture
         As it is believed to be taken.
     errors : ndarray, shape (n, q)
-        Of lines and circles, as numbered in `planner.features.seen`.
+        Of lines and circles, as numbered in `imaging.features.seen`.
 
     Returns
     -------

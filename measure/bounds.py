@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from imaging.blurred.arrangement import near_pixels, near_vertices
+from imaging.blurred.model import BlurredModel, State
+from imaging.models.bound import REACH, Information, fisher, known
+from imaging.models.bound import bound as errors_at_the_bound
+from imaging.pictures import Pictures
 from measure.features.layout import Layout, layout_of
 from measure.features.locating import locate
 from measure.features.shape import prepared
 from measure.measurement import distance, separation
-from planner import predict
-from planner.imaging.arrangement import near_pixels, near_vertices
-from planner.imaging.blurred import BlurredModel, State
-from planner.models.bound import REACH, Information, fisher, known
 from scenes import InvalidInput, Noise, Picture, Scene, status
 from scenes.arrays import picture as one_picture
 
@@ -21,7 +22,7 @@ from scenes.arrays import picture as one_picture
 def bound(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> float:
     """Smallest variance of the distance that any unbiased estimator can have in this setting, px^2.
 
-    From the planner's model of the whole picture around the required edges: free are all vertices there, the levels of
+    From the model of the whole picture around the required edges: free are all vertices there, the levels of
     the faces and the background. Infinite where an edge cannot be seen.
 
     Examples
@@ -30,7 +31,13 @@ def bound(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> floa
     >>> 4e-5 < bound(scenes.load("task1"), (30, 135), (15, 315)) < 6e-5
     True
     """
-    return predict(scene, sensor, light, model="bound").variance_px2
+    picture = Picture.of(scene, sensor, light)
+    if not picture.lights:
+        raise InvalidInput("light must be a pose, got nothing")
+    kind = picture.scene.quantities[0].kind
+    if kind != "distance":
+        raise InvalidInput(f"task.kind must be distance for a bound in px^2, got {kind!r}")
+    return float(errors_at_the_bound(Pictures.of(picture)).variances[0])
 
 
 def image_bound(clean: np.ndarray, scene: Scene | Picture, sensor: Any = None, light: Any = None) -> float:

@@ -12,13 +12,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from imaging.features.locator import information_bound, kappa2
+from imaging.models.paper import PAPER_KAPPA2
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
 from measure.estimators.registry import ESTIMATORS, estimator
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
-from planner.features.locator import information_bound, kappa2
-from planner.models.paper import PAPER_KAPPA2
 from scenes import Scene, status
 
 RATIOS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)

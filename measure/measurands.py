@@ -11,7 +11,6 @@ import numpy as np
 from measure.estimators.registry import best_estimator
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import Found, find
-from planner.forecast import unit_of
 from scenes import Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
@@ -153,7 +152,7 @@ def _gathered(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurem
     ]
     return Measurements(
         quantities=quantities,
-        units=tuple(unit_of(picture.scene, quantity) for quantity in quantities),
+        units=tuple(picture.scene.unit_of(quantity) for quantity in quantities),
         nominal=np.array(told, float),
         value_image=np.where(measured, found.image.value, np.nan).reshape(*lead, count),
         value=np.where(measured, found.plane.value, np.nan).reshape(*lead, count),

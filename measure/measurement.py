@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from imaging.models.bias import bias
+from imaging.pictures import Pictures
 from measure.estimators.registry import known_name
 from measure.quantities import Found, find
-from planner.imaging.pictures import Pictures
-from planner.models.bias import bias
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
 from scenes.results import Shown, finite, value

@@ -7,6 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from imaging.models.bias import MOST
+from imaging.models.texture import TextureErrors, texture_errors
+from imaging.pictures import Pictures
+from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
@@ -14,10 +18,6 @@ from measure.features.rims import circle_response
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, check_method, checked_image
 from measure.quantities import Found, find
-from planner.imaging.pictures import Pictures
-from planner.imaging.sensor import recorded
-from planner.models.bias import MOST
-from planner.models.texture import TextureErrors, texture_errors
 from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
 

@@ -7,16 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
+from imaging.features.kinds import Evaluated, in_image, on_plane
+from imaging.features.measurand import Measurands, dense, measurands
+from imaging.features.seen import Seen
+from imaging.geometry.lens import image_centre
+from imaging.pictures import Pictures
 from measure.features.corners import intersect
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import Circles, find_circle
 from measure.features.shape import find_shape
-from planner.features.kinds import Evaluated, in_image, on_plane
-from planner.features.measurand import Measurands, dense, measurands
-from planner.features.seen import Seen
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
 from scenes import Corner, Picture, Quantity, status
 
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from imaging.features.projected_edges import circles
 from measure.features.layout import layout_of
 from measure.features.rims import rim_tool, unmoved
 from measure.features.shape import prepared
 from measure.measurement import check_method
-from planner.features.projected_edges import circles
 from scenes import InvalidInput, Picture, Scene
 from scenes.errors import given
 

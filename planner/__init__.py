@@ -2,24 +2,23 @@
 
 import ice_vision
 
-ice_vision.check(__file__, "scenes")
+ice_vision.check(__file__, "scenes", "imaging")
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from imaging.blurred.whole import image
+from imaging.features.measurand import required_edges
+from imaging.features.projected_edges import projected_edges
+from imaging.pictures import Pictures
+from imaging.pose_scatter import PoseSpread, pose_scatter, pose_spread
 from planner.combining import Combination, combine
-from planner.features.measurand import required_edges
-from planner.features.projected_edges import projected_edges
 from planner.forecast import Forecast
-from planner.imaging.pictures import Pictures
-from planner.imaging.whole import image
-from planner.jitter import PoseSpread, pose_scatter, pose_spread
 from planner.maps import Map, pose_map, variance_map
 from planner.planning import Candidate, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.search.aim import Aim
 from planner.search.alternating import alternate
-from planner.search.candidates import edges_of
 from planner.search.choices import Choice, with_choice
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
@@ -52,7 +51,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
     "Forecast", "Map", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
-    "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "edges_of", "exhaustive",
+    "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "exhaustive",
     "image", "local_minima", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "pose_spread",
     "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

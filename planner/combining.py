@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.models.bias import MOST
 from planner.forecast import mildest
-from planner.models.bias import MOST
 from planner.prediction import Prediction
 from scenes.status import is_trusted
 

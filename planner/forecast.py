@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.models.errors import Errors
+from imaging.models.errors import Errors
 from planner.ranks import quantity_ranks
-from scenes import Quantity, Scene, Tolerance
+from scenes import Scene, Tolerance
 from scenes.results import finite, value
 from scenes.status import WORST_FIRST
 
@@ -85,11 +85,6 @@ class Forecast:
         }
 
 
-def unit_of(scene: Scene, quantity: Quantity) -> str:
-    """Of a quantity in the object: the scene's unit of length, or degrees."""
-    return "degrees" if quantity.is_angle else scene.units
-
-
 def forecasts(
     scene: Scene,
     evaluated: Errors,
@@ -110,7 +105,7 @@ def forecasts(
             Forecast(
                 name=quantity.name,
                 kind=quantity.kind,
-                unit=unit_of(scene, quantity),
+                unit=scene.unit_of(quantity),
                 value_image=float(known.value[m]),
                 value_object=float(known.value_object[m]),
                 variance_image=float(evaluated.variances[m]),

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.models.bias import cluttered
+from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.models.bias import cluttered
+from imaging.pictures import Pictures
 from planner.prediction import minimised
 from planner.ranks import quantity_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Objective

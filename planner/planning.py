@@ -7,13 +7,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from planner.features.measurand import required_edges
-from planner.imaging.pictures import Pictures
-from planner.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.features.measurand import required_edges
+from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.pictures import Pictures
 from planner.prediction import Prediction, minimised, predict
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.alternating import Step
-from planner.search.candidates import Candidate, candidates, edges_of
+from planner.search.candidates import Candidate, candidates
 from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, has_bound
@@ -237,7 +237,7 @@ def _finish(options: list[Option], results: list[Result], best: int, aim: Aim, r
     if refined and option.free:
         starts = [(sensor, light, _closely(scene, sensor, light, *how) if chosen.set_aside else result.variance)]
         if not chosen.set_aside and (found is None or not has_bound(scene, option.model)):
-            others = [c for c in choice[1:3] if c.edges == edges_of(scene) and np.isfinite(c.variance)]
+            others = [c for c in choice[1:3] if c.edges == scene.required and np.isfinite(c.variance)]
             starts += [(np.array(list(c.sensor)), as_array(c.light), c.variance) for c in others]
         limits = option.step_deg, option.constraints
         descents = [refine(scene, *at, *how, *limits, sizes=(0.7,), known=known) for *at, known in starts]

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from planner.features.measurand import measurand, measurands, normals
-from planner.features.propagation import corner_covariance
+from imaging.features.measurand import measurand, measurands, normals
+from imaging.features.propagation import corner_covariance
+from imaging.geometry.projection import jacobian_ideal
+from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.models.bias import bias, cluttered
+from imaging.models.errors import Errors
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
 from planner.forecast import Forecast, forecasts, worst
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import jacobian_ideal
-from planner.models import DEFAULT_MODEL, ModelName, variance_model
-from planner.models.bias import bias, cluttered
-from planner.models.errors import Errors
-from planner.models.texture import texture_errors
 from planner.ranks import edge_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.features.locator import MIN_CONTRAST, MIN_USABLE
-from planner.features.seen import unit_normals
-from planner.models.errors import Errors
+from imaging.features.locator import MIN_CONTRAST, MIN_USABLE
+from imaging.features.seen import unit_normals
+from imaging.models.errors import Errors
 from scenes import Corner, status
 from scenes.status import WORST_FIRST
 
@@ -24,7 +24,7 @@ def edge_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     ----------
     evaluated : Errors
     clutter : ndarray of bool, shape (..., E)
-        What `planner.models.bias.cluttered` says; False where it is not asked.
+        What `imaging.models.bias.cluttered` says; False where it is not asked.
     """
     view = evaluated.measurands.view
     whole = view.lengths - view.trims.sum(-1)

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import combine
-from planner.models import DEFAULT_MODEL, ModelName
 from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.beside import descend
 from planner.search.constraints import Constraints

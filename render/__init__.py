@@ -2,7 +2,7 @@
 
 import ice_vision
 
-ice_vision.check(__file__, "scenes", "planner")
+ice_vision.check(__file__, "scenes", "imaging")
 
 from render.phenomena import Tolerance, choose, effects
 from render.phenomena.pose import shaken

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from planner import Pictures, projected_edges
-from planner.features.limb_outline import limb_outline
-from planner.features.projected_edges import circles
-from planner.features.rim_sides import equal_angles, radials
-from planner.imaging.lens import image_centre
-from planner.imaging.projection import project
+from imaging.features.limb_outline import limb_outline
+from imaging.features.projected_edges import circles, projected_edges
+from imaging.features.rim_sides import equal_angles, radials
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import project
+from imaging.pictures import Pictures
 from render.rays import Rays
 from scenes import Curved, Picture
 

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from planner.imaging.reflectance import Index, Ops, across, brightness, diffuse
+from imaging.light.reflectance import Index, Ops, across, brightness, diffuse
 from render.texture import Face, bitmap
 from scenes import Material
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import analyser_axis
-from planner.imaging.irradiance import bands
-from planner.imaging.projection import camera_frame
-from planner.imaging.reflectance import Index, diffuse
-from planner.imaging.sheets import sheets
+from imaging.geometry.projection import camera_frame
+from imaging.light.appearance import analyser_axis
+from imaging.light.irradiance import bands
+from imaging.light.reflectance import Index, diffuse
+from imaging.light.sheets import sheets
 from render import bsdf, lights
 from render.curved import curved_shapes, stands_for
 from render.meshes import mesh

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from planner import edges_of
-from planner.imaging.projection import project
+from imaging.geometry.projection import project
 from render.adaptive import MISSED, crossed, limb_pieces
 from scenes import Picture
 
@@ -97,9 +96,9 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
     circles = {circle.name: circle.edges for circle in scene.solid.circles}
-    limbs = [each for each in scene.solid.curved if each.name in edges_of(scene)]
+    limbs = [each for each in scene.solid.curved if each.name in scene.required]
     circles |= dict.fromkeys((each.name for each in limbs), ())
-    names = [piece for name in edges_of(scene) for piece in circles.get(name, (name,))]
+    names = [piece for name in scene.required for piece in circles.get(name, (name,))]
     ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
     places = project(places, np.array(list(picture.sensor)), scene.camera)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import analyser_axis, polarisation_axis
-from planner.imaging.backlight import passed
-from planner.imaging.emitters import emitters, nodes, reach_of
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import Frame, light_frame, light_position
+from imaging.geometry.projection import Frame, light_frame, light_position
+from imaging.light.appearance import analyser_axis, polarisation_axis
+from imaging.light.backlight import passed
+from imaging.light.emitters import emitters, nodes, reach_of
+from imaging.pictures import Pictures
 from render.bsdf import Lamp
 from render.meshes import mesh
 from scenes import Backlight, Bar, Disc, Dome, Light, Luminaire, Picture, Pose, Ring, Scene

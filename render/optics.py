@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from planner.imaging.lens import undistorted
+from imaging.geometry.lens import undistorted
 from scenes import Camera
 
 _SOFT = 1.0  # fine pixels: a blur with which an image can be interpolated without ringing

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.imaging.backlight import backlights
-from planner.imaging.lens import image_centre
-from planner.imaging.projection import camera_frame, frame
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import camera_frame, frame
+from imaging.light.backlight import backlights
 from render.texture import pointed
 from scenes import Picture
 

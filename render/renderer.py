@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import is_plain
-from planner.imaging.backlight import backlights
-from planner.imaging.lens import confusion, recorded
-from planner.imaging.projection import depth, project_ideal
+from imaging.geometry.lens import confusion, recorded
+from imaging.geometry.projection import depth, project_ideal
+from imaging.light.appearance import is_plain
+from imaging.light.backlight import backlights
 from render import variant as variants
 from render.adaptive import bent, crossed, near_edges, refine
 from render.build import CUSTOM, MANY_WAYS, description, textured, view

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.sensor import full_scale, recorded, shot_noise
+from imaging.sensor import full_scale, recorded, shot_noise
 from scenes import InvalidInput, Noise
 from scenes.arrays import grey_levels, picture
 

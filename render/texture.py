@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.appearance import matt_part, signal
-from planner.imaging.emitters import SMOOTH, emitters, is_point
-from planner.imaging.irradiance import beam
-from planner.imaging.pictures import Pictures
-from planner.imaging.sheets import Sheet
+from imaging.light.appearance import matt_part, signal
+from imaging.light.emitters import SMOOTH, emitters, is_point
+from imaging.light.irradiance import beam
+from imaging.light.sheets import Sheet
+from imaging.pictures import Pictures
 from render.meshes import mesh
 from scenes import Material, Picture, Scene, Solid, as_point
 

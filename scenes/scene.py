@@ -159,6 +159,17 @@ class Scene(Model):
         return quantities_of(self.task, self.measurands)
 
     @property
+    def required(self) -> tuple[str, ...]:
+        """Names of the edges and circles that its numbers need, each once: a task's as it names them."""
+        if self.task is not None:
+            return self.task.edges
+        return tuple(dict.fromkeys(name for quantity in self.quantities for name in quantity.edges))
+
+    def unit_of(self, quantity: Quantity) -> str:
+        """Of a number in the object: the scene's unit of length, or degrees."""
+        return "degrees" if quantity.is_angle else self.units
+
+    @property
     def solid(self) -> Solid:
         """Vertices, faces and edges of the object; of a part from a file the curved surfaces that are measured."""
         solid, names = self.object.solid_in(self.units), self._walls

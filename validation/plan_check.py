@@ -130,7 +130,7 @@ def check_plan(
 
 def _best(found: planner.Plan) -> list[tuple[Pose, Pose, tuple[str, ...]]]:
     """The plan, and its candidates from other places, the best first."""
-    here = found.sensor, found.light, planner.edges_of(found.scene)
+    here = found.sensor, found.light, found.scene.required
     others = [(c.sensor, c.light, c.edges) for c in found.candidates]
     return [here, *(other for other in others if not _same(here, other))]
 
@@ -184,7 +184,7 @@ def without_formula(scene: Scene, sensor: Pose, light: Pose) -> tuple[str, ...]:
 
 def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:
     """The scene with the task that measures the same by other edges."""
-    if edges == planner.edges_of(scene):
+    if edges == scene.required:
         return scene
     task = next(task for task in planner.required_edges(scene) if task.edges == edges)
     return scene.model_copy(update={"task": task})

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 import measure
+from imaging.blurred.arrangement import arrangement_of
+from imaging.blurred.model import BlurredModel
+from imaging.geometry.lens import undistorted
+from imaging.light.appearance import is_plain
 from planner.budgeting.station import Station
-from planner.imaging.appearance import is_plain
-from planner.imaging.arrangement import arrangement_of
-from planner.imaging.blurred import BlurredModel
-from planner.imaging.lens import undistorted
 from scenes import InvalidInput, Picture
 
 

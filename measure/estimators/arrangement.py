@@ -1,7 +1,7 @@
 """Maximum likelihood of all visible faces around the required edges together.
 
 Unknown are the image positions of all vertices near the required edges, a level on each face, the background and the
-blur; `planner.imaging.blurred` says what image they make. From the expected place Fisher scoring climbs to the
+blur; `imaging.blurred.model` says what image they make. From the expected place Fisher scoring climbs to the
 likelihood's maximum, with the model evaluated anew at each step. `measure.estimators.stack` solves the other images of
 a stack around the place found for one of them.
 """
@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imaging.blurred.arrangement import Arrangement
+from imaging.blurred.model import BlurredModel, State
+from imaging.models.bound import Known, known, response
+from imaging.sensor import Levels, squared_errors
 from measure.estimators.expansion import Expansion, Pieces
 from measure.estimators.reach import model_within, reach_of
-from planner.imaging.arrangement import Arrangement
-from planner.imaging.blurred import BlurredModel, State
-from planner.imaging.sensor import Levels, squared_errors
-from planner.models.bound import Known, known, response
 from scenes import Noise
 
 _STEPS = 50

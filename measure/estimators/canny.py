@@ -14,6 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import sparse
 from scipy.special import ndtr
 
+from imaging.features.locator import MIN_CONTRAST, edge_blur
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
 from measure.estimators.profile import TRUNCATE, profile_kernel, top, top_kernel
 from measure.estimators.thinning import Thinned, Thinning
@@ -21,7 +22,6 @@ from measure.features.calipers import Caliper
 from measure.features.lines import cells, trend_along
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints, UnitNoise
-from planner.features.locator import MIN_CONTRAST, edge_blur
 
 _BESIDE = 0.7  # of the gradient at its top is left at a pixel half a diagonal away, at least
 _LOST = 0.1  # of an edge's points; up to there the variance is off by 3 % at most

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from imaging.features.locator import MIN_CONTRAST
+from imaging.geometry.segments import numbered
 from measure.features.lines import trapezoid, trend_along
 from measure.features.points import EachPoint, EdgePoints, UnitNoise
-from planner.features.locator import MIN_CONTRAST
-from planner.imaging.segments import numbered
 
 STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends

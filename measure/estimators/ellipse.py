@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from imaging.features.locator import CLEARANCE, edge_blur
 from measure.estimators.estimate import noisy
 from measure.features.blurred_ellipse import LEAST_BLUR, ellipse_image, from_symmetric, relative
 from measure.features.optics import Optics
-from planner.features.locator import CLEARANCE, edge_blur
 
 _STEPS = 8
 _SETTLED = 0.1  # px: after a smaller step the model, linear at where it began, is true to 0.001 px

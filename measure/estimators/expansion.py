@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.imaging.blurred import BlurredModel, State
+from imaging.blurred.model import BlurredModel, State
 
 _ROWS = ((0, 3), (1, 4), (2, 3), (3, 3), (4, 4), (5, 5))  # kernel and how many powers of t go with it
 _STARTS = np.cumsum([0, *(count for _, count in _ROWS)])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from imaging.features.locator import edge_blur
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.features.calipers import Caliper
 from measure.features.optics import Optics
-from planner.features.locator import edge_blur
 
 
 def gradient_locator(optics: Optics, caliper: Caliper) -> CrossingLocator:

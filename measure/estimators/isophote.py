@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.locator import MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
+from imaging.geometry.segments import distance_to_segment
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.estimators.strip import HALF_WIDTH, pixels_beside
 from measure.features.calipers import Caliper
 from measure.features.layout import BACKGROUND, Layout
-from planner.features.locator import MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
-from planner.imaging.segments import distance_to_segment
 from scenes import status
 
 TRIM = 3.0  # standard deviations of an edge from which 0.1 % of its contrast is left: where corners and levels begin

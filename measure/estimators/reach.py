@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.arrangement import Arrangement, near_pixels, near_vertices
-from planner.imaging.blurred import BlurredModel
-from planner.models.bound import REACH as FARTHEST
-from planner.models.bound import Information, fisher, known
+from imaging.blurred.arrangement import Arrangement, near_pixels, near_vertices
+from imaging.blurred.model import BlurredModel
+from imaging.models.bound import REACH as FARTHEST
+from imaging.models.bound import Information, fisher, known
 from scenes import Noise
 
 NEAR = 16.0  # px up to which pixels are used; beyond it they only add to known grey levels, as a rule

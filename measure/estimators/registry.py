@@ -9,6 +9,8 @@ from functools import cached_property, partial
 import numpy as np
 from scipy import sparse
 
+from imaging.features.locator import CLEARANCE, edge_blur, reach
+from imaging.light.appearance import is_plain
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.canny import CannyLocator, thinnings
 from measure.estimators.crossing import CrossingLocator
@@ -22,8 +24,6 @@ from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
 from measure.features.lines import fit_lines, regression
-from planner.features.locator import CLEARANCE, edge_blur, reach
-from planner.imaging.appearance import is_plain
 from scenes import InvalidInput, Noise, Scene, status
 
 ESTIMATORS = ("canny", "gradient", "isophote", "strip", "arrangement")

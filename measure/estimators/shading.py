@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.appearance import face_signal
-from planner.imaging.arrangement import spread
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project_ideal
+from imaging.blurred.arrangement import spread
+from imaging.geometry.projection import project_ideal
+from imaging.light.appearance import face_signal
+from imaging.pictures import Pictures
 
 _DEGREE = 3
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.geometry.segments import distance_to_segment, pixels_along
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
 from measure.features.calipers import Caliper
 from measure.features.layout import Layout
-from planner.imaging.segments import distance_to_segment, pixels_along
 
 NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
 SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the blur

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from imaging.sensor import full_scale
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 from measure.estimators.stack import Found, find
 from measure.features.contrasts import SEEN, asked, contrasts, seen_edges
@@ -17,7 +18,6 @@ from measure.features.linearity import is_reliable
 from measure.features.locating import FURTHEST, locate, moved
 from measure.goodness import WORST, p_value
 from measure.once import once
-from planner.imaging.sensor import full_scale
 from scenes import status
 
 BLAS = ThreadpoolController()  # the matrices are small: threads cost more than they give

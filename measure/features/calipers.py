@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.features.locator import MIN_USABLE
+from imaging.geometry.segments import distance_to_segment
 from measure.features.layout import Layout
 from measure.features.optics import Optics
-from planner.features.locator import MIN_USABLE
-from planner.imaging.segments import distance_to_segment
 from scenes import status
 
 MIN_POSITIONS = 3

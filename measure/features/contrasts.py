@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.locator import MIN_USABLE
 from measure.estimators.arrangement import ArrangementEstimator, Centre
 from measure.estimators.stack import Found
 from measure.features.layout import Layout
 from measure.once import once
-from planner.features.locator import MIN_USABLE
 from scenes import status
 
 SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it

@@ -8,15 +8,15 @@ from functools import lru_cache
 import numpy as np
 from skimage.measure import points_in_poly
 
+from imaging.blurred.arrangement import Arrangement, arrangement_of, polygon_arrangement
+from imaging.features.projected_edges import corner_features, projected_edges, straight
+from imaging.geometry.lens import signed_confusion
+from imaging.geometry.projection import depth, facing, project_ideal
+from imaging.light.appearance import is_plain
+from imaging.models.bias import cluttered
+from imaging.pictures import Pictures
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
-from planner.features.projected_edges import corner_features, projected_edges, straight
-from planner.imaging.appearance import is_plain
-from planner.imaging.arrangement import Arrangement, arrangement_of, polygon_arrangement
-from planner.imaging.lens import signed_confusion
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import depth, facing, project_ideal
-from planner.models.bias import cluttered
 from scenes import Picture, Scene
 
 BACKGROUND = -1

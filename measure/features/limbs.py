@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
+from imaging.features.limb_look import LimbLook, clear_of_others, limb_look, seen_along
+from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
+from imaging.features.locator import MIN_CONTRAST, edge_blur
+from imaging.geometry.lens import image_centre
+from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
 from measure.features.tools import RimTool, held
-from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
-from planner.features.limb_look import LimbLook, clear_of_others, limb_look, seen_along
-from planner.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
-from planner.features.locator import MIN_CONTRAST, edge_blur
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
 from scenes import Curved, Picture, status
 
 _SPACING = 2.0  # smoothing scales between places

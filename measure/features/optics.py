@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.lens import lens_jacobian, recorded, undistorted
-from planner.imaging.sensor import headroom
-from planner.imaging.sensor import recorded as expected
+from imaging.geometry.lens import lens_jacobian, recorded, undistorted
+from imaging.sensor import headroom
+from imaging.sensor import recorded as expected
 from scenes import Camera, Noise, Scene
 
 

@@ -11,19 +11,19 @@ from functools import lru_cache
 
 import numpy as np
 
+from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
+from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
+from imaging.features.rim_look import RimLook, look, places_around
+from imaging.features.rim_outline import facets, smooth_outline
+from imaging.features.rim_sides import clearance, equal_angles, outward_normals, radials, seen_along
+from imaging.features.seen import plane_axes
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import project_ideal
+from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
 from measure.features.tools import RimTool, held
-from planner.features.circles import LEAST_CLEAR, LEAST_SEEN
-from planner.features.locator import MIN_CONTRAST, edge_blur, reach
-from planner.features.rim_look import RimLook, look, places_around
-from planner.features.rim_outline import facets, smooth_outline
-from planner.features.rim_sides import clearance, equal_angles, outward_normals, radials, seen_along
-from planner.features.seen import plane_axes
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project_ideal
 from scenes import Circle, Curved, Picture, status
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
@@ -43,7 +43,7 @@ class Circles:
     Attributes
     ----------
     errors : ndarray, shape (n, p)
-        Shifts of the centre along the plane's two axes (`planner.features.seen.plane_axes`) and change of the radius;
+        Shifts of the centre along the plane's two axes (`imaging.features.seen.plane_axes`) and change of the radius;
         of a curved surface those of `Curved.parameters`, of a cone four.
     covariance : ndarray, shape (n, p, p)
     state : ndarray of str, shape (n,)
@@ -192,7 +192,7 @@ def _weights(
 ) -> tuple[np.ndarray, str]:  # fmt: skip
     """Weights of places (m,), 0 where they are not taken, and the status that this makes.
 
-    The rules are those of `planner.features.circles`.
+    The rules are those of `imaging.features.circles`.
     """
     margin = optics.window_px + 4 * optics.scale_px + 1
     inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(-1)

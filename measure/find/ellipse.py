@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.locator import MIN_CONTRAST, edge_blur
 from measure.estimators.ellipse import EllipseFit, Seen, free_parameters, is_ellipse, likeliest_ellipse
 from measure.estimators.gradient import gradient_along
 from measure.features.blurred_ellipse import curvature, outline, relative, to_symmetric
 from measure.features.calipers import MIN_POSITIONS
 from measure.features.conic import UNITS, Ellipse, no_ellipse
 from measure.features.optics import Optics
-from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import InvalidInput, status
 from scenes.arrays import finite, grey_levels
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from imaging.blurred.whole import check_drawable
 from measure.fitting.goodness import p_value, parts
 from measure.fitting.information import are_alone, are_told, covariance_of
 from measure.fitting.likelihood import Problem, most_likely
@@ -20,7 +21,6 @@ from measure.fitting.unmodelled import directions
 from measure.goodness import WORST
 from measure.photo.noise import noise_sigma
 from measure.photo.tone_curve import tone_curve
-from planner.imaging.whole import check_drawable
 from scenes import InvalidInput, Noise, Picture, Scene, Setting, several
 from scenes.photograph import Photograph
 from scenes.status import LOW_CONTRAST, MISFIT, OK, worst

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.blurred.whole import signal_at
+from imaging.geometry.projection import facing, light_position
+from imaging.pictures import Pictures
+from imaging.sensor import recorded
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import facing, light_position
-from planner.imaging.sensor import recorded
-from planner.imaging.whole import signal_at
 from scenes import Noise
 
 _EVALUATIONS, _FEW = 30, 12  # of sharp and of coarse images

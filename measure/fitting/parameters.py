@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import Frame, camera_frame, project_ideal
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import Frame, camera_frame, project_ideal
+from imaging.pictures import Pictures
 from scenes import Picture, Pose, Scene, mounted
 from scenes.numbers import number_at, with_number
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from planner.imaging.arrangement import arrangement_of, near_pixels
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project
+from imaging.blurred.arrangement import arrangement_of, near_pixels
+from imaging.geometry.projection import project
+from imaging.pictures import Pictures
 from scenes import InvalidInput
 from scenes.arrays import picture as checked
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.geometry.projection import facing, sensor_position
 from measure.fitting.information import covariance_of
 from measure.fitting.likelihood import Problem, most_likely
-from planner.imaging.projection import facing, sensor_position
 from scenes import Noise
 
 _FAR = 6.0  # standard errors from the maximum, where the likelihood is looked at

@@ -6,13 +6,13 @@ import numpy as np
 from scipy import sparse
 from scipy.special import chdtri
 
+from imaging.features.locator import MIN_CONTRAST, edge_blur
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_along
 from measure.features.conic import Ellipse, fit_ellipse, no_ellipse
 from measure.features.optics import Optics
 from measure.photo.recording import Recording
 from measure.photo.residuals import around
-from planner.features.locator import MIN_CONTRAST, edge_blur
 from scenes import status
 
 _SPACING = 2.0  # smoothing scales between points: between them errors are smooth

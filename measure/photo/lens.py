@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationError
 
+from imaging.features.locator import reach
 from measure.estimators.gradient import gradient_along
 from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
-from planner.features.locator import reach
 from scenes import InvalidInput
 from scenes.errors import describe
 from scenes.files import read_toml

@@ -8,11 +8,11 @@ from threading import Lock
 
 import numpy as np
 
+from imaging.geometry.segments import distance_to_segment
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import Correlation, correlation
 from measure.photo.noise_curve import NoiseCurve, curve_of, scale_of
 from measure.photo.patches import SIDE, Patches, smooth_patches
-from planner.imaging.segments import distance_to_segment
 from scenes import status
 from scenes.photograph import Photograph
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from imaging.blurred.arrangement import Region
+from imaging.geometry.segments import distance_to_segment
 from measure.features.layout import Layout
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import SIDE, Patches
-from planner.imaging.arrangement import Region
-from planner.imaging.segments import distance_to_segment
 
 MOST = 2  # order of a region's level
 _FAR = 40.0  # px from the sides up to which patches tell

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from imaging.light.appearance import is_plain
+from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
 from planner.budgeting.terms import EXPANSION, TEMPERATURE, Term, as_input, terms
-from planner.imaging.appearance import is_plain
-from planner.imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined

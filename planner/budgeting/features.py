@@ -12,17 +12,17 @@ from functools import cached_property
 
 import numpy as np
 
+from imaging.features.circles import Rim, rim
+from imaging.features.limb_outline import limb_outline
+from imaging.features.limbs import limb_rim
+from imaging.features.locator import MIN_CONTRAST
+from imaging.features.measurand import Measurands, measurands, normals
+from imaging.features.rim_sides import equal_angles, outward_normals, radials
+from imaging.geometry.lens import undistorted
+from imaging.geometry.projection import edge_points, project_ideal
+from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from imaging.pictures import Pictures
 from planner.budgeting.station import Station
-from planner.features.circles import Rim, rim
-from planner.features.limb_outline import limb_outline
-from planner.features.limbs import limb_rim
-from planner.features.locator import MIN_CONTRAST
-from planner.features.measurand import Measurands, measurands, normals
-from planner.features.rim_sides import equal_angles, outward_normals, radials
-from planner.imaging.lens import undistorted
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, project_ideal
-from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
 from scenes import Curved
 
 
@@ -44,7 +44,7 @@ class Features:
         return measurands(self.pictures)
 
     def errors(self, station: Station) -> np.ndarray:
-        """Errors of lines and circles, as numbered in `planner.features.seen`, shape (q,).
+        """Errors of lines and circles, as numbered in `imaging.features.seen`, shape (q,).
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
         circle's centre in its plane and change of its radius (the scene's unit). NaN where a feature is not seen.

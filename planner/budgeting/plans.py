@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.budgeting.budgets import SceneBudget, budget
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints
 from planner.search.poses import as_array, as_poses, by_light

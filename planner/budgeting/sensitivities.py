@@ -2,7 +2,7 @@
 
 A value is g(features(true station), believed scene). The features' errors by an input are central differences of the
 closed-form projection over 1e-5 of the input's own size, in which 1e-9 of them is lost; g is linear in small errors,
-and its derivative by them is exact (`planner.features.kinds`). No picture is rendered. An input that changes levels
+and its derivative by them is exact (`imaging.features.kinds`). No picture is rendered. An input that changes levels
 alone moves no feature; it changes the classic locators' bias, whose closed form is differenced over one standard
 uncertainty to both sides. What a geometric input does to that bias, a small part of a small part, is left out.
 """
@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.models.bias import bias
 from planner.budgeting.features import Features
 from planner.budgeting.sources import Source
 from planner.budgeting.station import Station
-from planner.models.bias import bias
 
 _STEP = 1e-5  # of an input's scale
 

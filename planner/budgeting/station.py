@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.imaging.lens import image_centre, recorded
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project_ideal
-from planner.jitter import LEAST_SINE
+from imaging.geometry.lens import image_centre, recorded
+from imaging.geometry.projection import project_ideal
+from imaging.pictures import Pictures
+from imaging.pose_scatter import LEAST_SINE
 from scenes import Scene
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.measurand import Measurands, measurands
+from imaging.features.measurand import Measurands, measurands
+from imaging.geometry.projection import edge_points
+from imaging.light.appearance import side_signals
+from imaging.models import variance_model
+from imaging.models.bias import MOST
+from imaging.pictures import Pictures
 from planner.forecast import Forecast
-from planner.imaging.appearance import side_signals
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points
-from planner.models import variance_model
-from planner.models.bias import MOST
 from planner.uncertainty.inputs import Input, Kind
 from scenes import Centre, Noise, Scene, Uncertain
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.search.constraints import Constraints
 from planner.search.looked import Pool, information
 from planner.search.refinement import refine

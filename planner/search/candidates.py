@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import direction
-from planner.models import variance_model
+from imaging.geometry.projection import direction
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.prediction import minimised
 from planner.search.aim import Aim
 from planner.search.poses import as_poses
-from scenes import Picture, Pose, Scene
+from scenes import Picture, Pose
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
@@ -75,19 +75,12 @@ def _candidate(option, sensor: np.ndarray, light: np.ndarray, aim: Aim) -> Candi
     worst = int(np.argmax(found.variances_object * aim.shares))
     return Candidate(
         *poses,
-        edges_of(option.scene),
+        option.scene.required,
         float(found.variances_object[worst]),
         float(found.variances[worst]),
         float(minimised(found, aim)),
         option.scene.quantities[worst].name,
     )
-
-
-def edges_of(scene: Scene) -> tuple[str, ...]:
-    """The required edges of all quantities: a task's as it names them, each else once."""
-    if scene.task is not None:
-        return scene.task.edges
-    return tuple(dict.fromkeys(name for quantity in scene.quantities for name in quantity.edges))
 
 
 def _spread(directions: np.ndarray, count: int) -> list[int]:

@@ -1,7 +1,7 @@
 """What a plan may choose beside poses: the angles of two polarisers, a lamp and a filter; and what light they cost.
 
 The one place that turns a choice into a scene. A polarised light is a lamp behind an ideal polariser, which passes half
-of it; an analyser passes half of unpolarised light (`planner.imaging.reflectance`); a lamp brings its power, a filter
+of it; an analyser passes half of unpolarised light (`imaging.light.reflectance`); a lamp brings its power, a filter
 passes what the lamp's spectrum, the lens and the sensor leave of it.
 """
 
@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from planner.imaging.reflectance import diffuse
+from imaging.light.reflectance import diffuse
 from scenes import Filter, InvalidInput, Lamp, Material, Scene
 
 Vary = Literal["analyser", "polarisation", "band"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.projected_edges import projected_edges
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import direction, light_position, project
+from imaging.features.projected_edges import projected_edges
+from imaging.geometry.projection import direction, light_position, project
+from imaging.pictures import Pictures
 from scenes import InvalidInput, Scene
 
 _BODY = 0.05  # of the distance: radius of a body of which nothing is said

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.projected_edges import circles
-from planner.imaging.appearance import is_separable
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
-from planner.models.errors import Errors
+from imaging.features.projected_edges import circles
+from imaging.light.appearance import is_separable
+from imaging.models import variance_model
+from imaging.models.errors import Errors
+from imaging.pictures import Pictures
 from planner.prediction import minimised
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import direction
-from planner.models import variance_model
+from imaging.geometry.projection import direction
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.prediction import minimised
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import cut_off

@@ -7,10 +7,9 @@ from itertools import product
 
 import numpy as np
 
-from planner.imaging.projection import direction
+from imaging.geometry.projection import direction
 from planner.planning import Plan
 from planner.search.aim import Aim
-from planner.search.candidates import edges_of
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
 from planner.search.refinement import refine, shifted
@@ -152,7 +151,7 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
         return max(float(evaluate_pairs(world, *pairs, plan.model, aim).max()) for world in worlds)
 
     starts = [(plan.sensor, plan.light)]
-    starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == edges_of(plan.scene)]
+    starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == plan.scene.required]
     starts = [tuple(np.array(list(pose)) for pose in pair) for pair in starts]
     values = [worst(*pair) for pair in starts]
     best = int(np.argmin(values))

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.features.locator import MIN_USABLE, correlation
-from planner.features.measurand import Measurands, measurands
-from planner.features.projected_edges import image_fractions
-from planner.imaging.appearance import edge_distance2, of_sides, paper_step, side_strengths
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import facing
-from planner.imaging.sensor import headroom, shot_noise
-from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes
-from planner.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
-from planner.models.paper import PAPER_KAPPA2, PAPER_POINTS
+from imaging.features.locator import MIN_USABLE, correlation
+from imaging.features.measurand import Measurands, measurands
+from imaging.features.projected_edges import image_fractions
+from imaging.geometry.projection import facing
+from imaging.light.appearance import edge_distance2, of_sides, paper_step, side_strengths
+from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
+from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
+from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS
+from imaging.pictures import Pictures
+from imaging.sensor import headroom, shot_noise
 from planner.search.aim import Aim
 from scenes import Scene
 

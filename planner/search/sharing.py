@@ -15,15 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.features.locator import MIN_CONTRAST
-from planner.features.measurand import measurands
-from planner.features.projected_edges import circles
-from planner.imaging.appearance import of_sides, side_signals
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points
-from planner.imaging.sensor import headroom
-from planner.models.along import NODE_WEIGHTS, Nodes, place_nodes
-from planner.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
+from imaging.features.locator import MIN_CONTRAST
+from imaging.features.measurand import measurands
+from imaging.features.projected_edges import circles
+from imaging.geometry.projection import edge_points
+from imaging.light.appearance import of_sides, side_signals
+from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
+from imaging.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
+from imaging.pictures import Pictures
+from imaging.sensor import headroom
 from planner.search.aim import Aim
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, evaluate_pairs

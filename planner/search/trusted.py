@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.prediction import predict
-from planner.search.candidates import Candidate, edges_of
+from planner.search.candidates import Candidate
 from planner.search.poses import as_array, as_poses
 from scenes import Scene
 from scenes.status import is_trusted
@@ -48,7 +48,7 @@ def trusted(
     for candidate in choice:
         if least.untrusted == 0 or candidate.variance > DEAREST * variance:
             break
-        if candidate.edges != edges_of(scene):
+        if candidate.edges != scene.required:
             continue
         poses = np.array(list(candidate.sensor)), as_array(candidate.light)
         if all(np.allclose(pose, own) for pose, own in zip(poses, best, strict=True)):

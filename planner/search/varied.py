@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.imaging.projection import direction
+from imaging.geometry.projection import direction
 from planner.search.choices import Choice
 from scenes import Pose, Scene
 

@@ -13,8 +13,8 @@ from itertools import islice, product
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.prediction import minimised, predict, variances
 from planner.search.aim import Aim
 from planner.search.choices import (

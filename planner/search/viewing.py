@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
-from planner.imaging.projection import direction
+from imaging.geometry.projection import direction
 from scenes import InvalidInput
 from scenes.arrays import finite, number
 from scenes.errors import given

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from planner import Pictures
+from imaging.pictures import Pictures
 from scenes import InvalidInput, Luminaire, Scene
 
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound

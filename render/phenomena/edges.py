@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner import Pictures
-from planner.features.locator import edge_blur
-from planner.features.measurand import measurands
-from planner.features.projected_edges import circles, straight
-from planner.imaging.appearance import face_signal
-from planner.imaging.projection import edge_points, facing, project_ideal
+from imaging.features.locator import edge_blur
+from imaging.features.measurand import measurands
+from imaging.features.projected_edges import circles, straight
+from imaging.geometry.projection import edge_points, facing, project_ideal
+from imaging.light.appearance import face_signal
+from imaging.pictures import Pictures
 from render.phenomena.base import Influence, largest
 from scenes import Scene
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures
-from planner.features.locator import edge_blur
-from planner.imaging.lens import confusion, lens_jacobian, recorded
-from planner.imaging.projection import depth, edge_points, project_ideal
+from imaging.features.locator import edge_blur
+from imaging.geometry.lens import confusion, lens_jacobian, recorded
+from imaging.geometry.projection import depth, edge_points, project_ideal
+from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
 from render.phenomena.edges import lever, required, sides
 from scenes import Lens, Scene

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures, pose_scatter
-from planner.jitter import LEAST_SINE
-from planner.models import DEFAULT_MODEL, variance_model
+from imaging.models import DEFAULT_MODEL, variance_model
+from imaging.pictures import Pictures
+from imaging.pose_scatter import LEAST_SINE, pose_scatter
 from render.phenomena.base import SAFETY, Effect, Influence, changed
 from scenes import Pose, Scene
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner import Pictures
+from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Tolerance
 from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
 from render.phenomena.pose import PoseJitter

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures
-from planner.imaging.backlight import backlights
-from planner.imaging.sensor import shot_noise
-from planner.models import DEFAULT_MODEL, variance_model
+from imaging.light.backlight import backlights
+from imaging.models import DEFAULT_MODEL, variance_model
+from imaging.pictures import Pictures
+from imaging.sensor import shot_noise
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
 from render.phenomena.edges import sides
 from scenes import Scene

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures
-from planner.features.measurand import measurands
-from planner.imaging.backlight import backlights
-from planner.models.texture import texture_errors
+from imaging.features.measurand import measurands
+from imaging.light.backlight import backlights
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit, with_materials
 from render.phenomena.edges import NEAR_STEP, compare, lever, sides, total_variance
 from render.phenomena.transport import albedo

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner import Pictures
-from planner.features.projected_edges import circles
-from planner.imaging.appearance import floor_material, signal
+from imaging.features.projected_edges import circles
+from imaging.light.appearance import floor_material, signal
+from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides
 from scenes import Material, Scene, Solid

@@ -18,13 +18,13 @@ from scipy.ndimage import map_coordinates
 from scipy.optimize import curve_fit
 from scipy.special import ndtr
 
+from imaging.geometry.projection import project
 from measure.bounds import corner_bound
 from measure.estimators.registry import ESTIMATORS
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
 from measure.measurement import separation
-from planner.imaging.projection import project
 from tests.oracle import polygon_image
 
 SHAPE = (112, 152)

@@ -5,9 +5,9 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from imaging import pictures
+from imaging.light.reflectance import beckmann
 from measure.features.lines import Lines
-from planner.imaging import pictures
-from planner.imaging.reflectance import beckmann
 from validation.hard import Answer, Case, Reference, fit_cases, planner_cases, precise, run
 from validation.hard.case import EPSILON
 from validation.hard.scenes_for import task1
@@ -85,8 +85,8 @@ def test_lengths_from_image_coordinates_fail_for_a_tiny_object(monkeypatch):
     case = planner_cases.variance("", task1(object={"size": [1.25e-8, 7.5e-9, 2.5e-9]}), (30, 135), (15, 315), "paper")
     assert run(case).verdict == "right"
     pictures._of_picture.cache_clear()  # what was projected before
-    outline = import_module("planner.features.projected_edges")
-    plain, known = outline.from_axis, import_module("planner.imaging.pictures")._of_picture
+    outline = import_module("imaging.features.projected_edges")
+    plain, known = outline.from_axis, import_module("imaging.pictures")._of_picture
     monkeypatch.setattr(outline, "from_axis", lambda *args: (plain(*args) + 127.5) - 127.5)
     known.cache_clear()  # edges are projected once a picture
     assert run(case).verdict == "WRONG"

@@ -15,11 +15,11 @@ import numpy as np
 import measure
 import render
 import scenes
+from imaging.contours import ellipse_of, image_conic
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import from_axis
 from measure.features.optics import Optics
 from measure.find.ellipse import find_ellipse
-from planner.imaging.lens import image_centre
-from planner.imaging.limbs import ellipse_of, image_conic
-from planner.imaging.projection import from_axis
 from scenes import Backlight, Picture, Scene
 
 MOST_SIGMA = 0.3

@@ -6,13 +6,13 @@ import re
 EQUIVALENT: dict[str, str] = {
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
     "measure/features/layout.py: middle = self.ends.reshape(- 2, 2).mean(0)": "numpy takes any negative size as open",
-    "planner/imaging/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
-    "planner/imaging/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
+    "imaging/geometry/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
+    "imaging/light/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
     "sensor.headroom(scene.noise):": "a shorter way to the same numbers is not taken",
     'render/build.py: "near_clip": 1e-3 / camera.distance,': "nothing stands so near to the sensor",
     "validation/statistics.py: pairs = np.stack([np.asarray(first, float), np.asarray(second, float)], axis=1)":
         "of two axes the second is the last",
-    "planner/imaging/quadrature.py: wanted = min(length, 99999.0) / blur + _MORE":
+    "imaging/blurred/quadrature.py: wanted = min(length, 99999.0) / blur + _MORE":
         "no piece in an image is so long",
     "measure/estimators/strip.py: blurs=(thin * nodes / sigma).sum(1)[:, None],":
         "a column of the least squares whose own coefficient nobody reads: its sign is free",

@@ -14,8 +14,8 @@ import measure
 import planner
 import render
 import scenes
+from imaging.geometry.projection import frame
 from measure.fitting.result import Fit
-from planner.imaging.projection import frame
 from scenes import Block, Picture, Pose, Scene
 
 _SHOTS = 200  # of a hidden scene, whose measured variance is set beside what the fitted scene predicts

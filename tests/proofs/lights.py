@@ -9,11 +9,11 @@ import numpy as np
 import typer
 
 import scenes
-from planner.imaging.appearance import seen_by_rays
-from planner.imaging.emitters import Emitter
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import frame
+from imaging.light.appearance import seen_by_rays
+from imaging.light.emitters import Emitter
+from imaging.pictures import Pictures
 from render import variant as variants
 from render.build import description
 from render.parts import Part

@@ -17,8 +17,8 @@ import measure
 import planner
 import render
 import scenes
-from planner.features.limbs import step_model_error
-from planner.features.measurand import measurands
+from imaging.features.limbs import step_model_error
+from imaging.features.measurand import measurands
 from scenes import InvalidInput, Light, Scene
 from tests.proofs import centres, silhouettes
 from validation.statistics import Verdict, verdict

@@ -35,7 +35,7 @@ from tests.proofs.reach import function, reached
 from tests.proofs.slips import SLIPS, places, slipped
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ("scenes", "planner", "measure", "render", "validation")
+SOURCES = ("scenes", "imaging", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
 DOCUMENTS = "tests/regression/test_documents.py"  # what all commands print
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.imaging.lens import image_centre
-from planner.imaging.limbs import limb
+from imaging.contours import limb
+from imaging.geometry.lens import image_centre
 from render import variant
 from render.build import view
 from render.curved import shape

@@ -11,8 +11,8 @@ from scipy import stats
 import measure
 import render
 import scenes
-from planner.imaging.pictures import Pictures
-from planner.models.texture import texture_errors
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
 from scenes import Picture, Scene
 
 

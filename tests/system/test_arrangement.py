@@ -7,12 +7,12 @@ import pytest
 
 import measure
 import planner
+from imaging.models.bound import Information, fisher, information, known
+from imaging.pictures import Pictures
 from measure.estimators.reach import NEAR, asked_of, model_within
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
-from planner.imaging.pictures import Pictures
-from planner.models.bound import Information, fisher, information, known
 from scenes import Picture, status
 from scenes.parts.block import Block
 from tests.oracle import block_image, polygon_image

@@ -8,10 +8,10 @@ import measure
 import planner
 import render
 import scenes
-from planner.imaging.appearance import seen_by_rays
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import frame
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import frame
+from imaging.light.appearance import seen_by_rays
+from imaging.pictures import Pictures
 from render import Quality, renderer
 from render.parts import parts
 from scenes import Backlight, Picture, Ring

@@ -163,7 +163,7 @@ def test_the_ellipses_own_centre_is_another_one(two_holes):
     scene, _ = two_holes
     steep = (60, 330)
     circle = scene.solid.circle(scene.quantities[0].features[0].circle)
-    from planner.imaging.projection import project
+    from imaging.geometry.projection import project
 
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)[:, None]
     rim = circle.centre + circle.radius * (np.cos(angle) * [1.0, 0, 0] + np.sin(angle) * [0, 1.0, 0])

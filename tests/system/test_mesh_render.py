@@ -5,7 +5,7 @@ import pytest
 
 import render
 import scenes
-from planner.imaging.projection import project
+from imaging.geometry.projection import project
 
 pytestmark = pytest.mark.render
 

@@ -7,7 +7,8 @@ import measure
 import planner
 import render
 import scenes
-from planner.imaging import reflectance, sensor
+from imaging import pictures, sensor
+from imaging.light import reflectance
 from scenes import Lens, Picture
 
 pytestmark = pytest.mark.render
@@ -23,7 +24,7 @@ def forget():
 
 
 def _forget():
-    planner.imaging.pictures._of_picture.cache_clear()
+    pictures._of_picture.cache_clear()
     measure.features.layout.layout_of.cache_clear()
 
 

@@ -18,8 +18,8 @@ import planner
 import render
 import scenes
 import validation
-from planner.imaging import lens as lenses
-from planner.imaging.visibility import seen
+from imaging.geometry import lens as lenses
+from imaging.geometry.visibility import seen
 from scenes import InvalidInput, Lens, Picture
 from scenes.load import BUNDLED
 from scenes.parts import mesh

@@ -32,7 +32,7 @@ def test_exact_poses_add_nothing(task1):
 
 def test_spread_is_that_of_sampled_poses(task1, rng):
     """Against distances projected from 4000 shaken poses: their variance within 10 % (4.5 sigma)."""
-    from planner.imaging.projection import project
+    from imaging.geometry.projection import project
     from render import shaken
 
     scene = task1.model_copy(update={"jitter": scenes.Jitter(sensor_deg=0.2)})

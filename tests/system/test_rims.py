@@ -9,9 +9,9 @@ import measure
 import planner
 import render
 import scenes
+from imaging.features import rim_look
+from imaging.pictures import Pictures
 from measure.features import rims
-from planner.features import rim_look
-from planner.imaging.pictures import Pictures
 from tests.parts import Hole, prism, unevenly
 
 pytestmark = pytest.mark.render

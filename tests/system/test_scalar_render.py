@@ -11,10 +11,10 @@ from scipy.ndimage import maximum_filter, minimum_filter
 import measure
 import render
 import scenes
+from imaging.light.irradiance import bands
+from imaging.light.reflectance import reflected
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from planner.imaging.irradiance import bands
-from planner.imaging.reflectance import reflected
 from render import build, mosaic, variant
 from render.adaptive import crossed
 from render.parts import Part

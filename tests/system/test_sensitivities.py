@@ -9,12 +9,12 @@ import pytest
 
 import measure
 import scenes
+from imaging.pictures import Pictures
 from measure.believed import believed
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import sources
 from planner.budgeting.station import Station
-from planner.imaging.pictures import Pictures
 from validation.stations import clean_image
 
 _BENT = "camera.lens.distortion[0]"

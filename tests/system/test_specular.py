@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from planner.imaging.irradiance import bands
-from planner.imaging.reflectance import reflected
+from imaging.light.irradiance import bands
+from imaging.light.reflectance import reflected
 from render import bsdf, variant
 from render.lights import lamps
 from render.parts import Part

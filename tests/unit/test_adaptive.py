@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.features.projected_edges import circles
+from imaging.features.projected_edges import circles
 from render.adaptive import crossed, near_edges
 from render.large import near_required
 from scenes import Picture, Pose

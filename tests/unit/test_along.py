@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from imaging.features.measurand import measurands, normals
+from imaging.geometry.lens import recorded
+from imaging.models.along import place_nodes, used_trims
 from planner import Pictures
-from planner.features.measurand import measurands, normals
-from planner.imaging.lens import recorded
-from planner.models.along import place_nodes, used_trims
 from scenes import Lens
 
 SENSORS, LIGHTS = np.array([[30.0, 135.0], [50.0, 60.0]]), np.array([[15.0, 315.0], [30.0, 200.0]])

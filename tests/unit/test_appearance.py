@@ -6,7 +6,8 @@ import pytest
 import planner
 import render
 import scenes
-from planner.imaging.appearance import (
+from imaging.geometry.projection import edge_points
+from imaging.light.appearance import (
     _on_floor,
     behind,
     edge_contrast,
@@ -15,8 +16,7 @@ from planner.imaging.appearance import (
     side_signals,
     signal,
 )
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points
+from imaging.pictures import Pictures
 from scenes import Floor, Noise, Obstacle, Picture
 from tests.oracle import axes
 

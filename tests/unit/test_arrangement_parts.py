@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from imaging.sensor import Levels, squared_errors
 from measure.estimators.arrangement import ArrangementEstimator, _chi_square
 from measure.estimators.ellipse import _Linear, _with_axes, free_parameters
 from measure.estimators.expansion import ROWS, Pieces, _vertex_steps
@@ -15,7 +16,6 @@ from measure.features.arranged import _seen
 from measure.features.blurred_ellipse import from_symmetric, to_symmetric
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
-from planner.imaging.sensor import Levels, squared_errors
 from scenes import Noise
 from tests.oracle import polygon_image
 

@@ -7,10 +7,10 @@ from scipy.optimize import brentq
 
 import planner
 import scenes
-from planner.features.sampling import sampled_line
-from planner.imaging.blurred_segment import Segments, second_and_third
-from planner.imaging.pictures import Pictures
-from planner.models.bias import bias, cluttered
+from imaging.blurred.segment import Segments, second_and_third
+from imaging.features.sampling import sampled_line
+from imaging.models.bias import bias, cluttered
+from imaging.pictures import Pictures
 from tests.oracle import polygon_image
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.imaging.arrangement import arrangement_of, polygon_arrangement
-from planner.imaging.blurred import BlurredModel
-from planner.imaging.pictures import Pictures
+from imaging.blurred.arrangement import arrangement_of, polygon_arrangement
+from imaging.blurred.model import BlurredModel
+from imaging.pictures import Pictures
 from scenes import Picture
 from tests.oracle import block_image, polygon_image
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from imaging.features.locator import information_bound, kappa2
 from measure.calibration import RATIOS, _curve, _lines, _points, _square, blur_for
 from measure.features.layout import polygon_layout
-from planner.features.locator import information_bound, kappa2
 from tests.oracle import polygon_image
 
 

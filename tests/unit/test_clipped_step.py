@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from planner.imaging.clipped_step import clipped
+from imaging.blurred.clipped_step import clipped
 from scenes import Noise
 
 NOISE = Noise(sigma=2.0, dark_level=20.0, bits=8)

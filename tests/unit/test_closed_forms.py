@@ -13,12 +13,12 @@ from scipy import stats
 import planner
 import render
 import scenes
+from imaging.light.bore import _form_factors, bores
+from imaging.light.emitters import nodes
+from imaging.light.revolved import rings_of
+from imaging.models import bias
 from measure.estimators.profile import profile_kernel, top_kernel
 from planner.combining import combined
-from planner.imaging.bore import _form_factors, bores
-from planner.imaging.emitters import nodes
-from planner.imaging.revolved import rings_of
-from planner.models import bias
 from planner.search.aim import Aim
 from planner.search.separable import separable
 from render import curved, lights

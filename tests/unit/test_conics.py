@@ -6,11 +6,11 @@ from scipy.optimize import least_squares
 
 import planner
 import scenes
-from planner.features.circles import fisher_circle, rim
-from planner.features.seen import plane_axes
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project
-from planner.models.paper import PAPER_KAPPA2, paper
+from imaging.features.circles import fisher_circle, rim
+from imaging.features.seen import plane_axes
+from imaging.geometry.projection import project
+from imaging.models.paper import PAPER_KAPPA2, paper
+from imaging.pictures import Pictures
 
 SENSOR = np.array([40.0, 30.0])
 COUNT = 1500

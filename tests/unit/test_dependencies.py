@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("scenes", "planner", "render", "measure", "validation")
+OURS = ("scenes", "imaging", "planner", "render", "measure", "validation")
 CHECK = {"ice_vision"}  # the module beside them
 OPTIONAL = {
     "distributed": "dask",

@@ -5,8 +5,8 @@ import pytest
 from scipy import integrate
 
 import scenes
-from planner.imaging.emitters import ERROR, emitters, nodes
-from planner.imaging.irradiance import beam
+from imaging.light.emitters import ERROR, emitters, nodes
+from imaging.light.irradiance import beam
 from scenes import Backlight, Bar, Disc, Dome, Light, Pose, Ring, as_point
 from tests.oracle import axes
 

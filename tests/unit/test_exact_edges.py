@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from imaging.geometry.segments import distance_to_segment
 from measure.estimators.registry import estimator
 from measure.estimators.strip import _strip
 from measure.features.calipers import edge_calipers
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
-from planner.imaging.segments import distance_to_segment
 from tests.oracle import polygon_image
 
 SHAPE, BLUR, CONTRAST = (120, 130), 0.7, 100.0

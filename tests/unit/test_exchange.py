@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.imaging.bore import _form_factors
-from planner.imaging.exchange import Patches, form_factors
+from imaging.light.bore import _form_factors
+from imaging.light.exchange import Patches, form_factors
 
 
 @pytest.mark.parametrize("deep", [0.5, 2.0, 4.0])
@@ -40,8 +40,8 @@ def test_plates_at_a_right_angle():
 
 
 def test_a_convex_body_has_none():
-    from planner.imaging.between import light_between
-    from planner.imaging.pictures import Pictures
+    from imaging.light.between import light_between
+    from imaging.pictures import Pictures
 
     pictures = Pictures.of(scenes.load("task1"), (30, 135), (15, 315))
     assert light_between(pictures, np.zeros((3, 3)), np.zeros(3, int)) == 0

@@ -15,8 +15,8 @@ from yarl import URL
 
 import planner
 import scenes
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose
 from scenes.status import MEANINGS
 from validation.batch.work import Chunk, Clean, Found, Packed

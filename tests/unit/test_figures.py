@@ -10,7 +10,7 @@ from matplotlib.text import Text
 
 import measure
 import planner
-from planner.imaging.projection import project
+from imaging.geometry.projection import project
 from tests.oracle import polygon_image
 from validation.report.canvas import WIDTH
 from validation.report.figures import edge_pixels

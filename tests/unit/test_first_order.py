@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.models.along import NODES, Nodes
-from planner.models.calibrated import _double_integral, _first_order, line_slope, line_weight, long_edge
+from imaging.models.along import NODES, Nodes
+from imaging.models.calibrated import _double_integral, _first_order, line_slope, line_weight, long_edge
 
 
 def nodes(length, middle):

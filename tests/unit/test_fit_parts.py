@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import planner
+from imaging.blurred.whole import signal_at
 from measure.fitting.fit import fit
 from measure.fitting.goodness import p_value, parts
 from measure.fitting.likelihood import Problem
@@ -138,7 +139,7 @@ def test_values_beyond_the_pole_are_told_as_usual(small):
     there, _ = parameters.settled(values, np.eye(values.size))
     pose = {name: there[parameters.names.index(name)] for name in ("sensor.polar", "sensor.azimuth", "camera.roll_deg")}
     assert pose == {"sensor.polar": 2.0, "sensor.azimuth": 300.0, "camera.roll_deg": -180.0}
-    images = [planner.imaging.whole.signal_at(parameters.pictures_at(v, 0), *np.indices((100, 100)).reshape(2, -1))
+    images = [signal_at(parameters.pictures_at(v, 0), *np.indices((100, 100)).reshape(2, -1))
               for v in (values, there)]  # fmt: skip
     np.testing.assert_allclose(*images, atol=1e-6)
 

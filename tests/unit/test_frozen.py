@@ -21,7 +21,7 @@ def thawed(text):
     return found
 
 
-@pytest.mark.parametrize("package", ["scenes", "planner", "render", "measure", "validation"])
+@pytest.mark.parametrize("package", ["scenes", "imaging", "planner", "render", "measure", "validation"])
 def test_dataclasses_are_frozen(package):
     for path in (ROOT / package).rglob("*.py"):
         names = thawed(path.read_text(encoding="utf-8"))

@@ -5,10 +5,10 @@ import pytest
 
 import planner
 import scenes
-from planner.imaging.appearance import is_separable, signal
-from planner.imaging.irradiance import bands, electric_field
-from planner.imaging.pictures import Pictures
-from planner.imaging.reflectance import Index, beckmann, fresnel, reflected
+from imaging.light.appearance import is_separable, signal
+from imaging.light.irradiance import bands, electric_field
+from imaging.light.reflectance import Index, beckmann, fresnel, reflected
+from imaging.pictures import Pictures
 from scenes import Material
 from tests import textbook
 from tests.textbook import mp

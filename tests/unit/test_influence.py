@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from render.phenomena.base import SAFETY, Influence, Tolerance, largest
 from render.phenomena.edges import sides
 from render.phenomena.register import REGISTER

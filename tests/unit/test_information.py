@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from imaging.blurred.arrangement import arrangement_of
+from imaging.blurred.model import BlurredModel
+from imaging.features.measurand import measurands
+from imaging.geometry.projection import direction
+from imaging.models.bound import bound, information, known, line_rows
 from planner import Pictures
-from planner.features.measurand import measurands
-from planner.imaging.arrangement import arrangement_of
-from planner.imaging.blurred import BlurredModel
-from planner.imaging.projection import direction
-from planner.models.bound import bound, information, known, line_rows
 from planner.search.robustness import Tolerances, _with_pose_errors, altered
 from scenes import InvalidInput
 

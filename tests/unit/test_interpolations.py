@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.imaging.boundaries import _SUPPORT, _interpolation
+from imaging.blurred.boundaries import _SUPPORT, _interpolation
 from planner.search.separable import _DEGREE, _influence, _lagrange, _nodes
 
 

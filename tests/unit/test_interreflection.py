@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.imaging.pictures import Pictures
+from imaging.pictures import Pictures
 from render.phenomena import transport
 from render.phenomena.register import REGISTER
 from render.phenomena.transport import _above_floor, _clearance, _form_factor, _gain, _hides, albedo

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.features.kinds import in_image, on_plane
-from planner.features.measurand import dense, measurands
-from planner.imaging.lens import image_centre
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project, project_ideal
+from imaging.features.kinds import in_image, on_plane
+from imaging.features.measurand import dense, measurands
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import project, project_ideal
+from imaging.pictures import Pictures
 
 SENSOR = np.array([35.0, 70.0])
 CORNER, FAR = {"vertex": "corner", "edges": ["e8", "e11"]}, {"vertex": "far", "edges": ["e4", "e5"]}

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.imaging.lens import image_centre, lens_jacobian, recorded, undistorted
-from planner.imaging.projection import jacobian, project
+from imaging.geometry.lens import image_centre, lens_jacobian, recorded, undistorted
+from imaging.geometry.projection import jacobian, project
 from scenes import Lens
 from tests.oracle import pinhole
 

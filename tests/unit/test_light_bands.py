@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.imaging.emitters import Emitter
-from planner.imaging.irradiance import bands, beam, electric_field, squared_distance
+from imaging.light.emitters import Emitter
+from imaging.light.irradiance import bands, beam, electric_field, squared_distance
 from scenes import Light, Material
 from tests.oracle import axes
 

@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 import scenes
-from planner.features.limb_outline import limb_outline
-from planner.features.limbs import limb_rim
-from planner.features.measurand import measurands
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import sensor_position
-from planner.jitter import _half_angle
+from imaging.features.limb_outline import limb_outline
+from imaging.features.limbs import limb_rim
+from imaging.features.measurand import measurands
+from imaging.geometry.projection import sensor_position
+from imaging.pictures import Pictures
+from imaging.pose_scatter import _half_angle
 from render import Quality
 from scenes import Ball, InvalidInput, Turned
 from tests.proofs.centres import centre_at, scene_beside

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from planner.features.limb_locator import limb_crossing
-from planner.features.locator import edge_blur, kappa2
-from planner.imaging.limbs import limb
-from planner.imaging.limbs.shading import Lamps, Profile, levels_inside, limb_profile, sampled_profile
+from imaging.contours import limb
+from imaging.contours.shading import Lamps, Profile, levels_inside, limb_profile, sampled_profile
+from imaging.features.limb_locator import limb_crossing
+from imaging.features.locator import edge_blur, kappa2
 from scenes.parts.surfaces import Cylinder, Sphere
 from tests.curved import SURFACES
 from tests.unit.test_limbs import CAMERA, POSES, SOLID

@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from planner.imaging.limbs import contour, ellipse_of, image_conic, limb
-from planner.imaging.projection import frame, from_axis, sensor_position
+from imaging.contours import contour, ellipse_of, image_conic, limb
+from imaging.geometry.projection import frame, from_axis, sensor_position
 from scenes import Camera, InvalidInput
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Surface, Torus
 from tests.curved import SURFACES, changed

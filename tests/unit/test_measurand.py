@@ -5,13 +5,13 @@ import pytest
 
 import planner
 import scenes
-from planner.features.measurand import measurand, required_edges
-from planner.features.projected_edges import projected_edges
-from planner.imaging.appearance import paper_contrast2
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, jacobian, project
-from planner.imaging.visibility import visible_spans
-from planner.models.paper import paper
+from imaging.features.measurand import measurand, required_edges
+from imaging.features.projected_edges import projected_edges
+from imaging.geometry.projection import edge_points, jacobian, project
+from imaging.geometry.visibility import visible_spans
+from imaging.light.appearance import paper_contrast2
+from imaging.models.paper import paper
+from imaging.pictures import Pictures
 from scenes import InvalidInput
 
 SENSOR, LIGHT = np.array([35.0, 70.0]), np.array([20.0, 200.0])

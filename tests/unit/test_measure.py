@@ -5,13 +5,13 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import measure
+from imaging.geometry.projection import project
 from measure.estimators.thinning import Thinned
 from measure.features.corners import intersect, line_equations
 from measure.features.layout import layout_of
 from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from measure.features.shape import prepared
-from planner.imaging.projection import project
 from scenes import InvalidInput, Noise, Picture, status
 from tests.oracle import polygon_image
 

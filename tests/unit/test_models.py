@@ -7,12 +7,12 @@ import pytest
 
 import planner
 import scenes
-from planner.features.locator import correlation, kappa2
-from planner.features.projected_edges import projected_edges
-from planner.features.propagation import corner_covariance
-from planner.imaging.appearance import side_signals
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, project
+from imaging.features.locator import correlation, kappa2
+from imaging.features.projected_edges import projected_edges
+from imaging.features.propagation import corner_covariance
+from imaging.geometry.projection import edge_points, project
+from imaging.light.appearance import side_signals
+from imaging.pictures import Pictures
 from scenes import InvalidInput
 from tests.oracle import axes
 

@@ -9,7 +9,7 @@ import pytest
 import ice_vision
 import scenes
 
-PACKAGES = ("scenes", "planner", "render", "measure", "validation")
+PACKAGES = ("scenes", "imaging", "planner", "render", "measure", "validation")
 ROOT = Path(scenes.__file__).parents[1]
 
 

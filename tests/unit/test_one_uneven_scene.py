@@ -12,11 +12,11 @@ import measure
 import planner
 import render
 import scenes
+from imaging.geometry.lens import blur_at, recorded, undistorted
+from imaging.geometry.projection import edge_points, project
+from imaging.light.appearance import edge_contrast, side_signals
+from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
-from planner.imaging.appearance import edge_contrast, side_signals
-from planner.imaging.lens import blur_at, recorded, undistorted
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import edge_points, project
 from tests.oracle import axes, torrance_sparrow
 
 FULL = 1023  # of ten bits

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from planner.imaging.lens import recorded, undistorted
+from imaging.geometry.lens import recorded, undistorted
 from render.optics import blur_and_bin, distort
 from scenes import Camera, Lens
 

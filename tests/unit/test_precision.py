@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import planner
-from planner.features.propagation import corner_covariance
-from planner.imaging.pictures import Pictures
-from planner.models.paper import paper
+from imaging.features.propagation import corner_covariance
+from imaging.models.paper import paper
+from imaging.pictures import Pictures
 from planner.search.viewing import ViewingSpace
 
 mp.mp.dps = 50

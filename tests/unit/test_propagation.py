@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import planner
+from imaging.features.propagation import corner_covariance
+from imaging.models.paper import paper
+from imaging.pictures import Pictures
 from measure.features.calipers import Caliper
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.lines import fit_lines, regression
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
-from planner.features.propagation import corner_covariance
-from planner.imaging.pictures import Pictures
-from planner.models.paper import paper
 from tests.scalar import weighted_points
 
 SENSOR, LIGHT = (30.0, 135.0), (15.0, 315.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from planner.imaging.kernels import Kernels, Scatter
-from planner.imaging.quadrature import Nodes, rule
+from imaging.blurred.kernels import Kernels, Scatter
+from imaging.blurred.quadrature import Nodes, rule
 
 
 @pytest.mark.parametrize("length", [0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 400.0, 2000.0])

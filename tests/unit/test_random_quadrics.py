@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from planner.imaging.limbs import image_conic, limb
-from planner.imaging.projection import sensor_position
+from imaging.contours import image_conic, limb
+from imaging.geometry.projection import sensor_position
 from scenes.parts.surfaces import Quadric
 from tests.unit.test_limbs import CAMERA, lines
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.imaging import rays as rays_module
-from planner.imaging.rays import _first, _may_meet, _plates, first_face
+from imaging.geometry import rays as rays_module
+from imaging.geometry.rays import _first, _may_meet, _plates, first_face
 
 
 def rays(kind, solid, rng, count):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.imaging import reflectance as module
-from planner.imaging.reflectance import NUMPY, Index, Ops, across, beckmann, brightness, diffuse, fresnel, reflected
+from imaging.light import reflectance as module
+from imaging.light.reflectance import NUMPY, Index, Ops, across, beckmann, brightness, diffuse, fresnel, reflected
 from scenes import Material
 from tests import textbook
 from tests.textbook import mp

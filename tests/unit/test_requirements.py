@@ -6,9 +6,9 @@ from scipy import stats
 
 import planner
 import scenes
-from planner.imaging.pictures import Pictures
-from planner.jitter import pose_scatter
-from planner.models.calibrated import calibrated
+from imaging.models.calibrated import calibrated
+from imaging.pictures import Pictures
+from imaging.pose_scatter import pose_scatter
 from planner.search.aim import Aim
 from planner.search.exhaustive import evaluate_pairs, exhaustive
 from planner.search.separable import separable
@@ -169,8 +169,8 @@ def test_pose_scatter_by_monte_carlo(rng):
     off = rng.standard_normal((count, 2)) * 0.05 / [1, np.sin(np.radians(40.0))]
     from dataclasses import replace
 
-    from planner.features.kinds import in_image, on_plane
-    from planner.features.measurand import measurands
+    from imaging.features.kinds import in_image, on_plane
+    from imaging.features.measurand import measurands
 
     there = measurands(Pictures.of(scene, at + off)).seen
     trusted = replace(there, sensors=np.broadcast_to(at, (count, 2)).copy(), expected=False)

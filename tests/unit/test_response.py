@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from planner.models.bound import response
+from imaging.models.bound import response
 from scenes import Noise
 
 

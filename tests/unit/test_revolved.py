@@ -5,12 +5,12 @@ import pytest
 from scipy.integrate import dblquad
 
 import scenes
-from planner.features.limb_lent import unlent
-from planner.features.limb_outline import limb_outline
-from planner.imaging import revolved
-from planner.imaging.pictures import Pictures
-from planner.imaging.rays import first_face
-from planner.imaging.revolved import light_around, passes, rings_of
+from imaging.features.limb_lent import unlent
+from imaging.features.limb_outline import limb_outline
+from imaging.geometry.rays import first_face
+from imaging.light import revolved
+from imaging.light.revolved import light_around, passes, rings_of
+from imaging.pictures import Pictures
 from scenes import Turned
 
 STEP = Turned(kind="turned", profile=[(0.0, 6.0), (20.0, 6.0), (20.0, 10.0), (30.0, 10.0)]).solid

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.features.circles import rim
-from planner.imaging.pictures import Pictures
+from imaging.features.circles import rim
+from imaging.pictures import Pictures
 from tests.oracle import pinhole
 
 POSES = [(30.0, 135.0), (10.0, 20.0), (50.0, 300.0)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import planner
-from planner.imaging.projection import camera_frame, frame, from_axis, light_position
+from imaging.geometry.projection import camera_frame, frame, from_axis, light_position
 from scenes import Ring
 
 POSE = np.array([40.0, 120.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.imaging.segments import distance_to_segment, pixels_along
+from imaging.geometry.segments import distance_to_segment, pixels_along
 
 
 @pytest.mark.parametrize(("point", "away"), [((5, 3), 3.0), ((-3, -4), 5.0), ((13, 4), 5.0), ((0, 0), 0.0)])

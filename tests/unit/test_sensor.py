@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import render
-from planner.imaging.sensor import full_scale, recorded, shot_noise, squared_errors
+from imaging.sensor import full_scale, recorded, shot_noise, squared_errors
 from scenes import InvalidInput, Noise
 
 

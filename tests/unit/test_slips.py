@@ -17,6 +17,15 @@ from scipy import stats
 import measure
 import planner
 import scenes
+from imaging.contours import contour, limb
+from imaging.features.circles import Rim, calibrated_circle
+from imaging.features.projected_edges import projected_edges
+from imaging.geometry.projection import direction, edge_points
+from imaging.light.appearance import edge_contrast, side_signals
+from imaging.light.emitters import GLANCE, emitters
+from imaging.light.exchange import exchanged
+from imaging.light.reflectance import diffuse
+from imaging.pictures import Pictures
 from measure.boards.fitting import fit_crossings
 from measure.boards.saddle import response
 from measure.boards.windows import Windows
@@ -27,15 +36,6 @@ from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
 from measure.photo import mtf as mtfs
 from measure.photo import recording
-from planner.features.circles import Rim, calibrated_circle
-from planner.features.projected_edges import projected_edges
-from planner.imaging.appearance import edge_contrast, side_signals
-from planner.imaging.emitters import GLANCE, emitters
-from planner.imaging.exchange import exchanged
-from planner.imaging.limbs import contour, limb
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import direction, edge_points
-from planner.imaging.reflectance import diffuse
 from planner.search import exhaustive, robustness
 from planner.search.aim import Aim
 from planner.search.refinement import shifted

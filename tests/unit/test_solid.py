@@ -9,9 +9,9 @@ import trimesh
 
 import planner
 import scenes
+from imaging.geometry.projection import direction
+from imaging.geometry.visibility import seen, turned, visible_spans
 from measure.features.layout import layout_of
-from planner.imaging.projection import direction
-from planner.imaging.visibility import seen, turned, visible_spans
 from scenes import InvalidInput
 from scenes.load import BUNDLED
 from scenes.parts import mesh

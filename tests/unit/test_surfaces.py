@@ -7,10 +7,10 @@ import trimesh
 import planner
 import render
 import scenes
-from planner.imaging.appearance import face_signal, is_separable, side_signals, whites
-from planner.imaging.between import light_between
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project
+from imaging.geometry.projection import project
+from imaging.light.appearance import face_signal, is_separable, side_signals, whites
+from imaging.light.between import light_between
+from imaging.pictures import Pictures
 from scenes import FaceMaterial, InvalidInput, Material, Picture
 from scenes.load import BUNDLED, from_document
 from scenes.parts.mesh import read

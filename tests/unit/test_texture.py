@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 import scenes
-from planner.imaging.reflectance import Index, reflected
+from imaging.light.reflectance import Index, reflected
 from render import texture
 from render.build import textured
 from scenes import Material, Picture, Pose

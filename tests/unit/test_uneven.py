@@ -12,12 +12,12 @@ import planner
 import render
 import scenes
 import validation
-from planner.features.measurand import measurands
-from planner.imaging.appearance import diffuse_signal, face_signal, is_separable
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import project
-from planner.imaging.sheets import sheets
-from planner.models.texture import texture_errors
+from imaging.features.measurand import measurands
+from imaging.geometry.projection import project
+from imaging.light.appearance import diffuse_signal, face_signal, is_separable
+from imaging.light.sheets import sheets
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
 from scenes import ImageTexture, InvalidInput, Picture, Setting, StatisticalTexture
 from scenes.load import BUNDLED
 from tests.proofs.uneven import shifts

@@ -7,9 +7,9 @@ import pytest
 
 import planner
 import scenes
-from planner.imaging.appearance import analyser_axis, of_sides, polarisation_axis, signal
-from planner.imaging.irradiance import bands
-from planner.imaging.pictures import Pictures
+from imaging.light.appearance import analyser_axis, of_sides, polarisation_axis, signal
+from imaging.light.irradiance import bands
+from imaging.pictures import Pictures
 from planner.prediction import variances
 from planner.search.choices import Choice, exposure_time, own_choice, throughput, with_choice
 from planner.search.descent import descend

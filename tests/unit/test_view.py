@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.imaging.projection import depth, direction, facing, frame, from_axis, project
+from imaging.geometry.projection import depth, direction, facing, frame, from_axis, project
 from tests.oracle import axes as axes_of
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import scenes
-from planner.features.projected_edges import projected_edges
-from planner.imaging.pictures import Pictures
-from planner.imaging.visibility import hidden_spans, longest_span, seen, visible_spans
-from planner.models.along import used_trims
+from imaging.features.projected_edges import projected_edges
+from imaging.geometry.visibility import hidden_spans, longest_span, seen, visible_spans
+from imaging.models.along import used_trims
+from imaging.pictures import Pictures
 from tests.oracle import axes
 
 

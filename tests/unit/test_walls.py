@@ -11,7 +11,7 @@ import trimesh
 
 import planner
 import scenes
-from planner.features.circles import Rim, calibrated_circle
+from imaging.features.circles import Rim, calibrated_circle
 from planner.search.refinement import refine, shifted
 from render.curved import stands_for
 from scenes import InvalidInput

@@ -73,7 +73,7 @@ def budget_command(
     check_directory("--out", out)
     poses = _poses(sensor, light)
     loaded = scenes.load(scene)
-    from planner.imaging.appearance import is_plain
+    from imaging.light.appearance import is_plain
     from validation import budgets
 
     picture = _picture(loaded, *poses)

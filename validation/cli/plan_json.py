@@ -18,7 +18,6 @@ def facts(
     found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path]
 ) -> dict:
     """The plan for JSON."""
-    import planner
 
     p = found.prediction
     return {
@@ -29,7 +28,7 @@ def facts(
         "light": scenes.pairs(found.light),
         "shares": found.shares,
         "alone": found.alone,
-        "edges": list(planner.edges_of(found.scene)),
+        "edges": list(found.scene.required),
         "over": found.over,
         "variance": found.variance,
         "limiting": found.limiting,

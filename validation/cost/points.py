@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.features.projected_edges import image_fractions, straight
-from planner.imaging.appearance import edge_contrast
-from planner.imaging.pictures import Pictures
+from imaging.features.projected_edges import image_fractions, straight
+from imaging.light.appearance import edge_contrast
+from imaging.pictures import Pictures
 from scenes import InvalidInput
 from validation.batch.campaign import Case
 from validation.cost.parameter import Fit, Parameter, slope

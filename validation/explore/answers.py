@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 import planner
-from planner.features.measurand import measurand
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.features.measurand import measurand
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.prediction import feature_covariances, glanced
 from scenes import InvalidInput, Scene
 from scenes.status import MEANINGS

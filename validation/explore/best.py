@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from planner.search.constraints import Constraints
 from planner.search.poses import by_light
 from planner.search.refinement import refine

@@ -9,11 +9,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from planner.features.projected_edges import projected_edges
-from planner.imaging.appearance import face_signal, seen_by_rays
-from planner.imaging.pictures import Pictures
-from planner.imaging.projection import depth, facing, frame, project
-from planner.imaging.sensor import full_scale
+from imaging.features.projected_edges import projected_edges
+from imaging.geometry.projection import depth, facing, frame, project
+from imaging.light.appearance import face_signal, seen_by_rays
+from imaging.pictures import Pictures
+from imaging.sensor import full_scale
 from planner.prediction import glanced
 from scenes import Picture, Scene
 from validation.explore.answers import Answer, finite

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Scene
 from validation.explore.state import SENSOR, State
 

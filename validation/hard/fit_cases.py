@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from imaging.features.propagation import corner_covariance
 from measure.features.calipers import Caliper
 from measure.features.conic import fit_ellipse
 from measure.features.corners import corner_response, intersect
@@ -13,7 +14,6 @@ from measure.features.lines import fit_lines, regression, trapezoid
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
-from planner.features.propagation import corner_covariance
 from validation.hard.case import Answer, Case, Reference
 
 

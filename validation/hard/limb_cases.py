@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.imaging.limbs import limb
+from imaging.contours import limb
 from scenes import Camera
 from scenes.parts.surfaces import Cone, Cylinder, Quadric, Sphere, Surface, Torus
 from validation.hard.case import Answer, Case, Reference

@@ -8,10 +8,10 @@ from functools import lru_cache, partial
 import numpy as np
 
 import measure
+from imaging.geometry.projection import project
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
-from planner.imaging.projection import project
 from scenes import InvalidInput, Scene
 from validation.hard.case import Answer, Case, Reference
 from validation.hard.polygon import polygon_image

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from planner.imaging.reflectance import Index, reflected
+from imaging.light.reflectance import Index, reflected
 from scenes import Material
 from validation.hard.case import Answer, Case, Reference
 

@@ -8,7 +8,7 @@ import numpy as np
 
 import measure
 import render
-from planner.imaging.projection import project
+from imaging.geometry.projection import project
 from render.renderer import Quality
 from scenes import InvalidInput, Scene
 from validation.hard.case import Answer, Case, Reference

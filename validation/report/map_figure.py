@@ -18,8 +18,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator
 
+from imaging.geometry.projection import direction
 from planner import Map, Plan
-from planner.imaging.projection import direction
 from scenes import Pose
 
 COLOURS = "viridis_r"  # lightness rises evenly, so that it is told apart in grey: the lighter, the more precise

@@ -10,13 +10,13 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from imaging.features.projected_edges import circles, projected_edges
+from imaging.geometry.lens import recorded
+from imaging.geometry.projection import facing, project
+from imaging.geometry.visibility import visible_spans
+from imaging.light.appearance import face_signal, is_separable
+from imaging.light.backlight import backlights
 from planner import Pictures, Plan, ViewingSpace, pose_map
-from planner.features.projected_edges import circles, projected_edges
-from planner.imaging.appearance import face_signal, is_separable
-from planner.imaging.backlight import backlights
-from planner.imaging.lens import recorded
-from planner.imaging.projection import facing, project
-from planner.imaging.visibility import visible_spans
 from scenes import Picture, Pose
 from validation.report.canvas import WIDTH, save
 from validation.report.map_figure import Chart, draw_map, draw_surface, short

@@ -31,7 +31,7 @@ def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust 
 
 def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
     """The best setting, what it gives, and what is known of it."""
-    p, edges = found.prediction, " ".join(planner.edges_of(found.scene))
+    p, edges = found.prediction, " ".join(found.scene.required)
     if len(p.measurands) > 1:
         return _head_of_several(found, edges, seconds)
     return (

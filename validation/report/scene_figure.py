@@ -10,9 +10,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from imaging.geometry.projection import facing, project
+from imaging.geometry.visibility import visible_spans
 from planner import Pictures
-from planner.imaging.projection import facing, project
-from planner.imaging.visibility import visible_spans
 from scenes import Circle, Edge, Pose, Scene
 from validation.report.canvas import WIDTH, save
 

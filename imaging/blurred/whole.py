@@ -1,0 +1,80 @@
+"""The whole picture without the renderer: one convex body before darkness, exactly blurred."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from imaging.blurred.arrangement import arrangement_of
+from imaging.blurred.model import BlurredModel
+from imaging.light.appearance import is_plain
+from imaging.pictures import Pictures
+from scenes import InvalidInput, Picture, Scene
+
+_NONE = np.empty(0, int)
+_AT_ONCE = 1 << 18  # pixels, which bounds the memory
+
+
+def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.ndarray:
+    """Noise-free grey levels, as `render.image` has them, from the image model alone.
+
+    Parameters
+    ----------
+    scene : Scene or Picture
+        One convex body before darkness, without textures.
+    sensor, light : Pose or pair of float
+        Degrees; left out for a picture.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        Darkness included, not cut off at the end of the scale.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene is another one, or it is not known where its lights stand.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> image(scenes.load("task1"), (30, 135), (15, 315)).shape
+    (240, 256)
+    """
+    picture = Picture.of(scene, sensor, light)
+    check_drawable(picture.scene)
+    if not picture.lights:
+        raise InvalidInput("light must be given, got none")
+    camera = picture.scene.camera
+    found = np.empty((camera.height, camera.width))
+    rows = max(_AT_ONCE // camera.width, 1)
+    for top in range(0, camera.height, rows):
+        y, x = np.mgrid[top : min(top + rows, camera.height), : camera.width]
+        found[top : top + rows] = signal_at(Pictures.of(picture), x.ravel(), y.ravel()).reshape(x.shape)
+    return found + picture.scene.noise.dark_level
+
+
+def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Signal above darkness at pixels (P,) of one picture, grey levels."""
+    arrangement = arrangement_of(pictures)
+    if not len(arrangement.pieces):  # no light falls on what is seen
+        return np.zeros(x.size)
+    model = BlurredModel(arrangement, x, y, _NONE)
+    return model.image(model.start())
+
+
+def check_drawable(scene: Scene) -> None:
+    """See that `image` knows such scenes.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    if not is_plain(scene):
+        raise InvalidInput(
+            "scene must be one convex body before darkness, got one in which things hide or shade others"
+        )
+    if scene.textures:
+        raise InvalidInput("scene must be without textures, got some")

@@ -1,0 +1,143 @@
+"""A circular edge as the sensor sees it, and how well the circle is found from its rim.
+
+The pose tells in which plane the circle lies, so its parameters are three: two shifts of its centre in that plane and
+the change of its radius. A point's residual is its distance from the rim's image along the normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imaging.features.locator import reach
+from imaging.features.rim_look import look
+from imaging.features.rim_sides import (
+    RIM_POINTS,
+    clearance,
+    contrast_along,
+    equal_angles,
+    outward_normals,
+    radials,
+    seen_along,
+    shading_shift,
+    steady,
+)
+from imaging.features.seen import plane_axes
+from imaging.pictures import Pictures
+from scenes import Circle
+
+LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of it is taken and its circle is `clutter`
+LEAST_SEEN = 0.1  # part of the rim that must have contrast
+
+
+@dataclass(frozen=True)
+class Rim:
+    """Points on the image of a circle, for settings of leading shape (...).
+
+    Attributes
+    ----------
+    design : ndarray, shape (..., n, p)
+        Derivative of each point's place along its normal by the circle's three parameters (`imaging.features.seen`;
+        a cone's four), px for the scene's unit.
+    arc : ndarray, shape (..., n)
+        Length of image that each point stands for, px.
+    squared : ndarray, shape (..., n)
+        Squared contrast, 0 at hidden points.
+    noise_variance : ndarray, shape (..., n), or float
+        Mean of both sides, grey levels^2.
+    clear : ndarray of bool, shape (..., n)
+        Whether what the locator finds there is known. In one picture `RimLook.good`; in many whether it is undisturbed:
+        the far rim of the wall beside, where the wall is seen, the straight edges around the circle's face, and jumps
+        of the contrast along the rim are `locator.reach` away.
+    """
+
+    design: np.ndarray
+    arc: np.ndarray
+    squared: np.ndarray
+    noise_variance: np.ndarray | float
+    clear: np.ndarray
+
+    @property
+    def crowded(self) -> np.ndarray:
+        """Whether so little of what is seen is undisturbed that all of it has to be taken, bool, shape (...)."""
+        seen = self.squared > 0
+        return (seen & self.clear).mean(-1) < LEAST_CLEAR * np.maximum(seen.mean(-1), LEAST_CLEAR)
+
+    @property
+    def counted(self) -> np.ndarray:
+        """Which points have any contrast."""
+        return self.squared > 0
+
+
+def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
+    """Sample a circular edge at equal angles.
+
+    One picture is looked at (`imaging.features.rim_look`), as a measurement does; of many the levels at the rim and
+    rules about what is near stand for that.
+    """
+    scene = pictures.scene
+    seen = look(pictures, circle) if fall_off and pictures.closely else None
+    angle = equal_angles(RIM_POINTS if seen is None else seen.shift.size)
+    one, two = plane_axes(circle.axis)
+    radial = radials(circle, angle)
+    normal, slope, speed = outward_normals(pictures, circle, angle)
+    across = np.einsum("...ni,...nij->...nj", normal, slope)
+    design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
+    arc, far = speed * 2 * np.pi / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
+    if seen is not None:
+        squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
+        return Rim(design, arc, squared, seen.noise_variance, seen.good)
+    squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
+    shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
+    clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
+    return Rim(design, arc, squared, noise, clear)
+
+
+def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
+    """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
+    information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
+    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 3
+    return _covariance(information, enough)
+
+
+def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
+    """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
+
+    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the
+    noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
+    edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
+    that is used; infinite where the pieces are so short that this would not be positive. Disturbed points and those of
+    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
+    """
+    taken = circle.clear | circle.crowded[..., None]
+    ratio = circle.squared / circle.noise_variance
+    used = taken & (ratio >= weakest)
+    ends = (used & ~np.roll(used, 1, -1)).astype(int) + (used & ~np.roll(used, -1, -1))
+    information, at_ends = (
+        np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
+        for weight in (circle.arc, ends)
+    )
+    scatter = 2 * np.sqrt(np.pi) * scale * information - 2 * scale**2 * at_ends
+    inverse = _covariance(information, (used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
+    good = np.isfinite(inverse).all((-1, -2))[..., None, None]
+    known = np.where(good, inverse, 0.0)
+    return np.where(good, kappa2 * known @ scatter @ known, inverse)
+
+
+def _positive(matrices: np.ndarray) -> np.ndarray:
+    """Which symmetric matrices (..., p, p) are positive definite by more than rounding, bool, shape (...)."""
+    size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=-2, axis2=-1), 0.0))
+    good = np.isfinite(matrices).all((-1, -2)) & (size > 0).all(-1)
+    size = np.where(good[..., None], size, 1.0)
+    scaled = np.where(good[..., None, None], matrices / (size[..., None] * size[..., None, :]), np.eye(size.shape[-1]))
+    return good & (np.linalg.eigvalsh(scaled)[..., 0] > 1e-10)
+
+
+def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:
+    """The inverse; infinite diagonal where singular."""
+    enough, same = enough & _positive(information), np.eye(information.shape[-1])
+    size = np.where(enough[..., None], np.sqrt(np.abs(np.diagonal(information, axis1=-2, axis2=-1))), 1.0)
+    scaled = np.where(enough[..., None, None], information / (size[..., None] * size[..., None, :]), same)
+    inverse = np.linalg.inv(scaled) / (size[..., None] * size[..., None, :])
+    return np.where(enough[..., None, None], inverse, np.diag(np.full(len(same), np.inf)))

@@ -1,0 +1,48 @@
+"""A limb as an outline that a round thing is found from, beside the rims of circles (`imaging.features.circles`).
+
+The sensor's distance is known, so a surface's parameters are three (`scenes.Curved.parameters`): where it is, two of
+them, and its radius; of a cone its half angle, too. Found at another distance, the same picture would mean another
+radius.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imaging.features.circles import Rim
+from imaging.features.limb_look import LimbLook, clear_of_others, limb_look
+from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, limb_outline
+from imaging.pictures import Pictures
+from scenes import Curved
+
+
+def limb_rim(pictures: Pictures, curved: Curved) -> Rim:
+    """Sample a limb at equal steps of its parameter; found once for each set of pictures."""
+    return pictures.once(("limb", curved.name), lambda: _limb_rim(pictures, curved))
+
+
+def _limb_rim(pictures: Pictures, curved: Curved) -> Rim:
+    outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
+    seen = limb_look(pictures, curved, outline)
+    clear = seen.good & clear_of_others(pictures, curved, outline, seen)
+    return rim_of(outline, seen, clear)
+
+
+def step_model_error(pictures: Pictures, curved: Curved) -> np.ndarray:
+    """What the p parameters would be off by if the limb of one picture were taken for a step, (p,).
+
+    By least squares, weighted as they are found; NaN where they are not.
+    """
+    outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
+    seen, each = limb_look(pictures, curved, outline), limb_rim(pictures, curved)
+    weight = np.where(each.clear, each.arc * each.squared / each.noise_variance, 0.0)
+    size = np.sqrt(weight @ each.design**2)
+    if not (size > 0).all():
+        return np.full(curved.count, np.nan)
+    root = np.sqrt(weight)
+    return np.linalg.lstsq(root[:, None] * each.design / size, root * seen.shift, rcond=None)[0] / size
+
+
+def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> Rim:
+    """As a circle's rim; places that are not there have no contrast."""
+    return Rim(np.nan_to_num(outline.design), np.nan_to_num(outline.arc), seen.squared, seen.noise_variance, clear)

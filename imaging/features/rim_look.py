@@ -1,0 +1,204 @@
+"""What the picture shows along a circular edge, and what it does to the zero crossings there: one picture, looked at.
+
+Rays across the rim tell its levels: the face, the wall with its facets, shadows and the light that it sends to itself,
+what is seen through the hole or past the rim, straight edges nearby. The zero crossing of the second derivative of that
+picture, blurred and smoothed, is where the locator will find the rim without noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imaging import sensor
+from imaging.features.locator import edge_blur
+from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
+from imaging.features.rim_sides import RIM_POINTS, equal_angles, outward_normals, radials
+from imaging.geometry.lens import image_centre, lens_jacobian
+from imaging.geometry.projection import camera_frame, from_axis
+from imaging.light.appearance import seen_by_rays
+from imaging.pictures import Pictures
+from scenes import Circle
+
+_BESIDE, _SHARES = np.array([-np.sqrt(3), 0.0, np.sqrt(3)]), np.array([1, 4, 1]) / 6  # Gauss-Hermite, tangentially
+_CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
+_SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
+_STEPS = 8  # of Newton's method
+_FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
+_STEEPER = 0.3  # by which the slope there may differ from a lone step's
+_ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
+_LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
+_AT = 1e-6  # of the way to the next place: there is the place itself
+_MOST = 4  # times `RIM_POINTS`
+_SPACING = 2.0  # smoothing scales between places, while there are not so many
+
+
+@dataclass(frozen=True)
+class RimLook:
+    """At equal angles of a circle in one picture.
+
+    Attributes
+    ----------
+    shift : ndarray, shape (n,)
+        How far outwards the crossing lies beside that of two even levels, ideal px; 0 where it is not to be trusted.
+    squared : ndarray, shape (n,)
+        Squared contrast that the slope at the crossing tells, grey levels^2.
+    noise_variance : ndarray, shape (n,)
+        Mean of both sides, grey levels^2.
+    good : ndarray of bool, shape (n,)
+        Where the shift can be trusted: the crossing is near, about as steep as a lone step's, and as its neighbours.
+    """
+
+    shift: np.ndarray
+    squared: np.ndarray
+    noise_variance: np.ndarray
+    good: np.ndarray
+
+    def at(self, angle: np.ndarray) -> RimLook:
+        """The same at other angles (m,), between the places; good where both neighbours are."""
+        count = self.shift.size
+        place = (angle / (2 * np.pi) * count - 0.5) % count
+        first, share = place.astype(int) % count, place - place.astype(int)
+        then = (first + 1) % count
+        told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
+        good = (self.good[first] | (share > 1 - _AT)) & (self.good[then] | (share < _AT))
+        return RimLook(*told, good)
+
+
+def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
+    """Number of places on a rim, about ``spacing`` px apart in one picture: `RIM_POINTS`, or 2 to ``most`` times it."""
+    places = circle.centre + circle.radius * radials(circle, equal_angles())
+    rim = from_axis(places, pictures.sensors, pictures.scene.camera)
+    length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()
+    return RIM_POINTS * int(np.clip(np.ceil(length / (spacing * RIM_POINTS)), 1, most))
+
+
+def look(pictures: Pictures, circle: Circle) -> RimLook:
+    """Look at a rim in one picture with its lights; once for each."""
+    return pictures.once(("look", circle.name), lambda: _look(pictures, circle))
+
+
+def _look(pictures: Pictures, circle: Circle) -> RimLook:
+    scene = pictures.scene
+    angle = equal_angles(places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
+    normals, width, where = _outline(pictures, circle, angle)
+    levels = _levels(pictures, circle, angle, normals, width, where)
+    alone = zero_of_steps(where, _SHARES)
+    crossing, slope = _zero(levels, where, alone)
+    sides = levels[:, 1, [_CELLS - 1, _CELLS]].T
+    noise = sensor.recorded(scene.noise, scene.noise.dark_level + sides).noise_variance
+    moved = (crossing - alone) * width
+    with np.errstate(divide="ignore", invalid="ignore"):
+        good = (np.abs(slope / (sides[1] - sides[0]) - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)
+    good &= sides.max(0) <= sensor.headroom(scene.noise)
+    good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
+    shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
+    noise = np.broadcast_to(noise, sides.shape).mean(0)
+    return RimLook(shift, np.nan_to_num(slope) ** 2, noise, good & _steady(moved, slope))
+
+
+def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:
+    """Whether places (n,) are like both neighbours, so that what lies between them is."""
+    size = np.abs(contrast)
+    onward = np.roll(size, -1)
+    with np.errstate(invalid="ignore"):
+        alike = np.abs(np.roll(shift, -1) - shift) <= _ROUGH
+        alike &= np.abs(onward - size) <= _JUMP * np.maximum(onward, size)
+    return alike & np.roll(alike, 1)
+
+
+def _outline(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals (n, 2), the smoothed edge's standard deviation (n,), ideal px, and the outline (n, J) in units of it."""
+    scene = pictures.scene
+    places, normals = _places(pictures, circle, angle), outward_normals(pictures, circle, angle)[0]
+    stretch = np.sqrt(np.abs(np.linalg.det(lens_jacobian(places + image_centre(scene.camera), scene.camera))))
+    width = np.hypot(scene.locator.scale_px, edge_blur(scene.camera.blur_px)) / stretch
+    where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE)
+    return normals, width, where / width[:, None]
+
+
+def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Image points (n, 2) of the mesh's rim from the image's middle, ideal px."""
+    spokes = radials(circle, angle) * (circle.radius * facets(pictures.scene.solid, circle, angle))[:, None]
+    return from_axis(circle.centre + spokes, pictures.sensors, pictures.scene.camera)
+
+
+def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) -> np.ndarray:
+    """Mean signal of the cells (n, J, 2 cells) on both sides of the outline, from the inside outwards.
+
+    One ray tells a cell, but several those beside the outline and those that differ from a neighbour: a wall may be
+    seen narrower than a cell.
+    """
+    places, tangents = _places(pictures, circle, angle), np.stack([-normals[:, 1], normals[:, 0]], -1)
+    lines = places[:, None] + width[:, None, None] * (
+        _BESIDE[:, None] * tangents[:, None] + where[..., None] * normals[:, None]
+    )
+
+    def seen(which: tuple[np.ndarray, ...], cells: np.ndarray) -> np.ndarray:
+        place, line = which
+        points = lines[place, line] + (width[place] * cells)[:, None] * normals[place]
+        levels = _looked_at(pictures, points)
+        return np.where(np.isfinite(points).all(-1), levels, np.nan)
+
+    middles = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
+    place, line, cell = np.indices((*where.shape, middles.size)).reshape(3, -1)
+    levels = seen((place, line), middles[cell]).reshape(*where.shape, -1)
+    uneven = _uneven(levels)
+    place, line, cell = (np.repeat(v, _SHARP) for v in np.nonzero(uneven))
+    offsets = _CELL * ((np.arange(_SHARP) + 0.5) / _SHARP - 0.5)
+    several = seen((place, line), middles[cell] + np.tile(offsets, uneven.sum()))
+    levels[uneven] = several.reshape(-1, _SHARP).mean(1)
+    return levels
+
+
+def _uneven(levels: np.ndarray) -> np.ndarray:
+    """Cells beside the outline, and such as differ from a neighbour on their side of it, bool (n, J, 2 cells)."""
+    found = np.zeros(levels.shape, bool)
+    found[..., [_CELLS - 1, _CELLS]] = True
+    limit = _EVEN * np.nanmax(levels, initial=0.0)
+    for side in (slice(0, _CELLS), slice(_CELLS, None)):
+        apart = np.abs(np.diff(levels[..., side])) > limit
+        found[..., side][..., 1:] |= apart
+        found[..., side][..., :-1] |= apart
+    return found
+
+
+def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
+    """Signal at image points (k, 2) from the image's middle, ideal px."""
+    axes = camera_frame(pictures.scene.camera, pictures.sensors)
+    rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points) @ np.stack([axes.right, axes.down])
+    return seen_by_rays(pictures, rays)
+
+
+def _zero(levels: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Zero crossing of the second derivative of levels (n, J, 2 cells) about steps at ``where`` (n, J), in standard
+    deviations, and the contrast of a lone step that has its slope there."""
+    found = start.copy()
+    for _ in range(_STEPS):
+        value, slope = _second(levels, where, found)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.where(slope != 0, value / slope, np.nan)
+        found = found - np.clip(step, -0.5, 0.5)
+    return found, -slope
+
+
+def _second(levels: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Second derivative of the blurred levels at ``at`` (n,) and its slope there, (n,), as of lone steps."""
+    away = where[..., None] + _CELL * np.arange(-_CELLS, _CELLS + 1) - at[:, None, None]
+    bell = np.exp(-(away**2) / 2)
+    first, second = -away * bell, (away**2 - 1) * bell  # of the bell, by the ends; both 0 at infinity
+    first[..., [0, -1]] = second[..., [0, -1]] = 0.0
+    value, slope = (np.einsum("j,njc,njc->n", _SHARES, levels, np.diff(v)) for v in (first, -second))
+    return value, slope
+
+
+def _steepest(levels, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """Whether no other crossing in the search window (n,) is nearly as steep, which noise would let win, (n,)."""
+    steps = np.linspace(-1, 1, _LOOKED)
+    told = np.stack([_second(levels, where, step * window)[0] for step in steps], 1) * np.sign(slope)[:, None]
+    left, right = told[:, :-1], told[:, 1:]
+    size = window * (steps[1] - steps[0])
+    fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)
+    others = np.abs((steps[:-1] + steps[1:]) / 2 * window[:, None] - crossing[:, None]) > size[:, None]
+    return (fall * others).max(1) <= _RIVAL * np.abs(slope)

@@ -1,0 +1,261 @@
+"""What lies beside a circular edge: levels on both sides, what disturbs a locator, and what shading does to it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from imaging.features.locator import edge_blur
+from imaging.features.seen import plane_axes
+from imaging.geometry.projection import from_axis, jacobian_ideal
+from imaging.geometry.rays import first_face
+from imaging.light.appearance import behind, face_signal, of_sides
+from imaging.pictures import Pictures
+from scenes import Circle, Solid
+
+RIM_POINTS = 64
+_JUMP = 0.2  # of the contrast between neighbouring places
+_MOST_SHIFT = 0.08  # px by shading: beyond, the wall is seen too flat for a first order
+_MOST_AWAY = 16  # places beyond which no jump is looked for
+_AT_ONCE = 1 << 17  # numbers
+_STEP = 0.25  # px that a slope is taken over
+
+
+def equal_angles(count: int = RIM_POINTS) -> np.ndarray:
+    """Angles all around a rim."""
+    return 2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Unit vectors from a circle's centre, shape (n, 3)."""
+    one, two = plane_axes(circle.axis)
+    return np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+
+
+def outward_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the rim's image: unit normals away from its middle (..., n, 2), the projection's derivative (..., n, 2, 3),
+    and image lengths for a radian (..., n), ideal px."""
+    one, two = plane_axes(circle.axis)
+    radial = radials(circle, angle)
+    slope = jacobian_ideal(circle.centre + circle.radius * radial, pictures.sensors, pictures.scene.camera)
+    step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
+    tangent = np.einsum("...nij,nj->...ni", slope, step)
+    speed = np.linalg.norm(tangent, axis=-1)
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1) / speed[..., None]
+    away = np.einsum("...ni,...nij,nj->...n", normal, slope, radial)
+    return np.where(away[..., None] < 0, -normal, normal), slope, speed
+
+
+def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """How far outwards shading moves the zero crossing along a rim, ideal px, shape (..., n); 0 where nothing is known.
+
+    S^2 (m_b - m_a) / (B - A), levels A inside and B outside and their slopes m per px outwards, S^2 the variance of the
+    smoothed edge. Along a wall that is seen at a slant the brightness changes across the rim as it does around it.
+    """
+    scene = pictures.scene
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    one, two = plane_axes(circle.axis)
+    along = np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one
+    normal, slope, _ = outward_normals(pictures, circle, angle)
+    sense = 1.0 if circle.hole else -1.0  # the face lies outside a hole, inside the end of a cylinder
+    face_step = _step_on(slope, along, radial, sense * _STEP * normal)
+    wall_step = _step_on(slope, along, np.broadcast_to(-circle.axis, radial.shape), -sense * _STEP * normal)
+    turned = angle + wall_step[..., 0] / circle.radius
+    spokes = np.cos(turned)[..., None] * one + np.sin(turned)[..., None] * two
+    face_at = points + face_step[..., :1] * along + face_step[..., 1:] * radial
+    wall_at = circle.centre + circle.radius * spokes - wall_step[..., 1:] * circle.axis
+    levels = _sides_at(pictures, circle, angle, True)
+    slopes = []
+    both = zip((levels[..., 0, :], levels[..., 1, :]), (face_at, wall_at), (circle.axis, -sense * spokes), strict=True)
+    for (level, at, facing), face in zip(both, sided(scene.solid, circle), strict=True):
+        there = face_signal(pictures, at, face, 1, normals=np.broadcast_to(facing, at.shape))
+        towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), pictures.sensor_at[..., None, :] - at)
+        slopes.append(np.where((level > 0) & (there > 0) & (towards > 0), (there - level) / _STEP, 0.0))
+    contrast = levels[..., 0, :] - levels[..., 1, :]  # face less wall; outside less inside, or the other way round
+    variance = scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = sense * variance * (slopes[0] + slopes[1]) / contrast
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _step_on(slope: np.ndarray, first: np.ndarray, second: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Steps (..., n, 2) along two directions (n, 3) of a surface that move the image by ``moved`` (..., n, 2), px."""
+    columns = np.stack([np.einsum("...nij,nj->...ni", slope, d) for d in (first, second)], -1)
+    (a, b), (c, d) = np.moveaxis(columns, (-2, -1), (0, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.moveaxis(moved, -1, 0)
+        steps = np.stack([d * x - b * y, a * y - c * x], -1) / (a * d - b * c)[..., None]
+    return np.where(np.isfinite(steps) & (np.abs(steps) < 1e9), steps, 0.0)
+
+
+def steady(squared: np.ndarray, shift: np.ndarray, arc: np.ndarray, far: float) -> np.ndarray:
+    """Whether a rim's squared contrast (..., n) is even within ``far`` px along it, bool, shape (..., n).
+
+    It jumps where a shadow or another edge meets the rim; where the wall turns away from the sensor, shading shifts the
+    edge (..., n) by more than a first order tells. ``arc`` (..., n) is the length that each place stands for, px.
+    """
+    contrast = np.sqrt(squared)
+    onward = np.roll(contrast, -1, -1)
+    jump = np.abs(onward - contrast) > _JUMP * np.maximum(onward, contrast)  # between a place and the next
+    bent = np.abs(shift) > _MOST_SHIFT
+    jump = jump | bent | np.roll(bent, -1, -1)
+    arc = np.broadcast_to(arc, jump.shape)
+    good, ahead, behind = ~(jump | np.roll(jump, 1, -1)), np.zeros(jump.shape), np.zeros(jump.shape)
+    for k in range(1, _MOST_AWAY):
+        ahead, behind = ahead + np.roll(arc, 1 - k, -1), behind + np.roll(arc, k - 1, -1)
+        if not ((ahead < far) | (behind < far)).any():
+            break
+        good &= ~(np.roll(jump, -k, -1) & (ahead < far)) & ~(np.roll(jump, k + 1, -1) & (behind < far))
+    return good
+
+
+def contrast_along(
+    pictures: Pictures, circle: Circle, angle: np.ndarray, *, fall_off: bool = True
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """Squared contrast at angles of a rim, 0 where it is hidden, and the noise's variance there."""
+    sides = _sides_at(pictures, circle, angle, fall_off)
+    if not fall_off:
+        return (sides[..., 0, :] - sides[..., 1, :]) ** 2, pictures.scene.noise.variance
+    return of_sides(pictures.scene, sides)
+
+
+def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees a rim at angles, whatever the light, bool, shape (..., n)."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    sensor_at = pictures.sensor_at[..., None, :]
+    turned = [
+        np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        for normal in (np.broadcast_to(circle.axis, points.shape), -radial if circle.hole else radial)
+    ]
+    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(pictures, circle, points), sensor_at)
+
+
+def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
+
+    Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the
+    sensor, beside the place or seen through the hole.
+    """
+    solid, radial = pictures.scene.solid, radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    there = _image(pictures, points)
+    nearest = np.full(there.shape[:-1], np.inf)
+    for other in solid.circles:
+        if _coaxial(circle, other):
+            spokes = radials(other, equal_angles())
+            far = other.centre + other.radius * spokes
+            wall = -spokes if other.hole else spokes
+            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
+            nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), turned))
+    ends = _image(pictures, _straight_around(solid, circle.face))
+    return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
+
+
+@lru_cache(maxsize=64)
+def _straight_around(solid: Solid, face: int) -> np.ndarray:
+    """Ends of the straight edges of a face, those of one after the other, shape (2 E, 3)."""
+    own = {name for rim in solid.circles for name in rim.edges}
+    ends = [edge.ends for edge in solid.edges if face in edge.faces and edge.name not in own]
+    return solid.vertices[np.array(ends, int).ravel()].reshape(-1, 3)
+
+
+def _image(pictures: Pictures, points: np.ndarray) -> np.ndarray:
+    return from_axis(points, pictures.sensors, pictures.scene.camera)
+
+
+def _coaxial(circle: Circle, other: Circle) -> bool:
+    """Whether another circle is the far rim of the same wall, or may be: on the same axis, about as wide."""
+    across = other.centre - circle.centre
+    along = across @ circle.axis
+    near = 1e-3 * circle.radius
+    return (
+        other is not circle
+        and other.hole == circle.hole
+        and abs(along) > near
+        and np.linalg.norm(across - along * circle.axis) < near
+        and abs(other.radius - circle.radius) < circle.radius / 2
+    )
+
+
+def to_curve(points: np.ndarray, curve: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
+    """Distance of points (..., n, 2) from the pieces between points (..., k, 2) of a curve, shape (..., n).
+
+    Of a closed one where ``shown`` (..., k) says which of its pieces count, each from its first point.
+    """
+    if shown is None:
+        return _to_pieces(points, curve[..., :-1, :], curve[..., 1:, :])
+    return _to_pieces(points, curve, np.roll(curve, -1, -2), shown)
+
+
+def _to_pieces(points: np.ndarray, start: np.ndarray, stop: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
+    """The same from straight pieces between points (..., k, 2), those that are shown; infinite without any."""
+    nearest = np.full(points.shape[:-1], np.inf)
+    pieces = start.shape[-2]
+    many = max(1, _AT_ONCE // max(points.size, 1))
+    for k in range(0, pieces, many):
+        a, b = (ends[..., None, k : k + many, :] for ends in (start, stop))
+        along, away = b - a, points[..., None, :] - a
+        size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
+        share = np.clip((away * along).sum(-1) / size, 0, 1)
+        apart = np.linalg.norm(away - share[..., None] * along, axis=-1)
+        if shown is not None:
+            apart = np.where(shown[..., None, k : k + many], apart, np.inf)
+        nearest = np.minimum(nearest, apart.min(-1))
+    return nearest
+
+
+def _probe(pictures: Pictures, circle: Circle, points: np.ndarray) -> np.ndarray:
+    """Places that stand for those of a rim where it is asked what they see: the mesh's facets reach into a hole."""
+    return circle.centre + (_narrowest(pictures.scene.solid, circle) if circle.hole else 1.0) * (points - circle.centre)
+
+
+@lru_cache(maxsize=64)
+def _narrowest(solid: Solid, circle: Circle) -> float:
+    """Radius of the widest circle free of the mesh's facets, over the circle's."""
+    middles = solid.vertices[[solid.edge(name).ends for name in circle.edges]].mean(1)
+    return float(np.linalg.norm(middles - circle.centre, axis=1).min() / circle.radius)
+
+
+def _sides_at(pictures: Pictures, circle: Circle, angle: np.ndarray, fall_off: bool) -> np.ndarray:
+    """Signals of both sides at angles of a rim, as `_sides` gives them; made once."""
+    radial = radials(circle, angle)
+    points = circle.centre + circle.radius * radial
+    key = "sides", circle.name, angle.tobytes(), fall_off
+    return pictures.once(key, lambda: _sides(pictures, circle, points, radial, fall_off))
+
+
+def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
+    """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
+    bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
+    wall = -radial if circle.hole else radial
+    probe = _probe(pictures, circle, points)
+    lit = tuple(_free(bodies, probe, emitter.at[..., None, :]) for emitter in pictures.emitters)
+    sides = []
+    normals = np.broadcast_to(circle.axis, points.shape), wall
+    for face, normal in zip(sided(pictures.scene.solid, circle), normals, strict=True):
+        turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        sides.append((turned, face_signal(pictures, points, face, 1, lit, normals=normal, fall_off=fall_off)))
+    seen = _free(bodies, probe, sensor_at) & (sides[0][0] | sides[1][0])
+    levels = []
+    for turned, level in sides:
+        wanted = seen & ~turned
+        past = behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off)
+        levels.append(np.where(seen, np.where(wanted, past, level), 0.0))
+    return np.stack(np.broadcast_arrays(*levels), -2)
+
+
+def sided(solid: Solid, circle: Circle) -> tuple[int, int]:
+    """The plane face of a rim, and one of its wall, which is of one material all round."""
+    return circle.face, next(face for face in solid.edge(circle.edges[0]).faces if face != circle.face)
+
+
+def _free(bodies: Solid, probe, position) -> np.ndarray:
+    """Whether nothing stands between the rim's points and a position (..., 1, 3)."""
+    if bodies.is_convex:
+        return np.ones((*position.shape[:-2], len(probe)), bool)
+    vectors = probe - position
+    _, t = first_face(bodies, np.broadcast_to(position, vectors.shape), vectors, ())
+    return t > 1 - 1e-6

@@ -1,0 +1,67 @@
+"""What sampling by pixels does to an edge that lies nearly along their rows or columns.
+
+The locator sums over pixels where it should integrate. By Poisson's formula the sum is the integral and terms in which
+the image's spectrum is moved by 2 pi m, m a pair of integers. A straight edge has its spectrum on a line through the
+origin along its normal n, so only terms with n nearly along m matter: they move the crossing by a sine of the place's
+phase 2 pi m . p, which averages out along an edge that crosses many rows.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from imaging.features.locator import edge_blur
+
+_TABLE = np.linspace(-1, 1, 1025)  # cosine between n and m
+_ORDERS = np.array([[1, 0], [0, 1]])  # further terms are below 1e-9 px
+
+
+def sampled_line(middle, tangent, length, blur_px: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mean shift along the normal (-t_y, t_x), px, and its slope, of the line through the crossings of a lone edge.
+
+    Parameters
+    ----------
+    middle : ndarray, shape (..., 2)
+        Middle of the used part of the edge, px from the centre of a pixel.
+    tangent : ndarray, shape (..., 2)
+        Unit direction t.
+    length : ndarray, shape (...)
+        Of the used part, px.
+    blur_px, scale : float
+        Of the lens and of the locator, px.
+    """
+    phase = 2 * np.pi * middle @ _ORDERS.T
+    x = np.pi * length[..., None] * (tangent @ _ORDERS.T)
+    normal = np.stack([-tangent[..., 1], tangent[..., 0]], -1)
+    amplitude = np.interp(normal @ _ORDERS.T, _TABLE, _amplitudes(blur_px, scale))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lever = np.where(np.abs(x) < 1e-3, x / 3, (np.sin(x) - x * np.cos(x)) / x**2)
+    mean = (amplitude * np.sin(phase) * np.sinc(x / np.pi)).sum(-1)
+    return mean, (amplitude * np.cos(phase) * lever).sum(-1) * 6 / length
+
+
+def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px: float, scale: float) -> np.ndarray:
+    """Shift (...) along unit normals (..., 2), px, of a lone edge's crossing at places (..., 2), px."""
+    amplitude = np.interp(normals @ _ORDERS.T, _TABLE, _amplitudes(blur_px, scale))
+    return (amplitude * np.sin(2 * np.pi * places @ _ORDERS.T)).sum(-1)
+
+
+@lru_cache(maxsize=16)
+def _amplitudes(blur_px: float, scale: float) -> np.ndarray:
+    """Largest shift, px, of the crossing by one of `_ORDERS` for the cosines of `_TABLE`; its sine goes with the phase.
+
+    The step's spectrum is 1 / (i w) times that of the lens' blur and of the pixel's box; the locator's, at
+    k = w n + 2 pi m, is -(k . n)^2 exp(-s^2 k^2 / 2). The pole at w = 0 is left out evenly on both sides.
+    """
+    spacing = 0.2 / max(scale, 1.0)
+    w = spacing * (np.arange(int((2 * np.pi + 8 / scale) / spacing)) + 0.5)
+    w = np.concatenate([-w[::-1], w])
+    cosine = _TABLE[:, None]
+    box = np.sinc(w * cosine / (2 * np.pi)) * np.sinc(w * np.sqrt(1 - cosine**2) / (2 * np.pi))
+    k2 = w**2 + 4 * np.pi * w * cosine + 4 * np.pi**2
+    kernel = (w + 2 * np.pi * cosine) ** 2 * np.exp(-(scale**2) * k2 / 2)
+    total = -(np.exp(-((blur_px * w) ** 2) / 2) * box * kernel / w).sum(-1) * spacing / (2 * np.pi)
+    lone = np.sqrt(2 * np.pi) * np.hypot(scale, edge_blur(blur_px)) ** 3
+    return 2 * total * lone

@@ -1,0 +1,239 @@
+"""What is seen of the features - lines, corners, circles - in the image and, back-projected, on their planes.
+
+The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px)
+at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
+change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
+`Curved.parameters`, of a cone four. They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then the circles
+(`Seen.numbers`). Image coordinates are ideal px from the image's middle, in which lines are straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from imaging.geometry.projection import Frame, camera_frame, sensor_position
+from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
+from scenes.features import place_of, point_of
+
+Moves = Mapping[int, np.ndarray]
+"""Derivatives by some of the parameters, by their numbers; all others are 0."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point in the image (k = 2) or in space (k = 3), shape (..., k), with its derivatives (..., k)."""
+
+    at: np.ndarray
+    moves: Moves
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through two points, the edge's ends."""
+
+    start: Point
+    stop: Point
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen from sensors of leading shape (...) or found in as many images.
+
+    Attributes
+    ----------
+    solid : Solid
+    camera : Camera
+    sensors : ndarray, shape (..., 2)
+        Poses, degrees.
+    names : tuple of str
+        The E edges.
+    start, along : ndarray, shape (..., E, 2)
+        First end of each edge's line, px from the image's middle, and from there to its last end.
+    corners : dict
+        Image of each `Corner`, (..., 2), px from the image's middle.
+    circles : tuple of str
+        The C circles.
+    centres : ndarray, shape (..., C, 3)
+        Their centres.
+    radii, half_angles : ndarray, shape (..., C)
+        The latter, rad, of cones; else 0.
+    expected : bool
+        Whether this is the object itself, whose points need not be sought along the rays.
+    """
+
+    solid: Solid
+    camera: Camera
+    sensors: np.ndarray
+    names: tuple[str, ...]
+    start: np.ndarray
+    along: np.ndarray
+    corners: Mapping[Corner, np.ndarray]
+    circles: tuple[str, ...]
+    centres: np.ndarray
+    radii: np.ndarray
+    half_angles: np.ndarray
+    expected: bool
+
+    @property
+    def count(self) -> int:
+        """Number of parameters, q."""
+        return 2 * len(self.names) + sum(self.sizes)
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """How many parameters each circle has."""
+        each = (self.solid.round(name) for name in self.circles)
+        return tuple(one.count if isinstance(one, Curved) else 3 for one in each)
+
+    def numbers(self, c: int) -> slice:
+        """Which parameters are those of the c-th circle."""
+        first = 2 * len(self.names) + sum(self.sizes[:c])
+        return slice(first, first + self.sizes[c])
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Unit normal (-t_y, t_x) of each line, shape (..., E, 2)."""
+        return unit_normals(self.along)
+
+    @cached_property
+    def eye(self) -> np.ndarray:
+        """Where the sensors stand, shape (..., 3)."""
+        return sensor_position(self.camera, self.sensors)
+
+    @cached_property
+    def axes(self) -> Frame:
+        return camera_frame(self.camera, self.sensors)
+
+    def point(self, feature: Corner | Centre | Wall, plane: np.ndarray | None) -> Point:
+        """A corner or a centre: in the image, or on the plane of a unit normal (..., 3)."""
+        if isinstance(feature, Centre | Wall):
+            return self._centre(feature, plane is not None)
+        at, moves = self.corners[feature], self._corner_moves(feature)
+        found = Point(at, moves)
+        return found if plane is None else self.onto(found, plane, point_of(self.solid, feature))
+
+    def line(self, side: Side, plane: np.ndarray | None) -> Line:
+        """An edge's line: in the image, or on a plane."""
+        e = self.names.index(side.edge)
+        normal, along = self.normals[..., e, :], self.along[..., e, :]
+        length = np.linalg.norm(along, axis=-1)[..., None]
+        start = Point(self.start[..., e, :], {2 * e: normal})
+        stop = Point(start.at + along, {2 * e: normal, 2 * e + 1: normal * length})
+        if plane is None:
+            return Line(start, stop)
+        ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
+        return Line(*(self.onto(end, plane, place) for end, place in zip((start, stop), ends, strict=True)))
+
+    def middle(self, side: Side, plane: np.ndarray | None) -> Point:
+        """The place on an edge's line where the image of the edge's middle is expected."""
+        e = self.names.index(side.edge)
+        ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
+        depths = np.moveaxis(self._depth(ends), -1, 0)
+        share = (depths[1] / (depths[0] + depths[1]))[..., None]  # of the image's length, by perspective
+        normal, along = self.normals[..., e, :], self.along[..., e, :]
+        at = self.start[..., e, :] + share * along
+        moves = {2 * e: normal, 2 * e + 1: normal * share * np.linalg.norm(along, axis=-1)[..., None]}
+        found = Point(at, moves)
+        return found if plane is None else self.onto(found, plane, ends.mean(0))
+
+    def circle(self, feature: Centre | Wall) -> tuple[Circle | Curved, Point, np.ndarray, int]:
+        """A circle or a curved surface, its centre, its radius (...) and the number of that among the parameters."""
+        c = self.circles.index(place_of(feature))
+        circle, first = self.solid.round(place_of(feature)), self.numbers(c).start
+        moves = {first + i: axis for i, axis in enumerate(self.sideways(circle))}
+        return circle, Point(self.centres[..., c, :], moves), self.radii[..., c], first + 2
+
+    def half_angle(self, wall: Wall) -> tuple[np.ndarray, int]:
+        """Of a cone (...), rad, and its number among the parameters."""
+        c = self.circles.index(wall.surface)
+        return self.half_angles[..., c], self.numbers(c).start + 3
+
+    def sideways(self, each: Circle | Curved) -> tuple[np.ndarray, np.ndarray]:
+        """The two directions (..., 3) in which the centre of a circle or a curved surface is found."""
+        return each.sideways(self.eye) if isinstance(each, Curved) else plane_axes(each.axis)
+
+    def depth(self, places: np.ndarray) -> np.ndarray:
+        """Distance of places (..., 3) from the sensor along its axis, shape (...)."""
+        return np.einsum("...i,...i->...", places - self.eye, self.axes.forward)
+
+    def _depth(self, points: np.ndarray) -> np.ndarray:
+        """The same of points (n, 3), shape (..., n)."""
+        return np.einsum("...ni,...i->...n", points - self.eye[..., None, :], self.axes.forward)
+
+    def _centre(self, feature: Centre | Wall, in_space: bool) -> Point:
+        _, point, _, _ = self.circle(feature)
+        if in_space:
+            return point
+        axes, away = self.axes, point.at - self.eye
+        z = np.einsum("...i,...i->...", away, axes.forward)[..., None]
+        screen = np.stack([axes.right, axes.down], -2)
+        at = self.camera.focal_px * np.einsum("...ki,...i->...k", screen, away) / z
+        slope = (self.camera.focal_px * screen - at[..., None] * axes.forward[..., None, :]) / z[..., None]
+        return Point(at, {k: slope @ move for k, move in point.moves.items()})
+
+    def _corner_moves(self, corner: Corner) -> Moves:
+        """A corner moves by N^-1 (d1, d2), the rows of N being the two normals, d at the corner's own place."""
+        index = [self.names.index(name) for name in corner.edges]
+        response = corner_response(self.normals[..., index, :])
+        moves: dict[int, np.ndarray] = {}
+        for k, e in enumerate(index):
+            along = self.along[..., e, :]
+            away = self.corners[corner] - self.start[..., e, :]
+            lever = np.einsum("...i,...i->...", away, along) / np.linalg.norm(along, axis=-1)
+            moves[2 * e] = response[..., :, k]
+            moves[2 * e + 1] = response[..., :, k] * lever[..., None]
+        return moves
+
+    def onto(self, image: Point, plane: np.ndarray, place: np.ndarray) -> Point:
+        """Where the ray of an image point meets the plane of a unit normal through a place; moves go along."""
+        axes, focal, at = self.axes, self.camera.focal_px, image.at
+        if self.expected:
+            ray = place - self.eye
+        else:
+            toward = focal * axes.forward + at[..., :1] * axes.right + at[..., 1:] * axes.down
+            reach = np.einsum("...i,...i->...", plane, place - self.eye)
+            ray = toward * (reach / np.einsum("...i,...i->...", plane, toward))[..., None]
+        z = np.einsum("...i,...i->...", ray, axes.forward)[..., None]
+        through = np.einsum("...i,...i->...", plane, ray)[..., None]
+        columns = [
+            z / focal * (axis - ray * np.einsum("...i,...i->...", plane, axis)[..., None] / through)
+            for axis in (axes.right, axes.down)
+        ]
+        found = {k: columns[0] * move[..., :1] + columns[1] * move[..., 1:] for k, move in image.moves.items()}
+        return Point(np.broadcast_to(place, ray.shape) if self.expected else self.eye + ray, found)
+
+
+def unit_normals(along: np.ndarray) -> np.ndarray:
+    """Unit normals (-t_y, t_x) of lines that go (..., 2); NaN where they go nowhere."""
+    length = np.linalg.norm(along, axis=-1, keepdims=True)
+    direction = along / np.where(length > 0, length, np.nan)
+    return np.stack([-direction[..., 1], direction[..., 0]], -1)
+
+
+def corner_response(pair: np.ndarray) -> np.ndarray:
+    """Derivative of the crossing of two lines by their displacements: the inverse of their normals (..., 2, 2)."""
+    (a1, b1), (a2, b2) = (np.moveaxis(pair[..., k, :], -1, 0) for k in (0, 1))
+    rows = np.stack([np.stack([b2, -b1], -1), np.stack([-a2, a1], -1)], -2)
+    return rows / (a1 * b2 - a2 * b1)[..., None, None]
+
+
+def plane_axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two perpendicular unit vectors in the plane of a unit normal (3,)."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    one = np.cross(axis, helper)
+    one /= np.linalg.norm(one)
+    return one, np.cross(axis, one)
+
+
+def half_angle_of(each: Circle | Curved) -> float:
+    """Of a cone, rad; else 0."""
+    return each.half_angle if isinstance(each, Curved) else 0.0
+
+
+def feature_names(features: tuple) -> str:
+    """Names of features, for a message."""
+    return ", ".join(map(place_of, features))

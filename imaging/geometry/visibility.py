@@ -1,0 +1,194 @@
+"""Which parts of an edge a point in space can see: what the sensor sees, and what the light reaches.
+
+A triangle between a position s and an edge AB hides an interval of it. In the plane through s, A and B a point is
+s + a (A - s) + b (B - s); the ray from s through it meets AB at the fraction b / (a + b), and it lies before the edge
+where 0 < a + b < 1. So the interval is exact, and no ray has to be cast.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from imaging.geometry.projection import above
+from scenes import Edge, Solid
+
+_BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
+
+
+def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+    """Fractions (from, to) of an edge that are hidden from positions.
+
+    Parameters
+    ----------
+    solid : Solid
+    edge : Edge
+    positions : ndarray, shape (..., 3)
+        Where the sensor or the light stands, outside the solid.
+
+    Returns
+    -------
+    ndarray, shape (..., K, 2)
+        Fractions of the edge's length in space, rising and apart from each other; (1, 0) where a position has less than
+        K hidden pieces. K is 0 for a convex solid.
+    """
+    if solid.is_convex:
+        return np.empty((*positions.shape[:-1], 0, 2))
+    return _hidden(solid, edge, np.ascontiguousarray(positions).tobytes(), positions.shape)
+
+
+@lru_cache(maxsize=128)  # asked for several times of each set of pictures
+def _hidden(solid: Solid, edge: Edge, positions: bytes, shape: tuple[int, ...]) -> np.ndarray:
+    spans = _united(_by_triangle(solid, edge, np.frombuffer(positions).reshape(shape)))
+    spans.flags.writeable = False
+    return spans
+
+
+def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+    """The interval that each of those triangles hides which may hide any; from > to for none; shape (..., T, 2).
+
+    What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
+    """
+    towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
+    towards[list(edge.faces)] = False
+    triangles = solid.triangles[towards[solid.triangle_faces]]
+    start, stop = (solid.vertices[end] - positions for end in edge.ends)
+    normal = np.cross(start, stop)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
+    sides = _coordinates(triangles, positions, normal)
+    some = (sides.max(-1) >= 0) & (sides.min(-1) < 0)  # the others do not reach the plane of position and edge
+    some = some.any(tuple(range(some.ndim - 1)))
+    a, b = (
+        _coordinates(triangles[some], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start))
+    )
+    return _merge(*_crossings(a, b, sides[..., some, :]))
+
+
+def _coordinates(triangles: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Coordinates of the triangles' corners along an axis (..., 3) from the positions, shape (..., T, 3)."""
+    along = axis @ triangles.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
+    return along.reshape(*along.shape[:-1], len(triangles), 3)
+
+
+def _united(spans: np.ndarray) -> np.ndarray:
+    """Intervals (..., T, 2) as the fewest that cover the same, (..., K, 2)."""
+    shape, rows = spans.shape[:-2], spans.reshape(math.prod(spans.shape[:-2]), *spans.shape[-2:])
+    filled = rows[..., 0] < rows[..., 1]
+    rows, filled = rows[:, filled.any(0)], filled[:, filled.any(0)]
+    order = np.argsort(np.where(filled, rows[..., 0], np.inf), -1)
+    starts, stops, filled = (np.take_along_axis(v, order, -1) for v in (rows[..., 0], rows[..., 1], filled))
+    covered = np.maximum.accumulate(np.where(filled, stops, -np.inf), -1)
+    begins = filled.copy()
+    begins[:, 1:] &= starts[:, 1:] > covered[:, :-1] + _BEFORE
+    piece = np.cumsum(begins, -1) - 1
+    found = np.empty((len(rows), int(piece.max(initial=-1)) + 1, 2))
+    found[:] = 1.0, 0.0
+    row = np.broadcast_to(np.arange(len(rows))[:, None], filled.shape)
+    found[row[begins], piece[begins], 0] = starts[begins]
+    np.maximum.at(found[..., 1], (row[filled], piece[filled]), stops[filled])
+    return found.reshape(*shape, *found.shape[1:])
+
+
+def _crossings(a: np.ndarray, b: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the three sides of each triangle cross the plane: a, b and whether they do, each (..., T, 3)."""
+    onward = [np.roll(values, -1, -1) for values in (a, b, above)]
+    crosses = (above >= 0) != (onward[2] >= 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        f = np.where(crosses, above / (above - onward[2]), 0.0)
+    return a + f * (onward[0] - a), b + f * (onward[1] - b), crosses
+
+
+def _merge(a: np.ndarray, b: np.ndarray, crosses: np.ndarray) -> np.ndarray:
+    """The hidden interval from the two points in which a triangle's boundary crosses the plane."""
+    first = np.argmax(crosses, -1)[..., None]
+    last = 2 - np.argmax(crosses[..., ::-1], -1)[..., None]
+    a1, a2, b1, b2 = (np.take_along_axis(v, i, -1)[..., 0] for v in (a, b) for i in (first, last))
+    near, far = a1 + b1, a2 + b2
+    low, high = _BEFORE, 1 - _BEFORE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = far - near
+        enter, leave = (low - near) / slope, (high - near) / slope
+        flat = np.abs(slope) < 1e-12
+        f1 = np.where(flat, 0.0, np.clip(np.minimum(enter, leave), 0, 1))
+        f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), 0, 1))
+        middle = near + (f1 + f2) / 2 * slope
+        hit = crosses.any(-1) & (f2 > f1) & (middle > low) & (middle < high)
+        t1, t2 = ((b1 + f * (b2 - b1)) / (near + f * slope) for f in (f1, f2))
+    start, stop = np.fmin(t1, t2), np.fmax(t1, t2)
+    hit &= (stop > 0) & (start < 1) & (stop > start)
+    return np.stack([np.where(hit, start, 1.0), np.where(hit, stop, 0.0)], -1)
+
+
+def turned(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+    """Which of an edge's two faces the position looks at, just beside the edge; bool, shape (..., 2).
+
+    At an inner edge each face hides the other unless both are turned towards the position.
+    """
+    faces = list(edge.faces)
+    towards = above(positions, solid.normals[faces], solid.offsets[faces])
+    return towards if edge.convex else towards & towards.all(-1, keepdims=True)
+
+
+def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """Which points of an edge nothing hides from a position, whatever way the edge's own faces turn.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (..., 3)
+    fractions : ndarray, shape (n,) or (..., n)
+        Of the edge's length in space.
+
+    Returns
+    -------
+    ndarray of bool, shape (..., n)
+    """
+    shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
+    clear = np.ones(shape, bool)
+    for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
+        clear &= (fractions <= start[..., None]) | (fractions >= stop[..., None])
+    return clear
+
+
+def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[float, float]]:
+    """The parts of an edge that one position sees, as fractions (from, to) of its length in space.
+
+    Examples
+    --------
+    >>> from scenes import block
+    >>> visible_spans(block((1, 1, 1)), block((1, 1, 1)).edge("e4"), np.array([2.0, 2.0, 9.0]))
+    [(0.0, 1.0)]
+    """
+    if not turned(solid, edge, position).any():
+        return []
+    spans = hidden_spans(solid, edge, position)
+    free, at = [], 0.0
+    for start, stop in spans[spans[:, 0] < spans[:, 1]].tolist():
+        if start > at:
+            free.append((at, start))
+        at = stop
+    return free + [(at, 1.0)] if at < 1 else free
+
+
+def longest_span(solid: Solid, edge: Edge, positions: np.ndarray, *more: np.ndarray) -> np.ndarray:
+    """The longest part of an edge that nothing hides, (from, to) as fractions of its length in space, shape (..., 2).
+
+    ``more`` are further positions (broadcast) from which the part has to be free too: sensor, then light.
+    (0, 0) where nothing is left; the way the edge's own faces turn does not matter.
+    """
+    shape = np.broadcast_shapes(positions.shape, *(p.shape for p in more))[:-1]
+    whole = np.broadcast_to(np.array([0.0, 1.0]), (*shape, 2))
+    if solid.is_convex:
+        return whole
+    spans = [hidden_spans(solid, edge, p) for p in (positions, *more)]
+    spans = np.concatenate([np.broadcast_to(s, (*shape, *s.shape[-2:])) for s in spans], -2)
+    order = np.argsort(spans[..., 0], -1)[..., None]
+    spans = np.take_along_axis(spans, order, -2)
+    covered = np.maximum.accumulate(np.clip(spans[..., 1], 0, 1), -1) if spans.shape[-2] else spans[..., 1]
+    starts = np.concatenate([np.zeros((*shape, 1)), covered], -1)
+    stops = np.concatenate([np.clip(spans[..., 0], 0, 1), np.ones((*shape, 1))], -1)
+    best = np.argmax(stops - starts, -1)[..., None]
+    found = np.concatenate([np.take_along_axis(v, best, -1) for v in (starts, stops)], -1)
+    return np.where(found[..., :1] < found[..., 1:], found, 0.0)

@@ -1,0 +1,57 @@
+"""Light that surfaces of the object send to each other, in pictures that are looked at closely."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from imaging.light.bore import Bore, bores, light_in_bore, place_in
+from imaging.light.emitters import GLANCE, Emitter, emitters
+from imaging.light.exchange import Exchanged, exchanged
+from imaging.light.reflectance import diffuse
+from imaging.pictures import Pictures
+from scenes import Scene
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RectBivariateSpline
+
+
+def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
+    """Signal that points (..., 3) on faces (...) of the object have from its other faces.
+
+    Diffuse light alone; 0 on faces of obstacles, of turned parts, and in pictures that are not looked at closely.
+    """
+    scene = pictures.scene
+    if not pictures.closely or scene.solid.is_convex or scene.solid.curved or not points.size:
+        return 0.0
+    shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
+    shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
+    points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
+    lent = _of_faces(scene, shining)
+    found = np.zeros(shape) if lent is None else lent.at(points, faces)
+    for bore in bores(scene.solid):
+        inside = np.isin(faces, bore.faces)
+        if inside.any():
+            found[inside] = _of_wall(scene, shining, bore).ev(*place_in(bore, points[inside]))
+    analysed = scene.camera.analyser_deg is not None
+    white = np.array([diffuse(material, analysed) for material in scene.surfaces.materials])
+    return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
+
+
+def _plain(emitter: Emitter) -> Emitter:
+    """The emitter of one picture as a record that can be compared."""
+    at, axis = (None if v is None else tuple(v.reshape(-1, 3)[0].tolist()) for v in (emitter.at, emitter.axis))
+    return emitter._replace(at=at, axis=axis)
+
+
+def _of_faces(scene: Scene, shining: tuple[Emitter, ...]) -> Exchanged | None:
+    """Light between plane faces."""
+    return exchanged(scene, shining, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
+
+
+@lru_cache(maxsize=64)
+def _of_wall(scene: Scene, shining: tuple[Emitter, ...], bore: Bore) -> RectBivariateSpline:
+    """Light that a bore's wall has."""
+    return light_in_bore(scene, shining, bore, _of_faces(scene, shining))

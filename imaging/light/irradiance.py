@@ -1,0 +1,98 @@
+"""The light that arrives at points of the scene: its direction, its strength, its polarisation, its wavelengths.
+
+A new kind of light needs a class in `scenes.lights`, its nodes in `imaging.light.emitters`, and its description in
+`render.lights`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imaging.light.emitters import Emitter
+from imaging.light.reflectance import Index
+from scenes import Luminaire, Material, Scene
+
+
+class Beam(NamedTuple):
+    """Light that arrives at points from one direction.
+
+    Attributes
+    ----------
+    to_light : ndarray, shape (..., 3)
+        Unit vector towards where it comes from.
+    strength : ndarray, shape (...) or float
+        Irradiance across the beam over that at the reference point.
+    """
+
+    to_light: np.ndarray
+    strength: np.ndarray | float
+
+
+def beam(emitter: Emitter, points: np.ndarray, axes: int = 0, *, fall_off: bool = True) -> Beam:
+    """What an emitter sends to points (..., 3), cm; with ``fall_off`` by the inverse square.
+
+    ``axes`` is how many axes the points have of their own, behind those of the pictures.
+    """
+    away = widened(np.asarray(emitter.at), axes) - points
+    distance = np.linalg.norm(away, axis=-1)
+    to_light = away / distance[..., None]
+    strength = emitter.power / (distance if fall_off else emitter.distance) ** 2
+    if emitter.axis is not None:
+        strength = strength * np.maximum(-(to_light * widened(np.asarray(emitter.axis), axes)).sum(-1), 0.0)
+    return Beam(to_light, strength)
+
+
+def widened(values: np.ndarray, axes: int) -> np.ndarray:
+    """Vectors (..., 3) with some axes of length 1 before the last."""
+    return values.reshape(*values.shape[:-1], *[1] * axes, values.shape[-1])
+
+
+def squared_distance(starts: np.ndarray, stops: np.ndarray, fractions: np.ndarray, light_at: np.ndarray) -> np.ndarray:
+    """Squared distance of a light (..., 3) from points at fractions of the segments (E, 3), cm^2, shape (..., E, n)."""
+    along = stops - starts
+    start = (light_at**2).sum(-1, keepdims=True) - 2 * light_at @ starts.T + (starts**2).sum(-1)
+    slope = np.einsum("ei,ei->e", starts, along) - light_at @ along.T
+    return start[..., None] + fractions * (2 * slope[..., None] + fractions * (along**2).sum(-1)[:, None])
+
+
+def electric_field(beam_axis: np.ndarray, angle_deg: float) -> np.ndarray:
+    """Unit vector of the electric field of linearly polarised light, shape (..., 3).
+
+    Parameters
+    ----------
+    beam_axis : ndarray, shape (..., 3)
+        From the reference point to the light.
+    angle_deg : float
+        From the vertical plane through the light (at the poles, from the x axis) towards rising azimuth.
+    """
+    ray = beam_axis / np.linalg.norm(beam_axis, axis=-1, keepdims=True)
+    across = np.hypot(ray[..., 0], ray[..., 1])
+    pole = across < 1e-12
+    safe = np.where(pole, 1.0, across)
+    cosine, sine = np.where(pole, 1.0, ray[..., 0] / safe), np.where(pole, 0.0, ray[..., 1] / safe)
+    down = np.stack([ray[..., 2] * cosine, ray[..., 2] * sine, -across], -1)
+    right = np.stack([-sine, cosine, np.zeros_like(sine)], -1)
+    angle = np.radians(angle_deg)
+    return np.cos(angle) * down + np.sin(angle) * right
+
+
+def bands(scene: Scene, light: Luminaire | None = None, material: Material | None = None) -> tuple[Index, ...]:
+    """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the material's table.
+
+    Shares add up to 1, so that the exposure keeps its meaning: the grey level of a white diffuse surface.
+    One band without a table, for then nothing depends on the wavelength.
+    """
+    material = material or scene.material
+    if not material.index_table:
+        return (Index(material.refractive_index, material.extinction, 1.0),)
+    wavelength, n, k = np.array(material.index_table).T
+    width = np.gradient(wavelength) if len(wavelength) > 2 else np.ones(len(wavelength))
+    width[[0, -1]] = np.diff(wavelength)[[0, -1]] / 2 if len(wavelength) > 2 else 1.0
+    share = width.copy()
+    for curve in (scene.camera.transmission, scene.camera.responsivity, (light or scene.lights[0]).spectrum):
+        if curve:
+            share *= np.interp(wavelength, *np.array(curve).T)
+    share /= share.sum()
+    return tuple(Index(*map(float, row)) for row in zip(n, k, share, strict=True))

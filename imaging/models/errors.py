@@ -1,0 +1,163 @@
+"""What every variance model answers: the errors of lines and centres, and of the measurand that depends on them.
+
+A model finds how well the line of every edge is known, as a function V(A, B): the variance of A d + B theta, d the
+line's displacement at the edge's first end (px) and theta its rotation (rad). `features.measurand` knows A and B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from imaging.features.circles import Rim, rim
+from imaging.features.limbs import limb_rim
+from imaging.features.measurand import Measurands, measurands
+from imaging.pictures import Pictures
+from scenes import Circle, Curved
+
+LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Predicted errors for pictures of leading shape (...).
+
+    Attributes
+    ----------
+    measurands : Measurands
+        What is measured; its arrays have the sensors' leading shape.
+    line_variance : callable
+        (A, B) of shape (..., E) to the variance of A d + B theta of each line, px^2.
+    contrast : ndarray, shape (..., E)
+        Root mean square contrast along each straight edge, grey levels.
+    noise_variance : ndarray, shape (..., E)
+        Mean variance of the noise along each straight edge, grey levels^2.
+    circles : tuple of ndarray, shape (..., p, p)
+        Covariance of each circle's three parameters, or a cone's four, the scene's unit squared; infinite diagonal
+        where it cannot be found.
+    crowded : tuple of ndarray of bool, shape (...)
+        Whether something disturbs most of each circle.
+    joint : tuple of ndarray, optional
+        Variances in the image and in the object where a model finds them jointly, not edge by edge.
+    """
+
+    measurands: Measurands
+    line_variance: LineVariance
+    contrast: np.ndarray
+    noise_variance: np.ndarray
+    circles: tuple[np.ndarray, ...]
+    crowded: tuple[np.ndarray, ...]
+    joint: tuple[np.ndarray, np.ndarray] | None = None
+
+    @cached_property
+    def variances(self) -> np.ndarray:
+        """Of all quantities in the image, px^2 (degrees^2), shape (..., M); infinite where not measurable."""
+        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
+
+    @cached_property
+    def variances_object(self) -> np.ndarray:
+        """The same in the object, the scene's unit squared (degrees^2)."""
+        return self.joint[1] if self.joint else _variances(self, self.measurands.gradient_object)
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Of the first quantity in the image, shape (...)."""
+        return self.variances[..., 0]
+
+    @property
+    def variance_object(self) -> np.ndarray:
+        """Of the first quantity in the object, shape (...)."""
+        return self.variances_object[..., 0]
+
+    def parts(self, number: int) -> dict[str, np.ndarray]:
+        """What every edge and circle that a quantity needs adds to its variance in the object, each (...).
+
+        Errors of different edges are independent, so the parts add up to the variance; infinite where one cannot be
+        found. Not of a model that finds all jointly.
+        """
+        needs = self.measurands.depends()[number]
+        edges, circles = _parts(self, self.measurands.gradient_object[..., number, :], needs)
+        names = [*self.measurands.view.names, *self.measurands.circles]
+        each = [*np.moveaxis(edges, -1, 0), *circles]
+        return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed}
+
+    def covariance(self, gradient: np.ndarray) -> np.ndarray:
+        """Joint covariance (..., M, M) of quantities with a gradient (..., M, q); infinite where not measurable.
+
+        From the variances of pairs' sums, each first brought to variance 1.
+        """
+        single = np.stack([_variance(self, gradient[..., m, :]) for m in range(gradient.shape[-2])], -1)
+        size = np.sqrt(np.where(np.isfinite(single) & (single > 0), single, 1.0))
+        unit = gradient / size[..., None]
+        whole = np.empty((*single.shape, single.shape[-1]))
+        for i in range(single.shape[-1]):
+            whole[..., i, i] = single[..., i]
+            for j in range(i):
+                both = _variance(self, unit[..., i, :] + unit[..., j, :])
+                whole[..., i, j] = whole[..., j, i] = (both - 2) / 2 * size[..., i] * size[..., j]
+        lost = ~np.isfinite(single)
+        either = lost[..., :, None] | lost[..., None, :]
+        return np.where(either, np.where(np.eye(single.shape[-1], dtype=bool), np.inf, np.nan), whole)
+
+
+def combined(
+    pictures: Pictures,
+    line_variance: LineVariance,
+    contrast2: np.ndarray,
+    noise_variance: np.ndarray | float,
+    circle_covariance: Callable[[Rim], np.ndarray],
+    *,
+    fall_off: bool = True,
+) -> Errors:
+    """From the lines' and the circles' errors to those of all quantities."""
+    known, solid = measurands(pictures), pictures.scene.solid
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        rims = [_outline(pictures, solid.round(name), fall_off) for name in known.circles]
+        circles = tuple(circle_covariance(each) for each in rims)
+    noise = np.broadcast_to(noise_variance, contrast2.shape)
+    crowded = tuple(each.crowded for each in rims)
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded)
+
+
+def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> Rim:
+    return limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each, fall_off=fall_off)
+
+
+def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:
+    """Variances (..., M) of quantities with a gradient (..., M, q)."""
+    needs = errors.measurands.depends()
+    return np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+
+
+def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = None) -> np.ndarray:
+    """Variance (...) of what moves by gradient . errors; infinite where something it needs cannot be found.
+
+    Without ``needs``, bool (E + C,), it needs whatever its gradient is not 0 for.
+    """
+    edges, circles = _parts(errors, gradient, needs)
+    with np.errstate(invalid="ignore", over="ignore"):
+        variance = edges.sum(-1)
+        for each in circles:
+            variance = variance + each
+    return np.where(np.isfinite(variance), variance, np.inf)
+
+
+def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tuple[np.ndarray, list[np.ndarray]]:
+    """What each edge (..., E) and each circle (...) adds to it; infinite where one that it needs cannot be found."""
+    known = errors.measurands
+    edges = len(known.view.names)
+    offset, tilt = gradient[..., 0 : 2 * edges : 2], gradient[..., 1 : 2 * edges : 2]
+    needed = (offset != 0) | (tilt != 0) if needs is None else needs[:edges]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        parts = errors.line_variance(offset, tilt)
+        variance = np.where(known.view.visible & np.isfinite(parts), parts, np.inf)
+        lines, circles = np.where(needed, variance, 0.0), []
+        for c, covariance in enumerate(errors.circles):
+            pull = known.of_circle(gradient[..., None, :], c)[..., 0, :]
+            moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
+            needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
+            circles.append(np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0))
+    return lines, circles
