@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ice_vision
 
-ice_vision.check(__file__, "scenes", "planner", "render", "measure")
+ice_vision.check(__file__, "scenes", "imaging", "planner", "render", "measure")
 
 from importlib import import_module
 from typing import Any

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+import imaging
 import measure
 import planner
 import render
@@ -169,7 +170,7 @@ def _identity(
 
 def _code() -> str:
     """Digest of the code that makes the numbers."""
-    folders = [Path(package.__file__).parent for package in (scenes, planner, render, measure)]
+    folders = [Path(package.__file__).parent for package in (scenes, imaging, planner, render, measure)]
     files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
         Path(module.__file__) for module in (work, photographs)
     ]
