@@ -20,7 +20,7 @@ from planner.forecast import Forecast, forecasts, worst
 from planner.ranks import edge_ranks
 from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
-from scenes.features import place_of
+from scenes.measurands.features import place_of
 from scenes.results import Shown
 from scenes.status import WORST_FIRST
 from scenes.units import in_unit

@@ -1,14 +1,15 @@
 """What is to be measured, with what: object, material, camera, light, noise, task and poses."""
 
-from scenes.camera import Camera
+from scenes.cameras.lens import Lens
+from scenes.cameras.noise import Noise
+from scenes.cameras.pinhole import Camera
 from scenes.errors import InvalidInput
-from scenes.filters import Filter, Lamp
-from scenes.lens import Lens
-from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
+from scenes.lights.filters import Filter, Lamp
+from scenes.lights.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
-from scenes.materials import FaceMaterial, Material
-from scenes.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance, Wall
-from scenes.noise import Noise
+from scenes.materials.textures import ImageTexture, StatisticalTexture
+from scenes.materials.torrance_sparrow import FaceMaterial, Material
+from scenes.measurands.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance, Wall
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.curved import Curved
@@ -20,7 +21,6 @@ from scenes.picture import Picture, mounted
 from scenes.pose import Pose, pairs, several, shown
 from scenes.scene import Scene, Setting
 from scenes.surroundings import Floor, Jitter, Obstacle
-from scenes.textures import ImageTexture, StatisticalTexture
 from scenes.uncertain import Uncertain, UncertainNumber
 from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
-from scenes.data_sheet import not_derived
+from scenes.cameras.data_sheet import not_derived
 from scenes.errors import InvalidInput, describe
 from scenes.numbers import steps_of
 from scenes.uncertain import taken_out

@@ -8,10 +8,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from scenes.errors import InvalidInput, describe, given
-from scenes.files import read_toml
+from scenes.files.door import read_toml
 from scenes.scene import Scene
 
-BUNDLED = Path(__file__).parent
+BUNDLED = Path(__file__).parent / "bundled"
 
 
 def names() -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from scenes.data_sheet import completed
+from scenes.cameras.data_sheet import completed
 
 if TYPE_CHECKING:
     from scenes.scene import Scene

@@ -8,8 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scenes import image_file, mosaic, tone
+from scenes.cameras import mosaic, tone
 from scenes.errors import InvalidInput
+from scenes.files import image as image_file
 
 CHANNELS = ("r", "g", "b", "luminance")
 _LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear light, red, green, blue (IEC 61966-2-1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenes.errors import InvalidInput
-from scenes.lights import Backlight, Luminaire
+from scenes.lights.lights import Backlight, Luminaire
 from scenes.pose import Pose, several
 from scenes.results import poses
 from scenes.scene import Scene

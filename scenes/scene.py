@@ -12,17 +12,19 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
-from scenes.camera import Camera
+from scenes.cameras.data_sheet import completed
+from scenes.cameras.noise import Noise
+from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
-from scenes.data_sheet import completed
 from scenes.errors import InvalidInput
-from scenes.features import check_feature, check_quantity
-from scenes.filters import Filter, Lamp, check_names
-from scenes.lights import AnyLight
-from scenes.materials import FaceMaterial, Material
-from scenes.measurands import Corner, Locator, Measurand, Quantity, Task, Wall, quantities_of
+from scenes.lights.filters import Filter, Lamp, check_names
+from scenes.lights.lights import AnyLight
+from scenes.materials.surfaces import Surfaces, surfaces
+from scenes.materials.textures import Texture, check_textures
+from scenes.materials.torrance_sparrow import FaceMaterial, Material
+from scenes.measurands.features import check_feature, check_quantity
+from scenes.measurands.measurands import Corner, Locator, Measurand, Quantity, Task, Wall, quantities_of
 from scenes.model import FileName, Model, Title
-from scenes.noise import Noise
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
@@ -32,9 +34,7 @@ from scenes.parts.step_file import Step
 from scenes.parts.turned import Turned
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
-from scenes.surfaces import Surfaces, surfaces
 from scenes.surroundings import Floor, Jitter, Obstacle
-from scenes.textures import Texture, check_textures
 from scenes.uncertain import UncertainNumber, check_uncertain, taken_out
 from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, model_validator
 
-from scenes.covariance import ORDER, Covariance, of_document
+from scenes.cameras.covariance import ORDER, Covariance, of_document
 from scenes.model import Model
 from scenes.ranges import Rounding, Spread
 from scenes.uncertain import Uncertain, UncertainNumber

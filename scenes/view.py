@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.camera import Camera
+from scenes.cameras.pinhole import Camera
 from scenes.parts.solid import Solid
 from scenes.units import UNITS, Unit, in_unit, times_apart
 

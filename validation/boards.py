@@ -8,7 +8,8 @@ from pathlib import Path
 
 import measure
 from measure.boards.camera import FEWEST_BOARDS, FEWEST_CORNERS
-from scenes import InvalidInput, image_file
+from scenes import InvalidInput
+from scenes.files import image as image_file
 
 MOST_FILES = 1000
 

@@ -12,7 +12,7 @@ from scipy import stats
 
 from scenes import InvalidInput
 from scenes.errors import describe
-from scenes.files import read_json
+from scenes.files.door import read_json
 
 _MOST = 1_000_000_000  # images of a setting
 

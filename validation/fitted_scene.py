@@ -9,11 +9,11 @@ from typing import Any
 import scenes
 from measure.fitting.result import Fit
 from scenes import InvalidInput
-from scenes.files import read_toml
+from scenes.files.door import read_toml
+from scenes.files.written import toml
 from scenes.numbers import number_at
 from scenes.scene import Scene
 from scenes.uncertain import taken_out
-from scenes.written import toml
 
 _CAMERA = ("distance", "roll_deg", "exposure", "blur_px", "focal_px")
 _NOISE = ("sigma", "gain", "dark_level")

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from scenes import InvalidInput
-from scenes.image_file import read
+from scenes.files.image import read
 
 __all__ = ["read", "write"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from imaging.features.seen import Line, Moves, Point, Seen
 from scenes import Quantity, Side
-from scenes.features import plane_of, points_of
+from scenes.measurands.features import plane_of, points_of
 
 _DEGREE = float(np.degrees(1.0))
 _ZERO = 1e-9  # of the object's size: an offset that is none, and has no side
@@ -39,7 +39,8 @@ def in_image(seen: Seen, quantity: Quantity) -> Evaluated:
 def on_plane(seen: Seen, quantity: Quantity) -> Evaluated:
     """On the plane of the features: the scene's unit, or degrees.
 
-    That of `scenes.features.plane_of`; where that is none, the plane through both points that faces the sensor most.
+    That of `scenes.measurands.features.plane_of`; where that is none, the plane through both points that faces the
+    sensor most.
     """
     if quantity.kind == "diameter":
         _, _, radius, number = seen.circle(quantity.features[0])

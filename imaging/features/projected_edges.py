@@ -17,7 +17,7 @@ from imaging.geometry.projection import depth, facing, from_axis
 from imaging.geometry.visibility import longest_span, turned
 from imaging.pictures import Pictures
 from scenes import Centre, Corner, Edge, Scene, Wall
-from scenes.features import place_of
+from scenes.measurands.features import place_of
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 
 from imaging.geometry.projection import Frame, camera_frame, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
-from scenes.features import place_of, point_of
+from scenes.measurands.features import place_of, point_of
 
 Moves = Mapping[int, np.ndarray]
 """Derivatives by some of the parameters, by their numbers; all others are 0."""

@@ -1,7 +1,7 @@
 """The light that arrives at points of the scene: its direction, its strength, its polarisation, its wavelengths.
 
-A new kind of light needs a class in `scenes.lights`, its nodes in `imaging.light.emitters`, and its description in
-`render.lights`.
+A new kind of light needs a class in `scenes.lights.lights`, its nodes in `imaging.light.emitters`, and its description
+in `render.lights`.
 """
 
 from __future__ import annotations

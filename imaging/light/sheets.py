@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from scenes import Scene, Solid
-from scenes.textures import CELLS, ImageTexture, Rectangle, StatisticalTexture
+from scenes.materials.textures import CELLS, ImageTexture, Rectangle, StatisticalTexture
 
 _REACH = 5.0  # standard deviations at which a Gaussian ends
 

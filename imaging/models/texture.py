@@ -25,7 +25,7 @@ from imaging.light.sheets import Sheet, sheets
 from imaging.models.along import place_nodes, used_trims
 from imaging.pictures import Pictures
 from scenes import Solid
-from scenes.textures import ImageTexture
+from scenes.materials.textures import ImageTexture
 
 _FAR = 5.0  # standard deviations of the smoothed edge beyond which a texture is not felt
 _MOST_ALONG, _ACROSS = 2000, (16, 64)  # places

@@ -15,7 +15,7 @@ from measure.boards.chessboard import Board
 from measure.boards.parameters import Model, read_model
 from measure.photo.lens import Lens
 from scenes import status
-from scenes.covariance import Covariance
+from scenes.cameras.covariance import Covariance
 from scenes.errors import InvalidInput
 
 FEWEST_BOARDS, FEWEST_CORNERS = 3, 8

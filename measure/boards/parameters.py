@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from scenes.covariance import ORDER
+from scenes.cameras.covariance import ORDER
 from scenes.errors import InvalidInput
 
 _COEFFICIENTS = ORDER[4:]

@@ -19,7 +19,7 @@ from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from scenes import InvalidInput
 from scenes.errors import describe
-from scenes.files import read_toml
+from scenes.files.door import read_toml
 from scenes.model import Model
 
 

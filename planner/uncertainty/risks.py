@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from scenes.errors import InvalidInput
-from scenes.measurands import Tolerance
+from scenes.measurands.measurands import Tolerance
 
 _REACH = 38.0  # standard deviations: the normal density beyond is below the smallest number
 _NODES = np.polynomial.legendre.leggauss(64)

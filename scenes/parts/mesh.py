@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
-from scenes.files import Unreadable, read_bytes
+from scenes.files.door import Unreadable, read_bytes
 from scenes.parts.facets import Chain, Facets, facets
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid

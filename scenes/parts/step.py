@@ -17,7 +17,7 @@ import numpy as np
 import trimesh
 
 from scenes.errors import InvalidInput
-from scenes.files import Unreadable, read_bytes
+from scenes.files.door import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
 from scenes.parts.curved import Curved
 from scenes.parts.solid import Edge, Solid

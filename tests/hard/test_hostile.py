@@ -23,7 +23,7 @@ import render
 import scenes
 import validation
 from scenes import InvalidInput, Noise
-from scenes.files import read_toml
+from scenes.files.door import read_toml
 from scenes.load import BUNDLED
 from scenes.parts import mesh
 from tests import commands

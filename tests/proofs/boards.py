@@ -18,7 +18,7 @@ from scipy import stats
 import measure
 from measure.boards.chessboard import Board
 from scenes import InvalidInput
-from scenes.image_file import read
+from scenes.files.image import read
 from tests.boards import SMALL, Rig, in_order, poses, told
 
 ENOUGH = 0.6  # of cornerSubPix' reprojection error

@@ -15,7 +15,7 @@ import numpy as np
 import typer
 
 import measure
-from scenes import mosaic, tone
+from scenes.cameras import mosaic, tone
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 

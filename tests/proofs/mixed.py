@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import typer
 
-from scenes import tone
+from scenes.cameras import tone
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 from tests.proofs.processed import jpeg, judged, resized, rounded, sharpened, smoothed

@@ -19,7 +19,7 @@ import planner
 import render
 import scenes
 from scenes import Scene
-from scenes.measurands import Measurand
+from scenes.measurands.measurands import Measurand
 from tests.parts import Hole, prism, unevenly
 from validation.cli.main import app
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms, PngImagePlugin
 
-from scenes import InvalidInput, image_file, mosaic, photograph, tone
+from scenes import InvalidInput, photograph
+from scenes.cameras import mosaic, tone
+from scenes.files import image as image_file
 
 GREY = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
 TURNS = {  # as the EXIF standard draws them

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from scenes import InvalidInput, photograph
-from scenes.image_file import Size, WrongSize
+from scenes.files.image import Size, WrongSize
 from validation import picture_file
 
 

@@ -43,8 +43,8 @@ from planner.search.shares import with_shares
 from planner.search.sharing import _Looks
 from planner.uncertainty import Input, monte_carlo
 from scenes import Camera, Noise, Picture, Pose
-from scenes.data_sheet import completed
-from scenes.measurands import Tolerance
+from scenes.cameras.data_sheet import completed
+from scenes.measurands.measurands import Tolerance
 from scenes.parts import mesh, step, step_kernel
 from scenes.parts.surfaces import Torus
 from scenes.photograph import Photograph

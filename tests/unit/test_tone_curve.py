@@ -6,7 +6,8 @@ import pytest
 
 import measure
 from measure.photo.tone_curve import UNTOLD, ToneCurve, together
-from scenes import photograph, status, tone
+from scenes import photograph, status
+from scenes.cameras import tone
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 import scenes
 from scenes import InvalidInput, Picture, Pose, Scene, Setting
 from scenes.errors import describe
-from scenes.files import read_toml
+from scenes.files.door import read_toml
 from scenes.load import find, from_document
 from scenes.model import FileName, Model, Title
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from scenes.errors import describe
-from scenes.files import check_bounded
+from scenes.files.door import check_bounded
 
 _Strict = ConfigDict(strict=True)
 _NotNegative = Annotated[FiniteFloat, Field(ge=0)]

@@ -19,8 +19,8 @@ from pydantic import Field, ValidationError
 
 from scenes import InvalidInput, Pose, Scene, photograph
 from scenes.errors import describe
-from scenes.files import read_toml
-from scenes.image_file import Size
+from scenes.files.door import read_toml
+from scenes.files.image import Size
 from scenes.model import Model
 from scenes.scene import Setting
 from validation.batch.campaign import Campaign

@@ -21,7 +21,7 @@ import render
 from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
-from scenes.camera import MOST_PIXELS
+from scenes.cameras.pinhole import MOST_PIXELS
 from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
 

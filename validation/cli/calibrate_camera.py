@@ -10,7 +10,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput
-from scenes.image_file import Size
+from scenes.files.image import Size
 from validation.cli.common import Json, check_number, commands, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console

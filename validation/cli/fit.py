@@ -10,7 +10,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput
-from scenes.image_file import Size
+from scenes.files.image import Size
 from scenes.photograph import read
 from validation.cli import recorded
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say

@@ -11,7 +11,7 @@ import typer
 import scenes
 import scenes.photograph
 from scenes import InvalidInput
-from scenes.image_file import Size
+from scenes.files.image import Size
 from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded

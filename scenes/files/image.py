@@ -14,11 +14,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from scenes.camera import MOST_PIXELS as _MOST_PIXELS
-from scenes.camera import Camera
+from scenes.cameras.pinhole import MOST_PIXELS as _MOST_PIXELS
+from scenes.cameras.pinhole import Camera
 from scenes.errors import InvalidInput
-from scenes.files import Unreadable, opened, read_bytes
-from scenes.image_header import Header, header, turned
+from scenes.files.door import Unreadable, opened, read_bytes
+from scenes.files.header import Header, header, turned
 
 _MOST_BYTES = 8 * _MOST_PIXELS + 10_000  # the largest image as float64, with a header
 

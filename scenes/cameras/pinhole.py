@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from scenes.lens import Lens
+from scenes.cameras.lens import Lens
 from scenes.model import Model
 from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
 
@@ -17,7 +17,7 @@ class Camera(Model):
     """A pinhole camera on a sphere around ``look_at``, which it looks at, z axis up.
 
     Instead of ``width`` and ``height``, ``distance`` and ``focal_px`` a scene may say ``sensor_size_mm``,
-    ``working_distance_mm``, and ``focal_length_mm`` with ``pixel_pitch_um`` (`scenes.data_sheet.completed`).
+    ``working_distance_mm``, and ``focal_length_mm`` with ``pixel_pitch_um`` (`scenes.cameras.data_sheet.completed`).
     """
 
     width: Annotated[int, Field(ge=1, le=16384)]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from scenes.errors import InvalidInput
-from scenes.files import read_json, read_toml
+from scenes.files.door import read_json, read_toml
 from scenes.model import Model
 
 Intrinsic = Literal["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"]

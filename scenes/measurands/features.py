@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from scenes.measurands import Centre, Corner, Quantity, Side, Wall
+from scenes.measurands.measurands import Centre, Corner, Quantity, Side, Wall
 from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cone, Sphere
 

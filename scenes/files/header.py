@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-from scenes import tone
-from scenes.camera import MOST_PIXELS
-from scenes.tone import Tone
+from scenes.cameras import tone
+from scenes.cameras.pinhole import MOST_PIXELS
+from scenes.cameras.tone import Tone
 
 _TIFF = (b"II*\0", b"MM\0*")
 _ORIENTATION, _EXIF, _COLOUR_SPACE, _SRGB = 0x0112, 0x8769, 0xA001, 1

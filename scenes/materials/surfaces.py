@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from scenes.materials import FaceMaterial, Material
+from scenes.materials.torrance_sparrow import FaceMaterial, Material
 from scenes.parts.solid import Solid
 
 

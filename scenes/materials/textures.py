@@ -105,7 +105,7 @@ class ImageTexture(Model):
 
     @model_validator(mode="after")
     def _read(self) -> ImageTexture:
-        from scenes.image_file import read  # loads OpenCV
+        from scenes.files.image import read  # loads OpenCV
 
         try:
             levels = read(self.file)

@@ -1,0 +1,1 @@
+"""Files that somebody else has written: texts, images and what they say of themselves."""

@@ -1,0 +1,1 @@
+"""What surfaces are made of, what is printed on them, and which face is made of what."""

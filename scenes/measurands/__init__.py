@@ -1,0 +1,1 @@
+"""What is to be measured, and on which features of the object."""
