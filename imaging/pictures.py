@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from imaging.geometry.projection import light_position, sensor_position
-from imaging.light.emitters import FULL, GLANCE, Emitter, emitters
+from imaging.light.emitters import Emitter, emitters
 from scenes import InvalidInput, Picture, Scene, mounted
 from scenes.arrays import poses
+from scenes.lights import FULL, GLANCE
 
 T = TypeVar("T")
 

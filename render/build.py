@@ -19,6 +19,7 @@ from render.parts import Part
 from render.rays import SURFACES
 from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
 from scenes import Floor, Material, Picture, Scene, Solid
+from scenes.lights.luminaire import BLACK
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
@@ -108,7 +109,7 @@ def _shown(mitsuba, solid: Solid, part: Part) -> list[Any]:
     """A solid's surface as one shape a material, and one a textured face; black where only a light is seen."""
     picture, active = part.picture, part.active
     if part.silhouette:
-        return _of_material(mitsuba, solid, np.ones(len(solid.faces), bool), lights.BLACK)
+        return _of_material(mitsuba, solid, np.ones(len(solid.faces), bool), BLACK)
     of_face, made = _materials(picture.scene, solid), []
     uneven = sheets(picture.scene) if solid is picture.scene.solid else {}
     for material in dict.fromkeys(of_face):

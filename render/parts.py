@@ -71,4 +71,4 @@ def within_cone(picture: Picture, crop: tuple[slice, slice], supersample: int) -
     middle = image_centre(camera)
     right, down = np.meshgrid((x - middle[0]) / camera.focal_px, (y - middle[1]) / camera.focal_px)
     rays = right[..., None] * sensor.right + down[..., None] * sensor.down + sensor.forward
-    return -(rays @ towards) > np.cos(np.radians(light.cone_deg)) * np.linalg.norm(rays, axis=-1)
+    return -(rays @ towards) > np.cos(light.cone) * np.linalg.norm(rays, axis=-1)

@@ -23,7 +23,7 @@ from render.parts import Part, parts, within_cone
 from render.phenomena import Tolerance, choose
 from render.precision import check_precision
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
-from scenes import Backlight, InvalidInput, Picture, Scene
+from scenes import InvalidInput, Picture, Scene
 
 _NEAR = 16  # rays of a fine pixel beside an edge, where what is random is faint
 
@@ -148,7 +148,7 @@ def _quiet(part: Part, sharp: frozenset[str]) -> bool:
     """Whether what is random about the rays is but a small part of the light: on curved parts, what faces send to each
     other, and what a backlight sends round them."""
     picture = part.picture
-    round_the_part = isinstance(picture.scene.lights[0], Backlight)
+    round_the_part = picture.scene.lights[0].faces_sensor
     return (
         bool(picture.scene.solid.curved)
         and not part.silhouette

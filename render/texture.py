@@ -22,12 +22,13 @@ from typing import Any
 import numpy as np
 
 from imaging.light.appearance import matt_part, signal
-from imaging.light.emitters import SMOOTH, emitters, is_point
+from imaging.light.emitters import emitters, is_point
 from imaging.light.irradiance import beam
 from imaging.light.sheets import Sheet
 from imaging.pictures import Pictures
 from render.meshes import mesh
 from scenes import Material, Picture, Scene, Solid, as_point
+from scenes.lights import SMOOTH
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

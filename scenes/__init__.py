@@ -4,8 +4,8 @@ from scenes.cameras.lens import Lens
 from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
 from scenes.errors import InvalidInput
+from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.lights.filters import Filter, Lamp
-from scenes.lights.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.load import find, load, names
 from scenes.materials.textures import ImageTexture, StatisticalTexture
 from scenes.materials.torrance_sparrow import FaceMaterial, Material

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenes.errors import InvalidInput
-from scenes.lights.lights import Backlight, Luminaire
+from scenes.lights import Luminaire
 from scenes.pose import Pose, several
 from scenes.results import poses
 from scenes.scene import Scene
@@ -115,6 +115,6 @@ def mounted(light: Luminaire, sensors: np.ndarray) -> np.ndarray:
     """
     if light.mount == "fixed":
         return np.array(list(light.pose))
-    if isinstance(light, Backlight):
+    if light.faces_sensor:
         return np.stack([180.0 - sensors[..., 0], (sensors[..., 1] + 180.0) % 360.0], -1)
     return sensors

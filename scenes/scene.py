@@ -17,8 +17,8 @@ from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
 from scenes.errors import InvalidInput
+from scenes.lights import LIGHTS, AnyLight
 from scenes.lights.filters import Filter, Lamp, check_names
-from scenes.lights.lights import AnyLight
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
 from scenes.materials.torrance_sparrow import FaceMaterial, Material
@@ -349,7 +349,7 @@ class Scene(Model):
                 f"{'lights' if self.several_lights else 'light'}.intensity must be more than 0 once, got 0"
             )
         for i, light in enumerate(self.lights):
-            if light.pose is not None and light.kind != "backlight":
+            if light.pose is not None and not light.faces_sensor:
                 self.check_pose("light", light.pose, f"lights[{i}].pose" if self.several_lights else "light.pose", i)
 
     def _check_measurands(self) -> None:
@@ -403,3 +403,6 @@ class Scene(Model):
             raise ValueError(
                 f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
             )
+
+
+LIGHTS.followed_by(lambda: Scene.model_rebuild(force=True))

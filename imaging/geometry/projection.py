@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging.geometry.lens import image_centre, lens_jacobian, recorded
-from scenes import Backlight, Camera, Luminaire, Solid
+from scenes import Camera, Luminaire, Solid
 
 _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
 
@@ -70,7 +70,7 @@ def camera_frame(camera: Camera, poses: np.ndarray) -> Frame:
 def light_frame(camera: Camera, light: Luminaire, poses: np.ndarray) -> Frame:
     """Axes of a light: right, down, and towards the reference point; one at the camera, before the object, turns with
     it."""
-    turns = light.mount == "camera" and not isinstance(light, Backlight)
+    turns = light.mount == "camera" and not light.faces_sensor
     return camera_frame(camera, poses) if turns else frame(poses)
 
 

@@ -1,4 +1,4 @@
-"""Lights that the sensor sees behind the object: flat squares of equal radiance within a cone about their axis."""
+"""Lights that the sensor sees behind the object."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from imaging.geometry.projection import frame
 from imaging.light.irradiance import electric_field, widened
 from imaging.pictures import Pictures
-from scenes import Backlight, Scene
+from scenes import Scene
 
 
 def backlights(scene: Scene) -> tuple[int, ...]:
     """Which of a scene's lights are seen by its sensor."""
-    return tuple(i for i, light in enumerate(scene.lights) if isinstance(light, Backlight) and light.intensity > 0)
+    return tuple(i for i, light in enumerate(scene.lights) if light.faces_sensor and light.intensity > 0)
 
 
 def backlit(
@@ -37,10 +37,9 @@ def backlit(
         away = widened(pictures.lights_at[which], 1) - points
         t = (away * normal).sum(-1) / towards
         place = t[..., None] * vectors - away
-        aside = np.maximum(np.abs((place * right).sum(-1)), np.abs((place * down).sum(-1)))
         cosine = -towards / np.linalg.norm(vectors, axis=-1)
-    shown = (aside <= light.half_side) & (t > 0) & (cosine > max(np.cos(np.radians(light.cone_deg)), 0.0))
-    return np.where(shown, scene.camera.exposure * light.intensity * passed(pictures, which, analyser), 0.0)
+        shown = light.seen_at((place * right).sum(-1), (place * down).sum(-1), cosine) * (t > 0)
+    return shown * scene.camera.exposure * light.intensity * passed(pictures, which, analyser)
 
 
 def passed(pictures: Pictures, which: int, analyser: np.ndarray | None) -> np.ndarray | float:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
-from imaging.light.emitters import GLANCE, Emitter, emitters
+from imaging.light.emitters import Emitter, emitters
 from imaging.light.exchange import Exchanged, exchanged
 from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from scenes import Scene
+from scenes.lights import GLANCE
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline

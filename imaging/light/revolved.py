@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from imaging.geometry.rays import first_face
-from imaging.light.emitters import GLANCE, Emitter, emitters
+from imaging.light.emitters import Emitter, emitters
 from imaging.light.irradiance import beam
 from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from scenes import Curved, Scene, Solid
+from scenes.lights import GLANCE
 from scenes.parts.surfaces import axes_beside
 from scenes.parts.surfaces.ruled import Ruled
 

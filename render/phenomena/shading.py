@@ -11,7 +11,7 @@ from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit, with_materials
 from render.phenomena.edges import NEAR_STEP, compare, lever, sides, total_variance
 from render.phenomena.transport import albedo
-from scenes import Backlight, Luminaire, Scene, as_point
+from scenes import Luminaire, Scene, as_point
 
 
 class AttachedShadow(Effect):
@@ -172,7 +172,7 @@ class LightSize(Effect):
     switch = "spheres, discs, rectangles, rings and domes instead of points"
 
     def absent(self, pictures: Pictures) -> str | None:
-        lights = [light for light in pictures.scene.lights if not isinstance(light, Backlight)]
+        lights = [light for light in pictures.scene.lights if not light.faces_sensor]
         one = "the light is a point" if len(lights) == 1 else "all lights are points"
         return one if all(light.half_size == 0 for light in lights) else None
 
@@ -187,7 +187,7 @@ class LightSize(Effect):
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return relit(scene, lambda light: light if isinstance(light, Backlight) else as_point(light))
+        return relit(scene, lambda light: light if light.faces_sensor else as_point(light))
 
 
 class BacklightShown(Effect):
@@ -205,7 +205,7 @@ class BacklightShown(Effect):
         return EVERYTHING
 
     def without(self, scene: Scene) -> Scene:
-        return relit(scene, lambda light: _changed(light, intensity=0.0) if isinstance(light, Backlight) else light)
+        return relit(scene, lambda light: _changed(light, intensity=0.0) if light.faces_sensor else light)
 
 
 class Spill(Effect):
@@ -223,7 +223,7 @@ class Spill(Effect):
         """A side along the axis has (c - sin c cos c) / pi of the radiance of a cone of half angle c, c = 90 degrees
         half of it; one that the sensor sees from within the cone at most twice that."""
         scene = pictures.scene
-        cones = (np.radians(scene.lights[which].cone_deg) for which in backlights(scene))
+        cones = (scene.lights[which].cone for which in backlights(scene))
         share = float(sum(2 * (cone - np.sin(cone) * np.cos(cone)) / np.pi for cone in cones)) * albedo(scene)
         moved = NEAR_STEP * np.sqrt(total_variance(scene)) * share
         lost = 1 / (1 - share) ** 2 - 1 if share < 1 else np.inf

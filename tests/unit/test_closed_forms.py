@@ -21,7 +21,7 @@ from measure.estimators.profile import profile_kernel, top_kernel
 from planner.combining import combined
 from planner.search.aim import Aim
 from planner.search.separable import separable
-from render import curved, lights
+from render import curved
 from render.phenomena import transport
 from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned
 from scenes.arrays import poses
@@ -223,7 +223,7 @@ def test_a_side_face_gives_half_of_what_a_floor_sends_and_an_upright_box_its_ele
 def test_the_renderer_s_ring_is_the_planner_s():
     """Tilted: its area, its inner rim further from the object than the outer one, its outside inwards and forwards."""
     light = Ring(kind="ring", distance=90.0, inner_radius=2.0, outer_radius=5.0, tilt_deg=35.0)
-    triangles, made = lights._ring(light), nodes(light, 10.0, 12)
+    triangles, made = light.shape()["triangles"], nodes(light, 10.0, 12)
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(normals, axis=1).sum() / 2
     assert area == pytest.approx(made.area, rel=1e-3)

@@ -5,9 +5,10 @@ import pytest
 from scipy import integrate
 
 import scenes
-from imaging.light.emitters import ERROR, emitters, nodes
+from imaging.light.emitters import emitters, nodes
 from imaging.light.irradiance import beam
 from scenes import Backlight, Bar, Disc, Dome, Light, Pose, Ring, as_point
+from scenes.lights.luminaire import ERROR
 from tests.oracle import axes
 
 DISTANCE, REACH = 50.0, 8.0

@@ -22,7 +22,7 @@ from imaging.features.circles import Rim, calibrated_circle
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, edge_points
 from imaging.light.appearance import edge_contrast, side_signals
-from imaging.light.emitters import GLANCE, emitters
+from imaging.light.emitters import emitters
 from imaging.light.exchange import exchanged
 from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
@@ -44,6 +44,7 @@ from planner.search.sharing import _Looks
 from planner.uncertainty import Input, monte_carlo
 from scenes import Camera, Noise, Picture, Pose
 from scenes.cameras.data_sheet import completed
+from scenes.lights import GLANCE
 from scenes.measurands.measurands import Tolerance
 from scenes.parts import mesh, step, step_kernel
 from scenes.parts.surfaces import Torus

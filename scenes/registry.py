@@ -1,0 +1,98 @@
+"""Kinds of things by their names: those of the project, and those of a user's own module."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, TypeVar
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from scenes.errors import InvalidInput, given
+
+Kind = TypeVar("Kind")
+
+
+class Registry(Generic[Kind]):
+    """Kinds of one noun by name.
+
+    A module of a user's own adds one with `add`, as decorator or called; it is found where the project's own are
+    (`scenes.plugins` says how the command line loads such a module).
+
+    Examples
+    --------
+    >>> colours = Registry("colour")
+    >>> colours.add("red")(1.0), colours.names, colours["red"]
+    (1.0, ('red',), 1.0)
+    >>> colours["blue"]
+    Traceback (most recent call last):
+    ...
+    scenes.errors.InvalidInput: colour must be one of red, got 'blue'
+    """
+
+    def __init__(self, noun: str) -> None:
+        self.noun = noun
+        self._kinds: dict[str, Kind] = {}
+        self._dependants: list[Callable[[], Any]] = []
+
+    def add(self, name: str) -> Callable[[Kind], Kind]:
+        """A decorator that makes a kind known by its name.
+
+        Raises
+        ------
+        InvalidInput
+            If another kind has the name.
+        """
+
+        def known(kind: Kind) -> Kind:
+            other = self._kinds.get(name)
+            if other is not None and other != kind:
+                raise InvalidInput(f"{self.noun} must have a name of its own, got {name!r}, which is {other!r}")
+            self._kinds[name] = kind
+            for rebuild in self._dependants:
+                rebuild()
+            return kind
+
+        return known
+
+    def remove(self, name: str) -> None:
+        """Forget a kind: what a test does with the kind that it added."""
+        del self._kinds[name]
+        for rebuild in self._dependants:
+            rebuild()
+
+    def followed_by(self, rebuild: Callable[[], Any]) -> None:
+        """Have a function called whenever the kinds change."""
+        self._dependants.append(rebuild)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """In the order in which they were added."""
+        return tuple(self._kinds)
+
+    def __getitem__(self, name: str) -> Kind:
+        """The kind of a name; `InvalidInput` where there is none."""
+        if not isinstance(name, str) or name not in self._kinds:
+            raise InvalidInput(f"{self.noun} must be one of {', '.join(self._kinds)}, got {given(name)}")
+        return self._kinds[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._kinds
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._kinds)
+
+
+class OneOf:
+    """Annotation of a field whose value is a model of one of a registry's kinds, told by its key ``kind``."""
+
+    def __init__(self, kinds: Registry, default: str) -> None:
+        self._kinds, self._default = kinds, default
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        choices = {name: handler.generate_schema(self._kinds[name]) for name in self._kinds}
+        return core_schema.tagged_union_schema(choices, discriminator=self._name)
+
+    def _name(self, value: Any) -> str:
+        named = value.get("kind", self._default) if isinstance(value, dict) else getattr(value, "kind", self._default)
+        return named if isinstance(named, str) else repr(named)
