@@ -7,7 +7,8 @@ ice_vision.check(__file__, "scenes", "imaging")
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
 from measure.bounds import bound, image_bound
-from measure.estimators.registry import ESTIMATORS, best_estimator
+from measure.estimators.kinds import ESTIMATORS, EstimatorKind
+from measure.estimators.registry import best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.features.relations import line_angle, point_distance
 from measure.find.candidate import Candidate
@@ -32,6 +33,7 @@ __all__ = [
     "Candidate",
     "EdgeResponse",
     "Ellipse",
+    "EstimatorKind",
     "Fit",
     "Found",
     "Lens",

@@ -15,7 +15,9 @@ import numpy as np
 from imaging.features.locator import information_bound, kappa2
 from imaging.models.paper import PAPER_KAPPA2
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
-from measure.estimators.registry import ESTIMATORS, estimator
+from measure.estimators.kinds import ESTIMATORS
+from measure.estimators.registry import estimator
+from measure.estimators.separate import SeparateEstimator
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape
@@ -148,7 +150,7 @@ def _covered(square: bytes, blur: float) -> np.ndarray:
 
 def _points(noisy: np.ndarray, layout: Layout, name: str) -> tuple[float, float] | None:
     """Pooled variance of edge points, and the correlation length that the variance of their mean tells."""
-    tool = estimator(layout, name, 0.15 * _CONTRAST)
+    tool: SeparateEstimator = estimator(layout, name, 0.15 * _CONTRAST)
     variances, lengths = [], []
     for part in tool.parts:
         found = part.locator.locate(noisy)

@@ -10,6 +10,7 @@ import numpy as np
 
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
+from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.registry import known_name
 from measure.quantities import Found, find
 from scenes import InvalidInput, Picture, Scene, status
@@ -17,7 +18,6 @@ from scenes.arrays import BRIGHTEST, grey_levels, numbers
 from scenes.results import Shown, finite, value
 
 DEFAULT_ESTIMATOR = "gradient"
-PREDICTED = ("gradient", "canny")  # estimators whose bias the planner knows
 _DARK = 1e-30  # squared grey levels
 
 
@@ -143,8 +143,9 @@ def distance(
 def _check_known(picture: Picture, estimator: str) -> None:
     if not picture.lights:
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
-    if estimator not in PREDICTED:
-        raise InvalidInput(f"estimator must be one of {', '.join(PREDICTED)} to correct the bias, got {estimator!r}")
+    known = [name for name in ESTIMATORS if ESTIMATORS[name].bias_predicted]
+    if estimator not in known:
+        raise InvalidInput(f"estimator must be one of {', '.join(known)} to correct the bias, got {estimator!r}")
 
 
 def _corrected(found: Measurement, picture: Picture) -> Measurement:

@@ -12,11 +12,12 @@ from imaging.models.texture import TextureErrors, texture_errors
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
+from measure.estimators.kinds import ESTIMATORS
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response
 from measure.features.shape import prepared
-from measure.measurement import DEFAULT_ESTIMATOR, PREDICTED, check_method, checked_image
+from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import Found, find
 from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
@@ -124,7 +125,7 @@ def propagate(
     errors = (noise * rows) @ rows.T
     image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
     textures = texture_errors(Pictures.of(picture)) if picture.lights else None
-    values = _values(found, image, plane, state, estimator in PREDICTED and not photographed, textures)
+    values = _values(found, image, plane, state, ESTIMATORS[estimator].bias_predicted and not photographed, textures)
     return _of_first(found, rows, errors, values, clean.shape)
 
 

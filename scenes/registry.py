@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, Generic, TypeVar
 
 from pydantic import GetCoreSchemaHandler
@@ -13,7 +13,7 @@ from scenes.errors import InvalidInput, given
 Kind = TypeVar("Kind")
 
 
-class Registry(Generic[Kind]):
+class Registry(Generic[Kind], Collection):
     """Kinds of one noun by name.
 
     A module of a user's own adds one with `add`, as decorator or called; it is found where the project's own are
@@ -75,6 +75,9 @@ class Registry(Generic[Kind]):
         if not isinstance(name, str) or name not in self._kinds:
             raise InvalidInput(f"{self.noun} must be one of {', '.join(self._kinds)}, got {given(name)}")
         return self._kinds[name]
+
+    def __len__(self) -> int:
+        return len(self._kinds)
 
     def __contains__(self, name: object) -> bool:
         return name in self._kinds

@@ -20,8 +20,10 @@ from imaging.blurred.model import BlurredModel, State
 from imaging.models.bound import Known, known, response
 from imaging.sensor import Levels, squared_errors
 from measure.estimators.expansion import Expansion, Pieces
+from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.estimators.reach import model_within, reach_of
-from scenes import Noise
+from measure.features.layout import Layout
+from scenes import InvalidInput, Noise
 
 _STEPS = 50
 _SCORED = 5  # steps of Fisher scoring before those of Newton: it ends sooner where little is known
@@ -32,6 +34,7 @@ _LOST = 40.0  # px from the expected place at which they are
 _SETTLED = 1e-3  # of a standard deviation
 _ROUNDING = 1e-5  # of a chi-square: what is less is no difference
 _WHOLE = 1 - 1e-9  # of the sensor's sensitivity: less where the scale ends
+_FAINTEST = 1e-3  # grey levels of noise: about what the image of an arrangement is exact to
 _FREE = 1e3  # px: a standard deviation at which nothing is known
 
 
@@ -358,3 +361,18 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a positive matrix whose rows differ much in size."""
     scale = 1 / np.sqrt(np.diag(matrix))
     return np.linalg.inv(matrix * scale[:, None] * scale) * scale[:, None] * scale
+
+
+def _prepared(layout: Layout, threshold: float) -> ArrangementEstimator:
+    if layout.arrangement is None:
+        rest = ", ".join(name for name in ESTIMATORS if name != "arrangement")
+        raise InvalidInput(
+            f"estimator must be one of {rest} for what is no convex body before darkness, got 'arrangement'"
+        )
+    noise = layout.optics.sensor
+    if noise.variance < _FAINTEST**2:  # the least that a likelihood can be made of
+        noise = noise.model_copy(update={"sigma": _FAINTEST})
+    return ArrangementEstimator(layout.arrangement, layout.optics.shape, noise)
+
+
+ARRANGEMENT = EstimatorKind(_prepared, capture_px=np.inf, exact_px=2e-3)

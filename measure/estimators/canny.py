@@ -16,9 +16,12 @@ from scipy.special import ndtr
 
 from imaging.features.locator import MIN_CONTRAST, edge_blur
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, half_plane
+from measure.estimators.kinds import EstimatorKind
 from measure.estimators.profile import TRUNCATE, profile_kernel, top, top_kernel
+from measure.estimators.separate import SeparateEstimator, by_points, calipers_for, measurable
 from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper
+from measure.features.layout import Layout
 from measure.features.lines import cells, trend_along
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints, UnitNoise
@@ -219,3 +222,14 @@ def _window(pixels: np.ndarray, shape: tuple[int, int], margin: int) -> tuple[sl
 
 def _area(window: tuple[slice, slice]) -> int:
     return (window[0].stop - window[0].start) * (window[1].stop - window[1].start)
+
+
+def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
+    optics, calipers = layout.optics, calipers_for(layout, TRUNCATE)
+    looks = iter(thinnings(optics, [caliper for caliper in calipers if measurable(caliper)], threshold))
+    parts = by_points(optics, calipers, lambda caliper: CannyLocator.of(optics, caliper, threshold, next(looks)))
+    different = {part.locator.thinning for part in parts if part}
+    return SeparateEstimator(calipers, parts, different.pop() if len(different) == 1 else None)
+
+
+CANNY = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from scipy import sparse
 
 from imaging.features.locator import edge_blur
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
+from measure.estimators.kinds import EstimatorKind
+from measure.estimators.separate import SeparateEstimator, by_points, calipers_for, thinned
 from measure.features.calipers import Caliper
+from measure.features.layout import Layout
 from measure.features.optics import Optics
 
 
@@ -52,3 +57,12 @@ def second_derivative(
         return across / scale**4
 
     return gaussian_rows(places, scale, shape, derive)
+
+
+def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
+    optics = layout.optics
+    calipers = tuple(thinned(caliper, optics.scale_px) for caliper in calipers_for(layout, 4))
+    return SeparateEstimator(calipers, by_points(optics, calipers, partial(gradient_locator, optics)))
+
+
+GRADIENT = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True)

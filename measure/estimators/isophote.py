@@ -9,11 +9,15 @@ in its response. Through the points of an edge goes the line that the contour of
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from imaging.features.locator import MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
+from imaging.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 from imaging.geometry.segments import distance_to_segment
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
+from measure.estimators.kinds import EstimatorKind
+from measure.estimators.separate import PointEstimator, SeparateEstimator, calipers_for, measurable, thinned
 from measure.estimators.strip import HALF_WIDTH, pixels_beside
 from measure.features.calipers import Caliper
 from measure.features.layout import BACKGROUND, Layout
@@ -93,3 +97,20 @@ def _smoothed(layout: Layout, face: int, caliper: Caliper, sign: int) -> np.ndar
     )
     mean = there + inward * (inside - outside) / 2
     return np.stack([mean, mean * (caliper.positions - caliper.positions.mean()), there * inward], 1)
+
+
+def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
+    """Each edge by its isophote; `clutter` where one of its sides has no level of its own."""
+    parts, found = [], []
+    for index, caliper in enumerate(calipers_for(layout, 4, TRIM / CLEARANCE)):
+        part = None
+        if measurable(caliper):
+            locator, state = isophote_locator(layout, index, thinned(caliper, layout.optics.scale_px))
+            part = PointEstimator(replace(caliper, positions=locator.positions), locator)
+            caliper = replace(part.caliper, status=status.worst(caliper.status, state))
+        found.append(caliper)
+        parts.append(part)
+    return SeparateEstimator(tuple(found), tuple(parts))
+
+
+ISOPHOTE = EstimatorKind(_prepared, capture_px=0.5, exact_px=0.003)

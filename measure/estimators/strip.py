@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.geometry.segments import distance_to_segment, pixels_along
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
+from measure.estimators.kinds import EstimatorKind
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
-from measure.features.calipers import Caliper
+from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
+from scenes import status
 
 NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
 SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the blur
@@ -101,3 +106,18 @@ def pixels_beside(caliper: Caliper, half_width: float) -> tuple[np.ndarray, ...]
         (np.abs(across) <= half_width) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
     )
     return (y * shape[1] + x)[near], points[near], along[near], across[near]
+
+
+def _prepared(layout: Layout, threshold: float) -> LikelihoodEstimator:
+    clear = CLEARANCE * edge_blur(layout.optics.blur_px)  # a face less than twice as wide has no pixel of its own level
+    calipers = edge_calipers(layout, clear, 0.0, 2 * clear)
+    whole = [caliper.status in status.MEASURED for caliper in calipers]
+    parts = [strip_estimator(layout, f, i, clear) if whole[i] else None for i, f in enumerate(calipers)]
+    calipers = tuple(
+        f if part or not can else replace(f, status=status.SHORT)
+        for f, part, can in zip(calipers, parts, whole, strict=True)
+    )
+    return LikelihoodEstimator.joined(calipers, parts)
+
+
+STRIP = EstimatorKind(_prepared, capture_px=0.125, exact_px=2e-3)

@@ -11,7 +11,8 @@ import numpy as np
 
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
-from measure.estimators.registry import CAPTURE, estimator
+from measure.estimators.kinds import ESTIMATORS
+from measure.estimators.registry import estimator
 from measure.features.alignment import align
 from measure.features.arranged import find_arranged, goodness
 from measure.features.corners import corner_response, intersect, line_equations
@@ -87,7 +88,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
         return shape
     lengths = np.array([caliper.length for caliper in calipers])
     offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
-    limit = np.maximum(CAPTURE[name], 5 * _end_errors(lines, lengths))
+    limit = np.maximum(ESTIMATORS[name].capture_px, 5 * _end_errors(lines, lengths))
     far = ~(np.abs(offsets) <= limit).all((1, 2))
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:

@@ -19,8 +19,8 @@ from scipy.optimize import curve_fit
 from scipy.special import ndtr
 
 from imaging.geometry.projection import project
+from measure import ESTIMATORS
 from measure.bounds import corner_bound
-from measure.estimators.registry import ESTIMATORS
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared

@@ -5,7 +5,7 @@ import pytest
 
 import measure
 import render
-from measure.estimators.registry import ESTIMATORS
+from measure import ESTIMATORS
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.lines import fit_lines
 from measure.features.optics import Optics

@@ -224,7 +224,7 @@ def test_region_of_interest_holds_every_pixel_that_matters(task1, rng):
     """Changing all other pixels changes nothing, for every estimator."""
     image, _ = picture(task1, SENSOR)
     image = image + rng.standard_normal(image.shape)
-    looked_at = measure.region_of_interest(task1, SENSOR, None, measure.ESTIMATORS)
+    looked_at = measure.region_of_interest(task1, SENSOR, None, measure.ESTIMATORS.names)
     outside = np.where(looked_at, 0, 40 * rng.standard_normal(image.shape))
     for estimator in measure.ESTIMATORS:
         assert measure.distance(image + outside, task1, SENSOR, estimator=estimator).value_px == pytest.approx(

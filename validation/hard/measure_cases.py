@@ -18,7 +18,6 @@ from validation.hard.polygon import polygon_image
 from validation.hard.scenes_for import task1
 
 SENSOR, LIGHT = (31.3, 137.1), (15, 315)
-BIAS = {"gradient": 0.006, "canny": 0.006, "isophote": 0.003, "strip": 2e-3, "arrangement": 2e-3}  # px, noise free
 _TOP = ("v4", "v3", "v7", "v6")
 _BY_ALL = (
     "black image",
@@ -51,7 +50,8 @@ def distance(name: str, scene: Scene, image: Callable[[], np.ndarray], estimator
     sensor = how.pop("sensor", SENSOR)
     corners = top_face(scene, sensor)
     length = float(np.linalg.norm(corners[1] - corners[3]))
-    truth = Reference(length, "exact image", None, BIAS[estimator], scale=1.0) if right else Reference(None, "rule")
+    exact = measure.ESTIMATORS[estimator].exact_px
+    truth = Reference(length, "exact image", None, exact, scale=1.0) if right else Reference(None, "rule")
 
     def ours() -> Answer:
         try:

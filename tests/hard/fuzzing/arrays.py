@@ -58,7 +58,7 @@ def _hostile(rng: np.random.Generator) -> Any:
 
 
 def _distance(rng: np.random.Generator, value: Any) -> None:
-    found = measure.distance(value, _scene(), (30, 135), estimator=str(rng.choice(measure.ESTIMATORS)))
+    found = measure.distance(value, _scene(), (30, 135), estimator=str(rng.choice(measure.ESTIMATORS.names)))
     good = np.isin(found.status, ("ok", "clutter"))
     if not (np.isfinite(found.value_px) == good).all() or not (found.variance_px2 > 0).all():
         raise AssertionError(f"value {found.value_px}, variance {found.variance_px2}, status {found.status}")
@@ -78,7 +78,7 @@ def _distance_arguments(rng: np.random.Generator, value: Any) -> None:
 
 
 def _propagate(rng: np.random.Generator, value: Any) -> None:
-    found = measure.propagate(value, _scene(), (30, 135), estimator=str(rng.choice(measure.ESTIMATORS)))
+    found = measure.propagate(value, _scene(), (30, 135), estimator=str(rng.choice(measure.ESTIMATORS.names)))
     if not (found.variance_px2 > 0 or found.status not in ("ok", "clutter")):
         raise AssertionError(f"variance {found.variance_px2}, status {found.status}")
 

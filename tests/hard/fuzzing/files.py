@@ -71,7 +71,7 @@ def image(rng: np.random.Generator, folder: Path) -> str:
     picture = picture_file.read(stored(folder, f"image{suffix}", data))
     if picture.size <= 100_000:
         measure.measure_quadrilateral(picture)
-    estimator = str(rng.choice(measure.ESTIMATORS))
+    estimator = str(rng.choice(measure.ESTIMATORS.names))
     found = measure.distance(picture, scenes.load("task1"), (30, 135), estimator=estimator)
     good = np.isin(found.status, status.MEASURED)
     if not (np.isfinite(found.value_px) == good).all() or not (found.variance_px2 > 0).all():

@@ -1,0 +1,200 @@
+"""Edges that are measured one by one: points along each, a line through them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from imaging.features.locator import reach
+from measure.estimators.crossing import CrossingLocator
+from measure.estimators.estimate import Estimate, noisy
+from measure.estimators.thinning import Thinned, Thinning
+from measure.features.calipers import Caliper, edge_calipers
+from measure.features.layout import Layout, Optics
+from measure.features.lines import fit_lines, regression
+from scenes import status
+
+if TYPE_CHECKING:
+    from measure.estimators.canny import CannyLocator
+
+_FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
+_MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
+_DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
+_MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
+
+
+def calipers_for(layout: Layout, kernel_sigmas: float, trim: float = 1.0) -> tuple[Caliper, ...]:
+    """Calipers of a layout's edges for a locator whose kernel ends after so many smoothing scales.
+
+    ``trim`` is how much of the reach is left out beside each corner.
+    """
+    optics = layout.optics
+    beside = reach(optics.scale_px, optics.blur_px)
+    margin = optics.window_px + kernel_sigmas * optics.scale_px + 1
+    return edge_calipers(layout, trim * beside, margin, beside)
+
+
+def by_points(
+    optics: Optics, calipers: tuple[Caliper, ...], locator: Callable[[Caliper], CrossingLocator | CannyLocator]
+) -> tuple[PointEstimator | None, ...]:
+    """An estimator of each edge that can be measured, by its locator."""
+    return tuple(PointEstimator(f, locator(f)) if measurable(f) else None for f in calipers)
+
+
+def thinned(caliper: Caliper, scale: float) -> Caliper:
+    """Positions at most 2 scales apart, and not too few: points in between add nothing (their errors are smooth)."""
+    if caliper.positions.size < 3:
+        return caliper
+    first, last = caliper.positions[[0, -1]]
+    return replace(
+        caliper, positions=np.linspace(first, last, max(_FEWEST, int(np.ceil((last - first) / (2 * scale))) + 1))
+    )
+
+
+def measurable(caliper: Caliper) -> bool:
+    """Whether its edge can be measured at all."""
+    return caliper.status in status.MEASURED
+
+
+@dataclass(frozen=True)
+class PointEstimator:
+    """One edge from edge points and a total-least-squares line."""
+
+    caliper: Caliper
+    locator: CrossingLocator | CannyLocator
+
+    @property
+    def calipers(self) -> tuple[Caliper, ...]:
+        return (self.caliper,)
+
+    @property
+    def pixels(self) -> np.ndarray:
+        return self.locator.pixels
+
+    def estimate(self, images: np.ndarray | Thinned, noise_variance: np.ndarray | float) -> Estimate:
+        """As `Estimator.estimate`; ``noise_variance`` (n,) is the mean along the edge, grey levels^2."""
+        points = self.locator.locate(images)
+        lines = fit_lines(points, points.weights)
+        slope = np.tan(lines.tilt)
+        enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
+        clear = points.contrast > self.locator.least_contrast * np.sqrt(noise_variance)
+        edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
+        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
+        columns = (
+            lines.mean_offset - slope * lines.mean_along,
+            slope,
+            np.stack([points.contrast - points.trend * lines.mean_along, points.trend], -1),
+            lines.count,
+            np.maximum(self.caliper.positions.size - lines.count, 0),
+            state,
+        )
+        return Estimate(*(column[:, None] for column in columns))
+
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
+        """That of a straight edge whose points' errors go with 1 / contrast, a parabola through three places."""
+        contrast = estimate.contrast[..., :1] + estimate.contrast[..., 1:] * self._places
+        middle = contrast[:, 0, 1:2]
+        inverse = 1 / np.where(middle > 0, np.maximum(contrast[:, 0], _DIMMEST * middle), np.nan)
+        moments = noisy(self._responses, self.caliper.optics, images, self.pixels)
+        shape = (len(inverse) if moments.ndim == 3 else 1, 2, 3, 2, 3)
+        moments = np.broadcast_to(moments.reshape(shape), (len(inverse), *shape[1:]))
+        return np.einsum("nj,nk,najbk->nab", inverse, inverse, moments)
+
+    @property
+    def _places(self) -> np.ndarray:
+        """Start, middle and end of the part of the edge that is measured, px."""
+        return np.linspace(*self.caliper.positions[[0, -1]], 3)
+
+    @cached_property
+    def _responses(self) -> np.ndarray:
+        """Derivative of (level, slope) by `pixels` where 1 / contrast is 1 at one of `_places`, 0 at others, (6, P)."""
+        noise = self.locator.unit_noise()
+        lines = _level_and_slope(noise.along, noise.weights)
+        shapes = np.linalg.inv(np.vander(self._places, 3)).T @ np.vander(noise.along, 3).T
+        return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
+
+    def respond(self, clean: np.ndarray) -> np.ndarray:
+        return self._response(clean).toarray()
+
+    def respond_within(self, clean: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+        """The same at some pixels, flat indices in order that hold all of `pixels`, (2, P)."""
+        told = self._response(clean).tocoo()
+        found = np.zeros((2, pixels.size))
+        row, column = told.coords
+        found[row, np.searchsorted(pixels, column)] = told.data
+        return found
+
+    def _response(self, clean: np.ndarray) -> sparse.csr_array:
+        """Derivative of (level, slope) by an image's pixels, (2, H W)."""
+        points, response = self.locator.linear_response(clean)
+        count = response.shape[0]
+        keep = points.valid[0, :count]
+        if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
+            pixels = np.tile(self.pixels, 2)
+            return sparse.csr_array(
+                (np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)), (2, clean.size)
+            )
+        weights = np.broadcast_to(points.weights, points.along.shape)[0, :count][keep]
+        lines = _level_and_slope(points.along[0, :count][keep], weights)
+        return sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
+
+
+def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Linear map from offsets at places (m,) to (offset at the start of the edge, slope), (2, m)."""
+    mean, slope = regression(along, weights)
+    return np.stack([mean - (weights @ along) / weights.sum() * slope, slope])
+
+
+@dataclass(frozen=True)
+class SeparateEstimator:
+    """Several edges, each by an estimator of its own; None for an edge that cannot be measured."""
+
+    calipers: tuple[Caliper, ...]
+    parts: tuple[PointEstimator | None, ...]
+    thinning: Thinning | None = None
+    """Canny's choice of pixels where it is made once for all parts."""
+
+    @property
+    def pixels(self) -> np.ndarray:
+        return np.unique(np.concatenate([np.empty(0, int), *(part.pixels for part in self.parts if part)]))
+
+    def estimate(self, images: np.ndarray) -> Estimate:
+        n = len(images)
+        nothing = np.full((n, 1), np.nan)
+        none = np.zeros((n, 1), int)
+        missing = Estimate(nothing, nothing, np.zeros((n, 1, 2)), none, none, np.full((n, 1), status.LOW_CONTRAST))
+        seen = self.thinning(images) if self.thinning else images
+        parts = [missing if part is None else part.estimate(seen, _noise_of(part, images)) for part in self.parts]
+        return Estimate(*(np.concatenate(column, 1) for column in zip(*parts, strict=True)))
+
+    def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
+        edges = len(self.parts)
+        whole = np.zeros((len(estimate.level), 2 * edges, 2 * edges))
+        for e, part in enumerate(self.parts):
+            if part:
+                here = slice(2 * e, 2 * e + 2)
+                own = Estimate(*(column[:, e : e + 1] for column in estimate))
+                whole[:, here, here] = part.covariance(own, images)
+        return whole
+
+    def respond(self, clean: np.ndarray) -> np.ndarray:
+        return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])
+
+    def respond_within(self, clean: np.ndarray) -> np.ndarray:
+        """The same at `pixels` alone, (2 E, P)."""
+        pixels = self.pixels
+        return np.concatenate([part.respond_within(clean, pixels) if part else np.zeros((2, pixels.size))
+                               for part in self.parts])  # fmt: skip
+
+
+def _noise_of(part: PointEstimator, images: np.ndarray) -> np.ndarray | float:
+    """Mean variance of the noise at the pixels of one edge, grey levels^2, of all images or of each (n,)."""
+    optics = part.caliper.optics
+    if optics.noise is None or optics.noise.gain <= 0:
+        return optics.noise_variance
+    return optics.noise_at(images.reshape(len(images), -1)[:, part.pixels]).mean(1)
