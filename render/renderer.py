@@ -20,7 +20,7 @@ from render.large import Renders, fine_pixels, is_large
 from render.mosaic import mosaic, refine_tiles
 from render.optics import blur_and_bin
 from render.parts import Part, parts, within_cone
-from render.phenomena import Tolerance, choose
+from render.phenomena import EFFECTS, Tolerance, choose
 from render.precision import check_precision
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
 from scenes import InvalidInput, Picture, Scene
@@ -121,6 +121,8 @@ def image(
             if part.silhouette:
                 fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
             levels[rows, columns] += blur_and_bin(fine, camera, k, start)
+    for name in sorted(chosen.active):
+        levels = EFFECTS[name].seen(levels, picture)
     return levels
 
 

@@ -13,7 +13,7 @@ from scenes.errors import InvalidInput, given
 Kind = TypeVar("Kind")
 
 
-class Registry(Generic[Kind], Collection):
+class Registry(Collection[str], Generic[Kind]):
     """Kinds of one noun by name.
 
     A module of a user's own adds one with `add`, as decorator or called; it is found where the project's own are

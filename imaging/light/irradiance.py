@@ -40,7 +40,7 @@ def beam(emitter: Emitter, points: np.ndarray, axes: int = 0, *, fall_off: bool 
     to_light = away / distance[..., None]
     strength = emitter.power / (distance if fall_off else emitter.distance) ** 2
     if emitter.axis is not None:
-        strength = strength * np.maximum(-(to_light * widened(np.asarray(emitter.axis), axes)).sum(-1), 0.0)
+        strength = strength * emitter.light.profile(-(to_light * widened(np.asarray(emitter.axis), axes)).sum(-1))
     return Beam(to_light, strength)
 
 

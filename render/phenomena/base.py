@@ -10,7 +10,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from imaging.pictures import Pictures
-from scenes import InvalidInput, Luminaire, Scene
+from scenes import InvalidInput, Luminaire, Picture, Scene
+from scenes.registry import Registry
 
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
 
@@ -83,6 +84,16 @@ class Effect(ABC):
     def without(self, scene: Scene) -> Scene:
         """The scene with the effect's parts neutral."""
         return scene
+
+    def seen(self, levels: np.ndarray, picture: Picture) -> np.ndarray:
+        """What it makes of a rendered image (height, width), grey levels, ``noise.dark_level`` in darkness.
+
+        For an effect that no part of the scene and no ray simulates.
+        """
+        return levels
+
+
+EFFECTS: Registry[Effect] = Registry("effect")
 
 
 def changed(scene: Scene, part: str, **values) -> Scene:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.pictures import Pictures
-from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, Tolerance
+from render.phenomena.base import EFFECTS, EVERYTHING, NOTHING, Effect, Influence, Tolerance
 from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
 from render.phenomena.pose import PoseJitter
 from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
@@ -28,15 +28,13 @@ from render.phenomena.transport import CastShadow, FloorReflectance, Interreflec
 from scenes import InvalidInput, Picture, Scene
 from scenes.errors import given
 
-REGISTER: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
-        Analyser(), Wavelength(), Texture(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
-        LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
-        FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
-    )
-}  # fmt: skip
+for _effect in (
+    AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
+    Analyser(), Wavelength(), Texture(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
+    LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
+    FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
+):  # fmt: skip
+    EFFECTS.add(_effect.name)(_effect)
 
 
 @dataclass(frozen=True)
@@ -114,8 +112,8 @@ def choose(scene: Scene, wanted: str | Iterable[str], tolerance: Tolerance, pict
     else:
         decisions, active = (), named(wanted)
     reduced = scene
-    for name in REGISTER.keys() - active:
-        reduced = REGISTER[name].without(reduced)
+    for name in set(EFFECTS) - active:
+        reduced = EFFECTS[name].without(reduced)
     return Choice(reduced, active, decisions)
 
 
@@ -128,11 +126,11 @@ def named(wanted: str | Iterable[str]) -> frozenset[str]:
         If there is no such effect.
     """
     if wanted == "all":
-        return frozenset(REGISTER)
+        return frozenset(EFFECTS)
     names = frozenset(wanted.split(",") if isinstance(wanted, str) else wanted) - {""}
-    unknown = sorted(names - REGISTER.keys())
+    unknown = sorted(names - set(EFFECTS))
     if unknown:
-        raise InvalidInput(f"effects must be auto, all or some of {', '.join(REGISTER)}, got {unknown[0]!r}")
+        raise InvalidInput(f"effects must be auto, all or some of {', '.join(EFFECTS)}, got {unknown[0]!r}")
     return names
 
 
@@ -149,7 +147,7 @@ def of_settings(scene: Scene, *pictures: Picture) -> Pictures:
 
 
 def _decisions(pictures: Pictures, tolerance: Tolerance) -> tuple[Decision, ...]:
-    return tuple(_decide(effect, pictures, tolerance) for effect in REGISTER.values())
+    return tuple(_decide(effect, pictures, tolerance) for effect in map(EFFECTS.__getitem__, EFFECTS))
 
 
 def _decide(effect: Effect, pictures: Pictures, tolerance: Tolerance) -> Decision:

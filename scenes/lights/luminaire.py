@@ -104,6 +104,10 @@ class Luminaire(Model):
         """Whether it is taken for a point."""
         return False
 
+    def profile(self, cosine: np.ndarray) -> np.ndarray:
+        """What a node sends at an angle to its normal over what it sends along it, from the angle's cosine."""
+        return np.maximum(cosine, 0.0)
+
     @property
     def cone(self) -> float:
         """Half angle of the cone about its axis in which it shines [rad]."""

@@ -75,6 +75,8 @@ class Light(Luminaire):
         return needed(self.half_size / distance)  # its field is told by powers of its radius over distance
 
 
-def as_point(light: Luminaire) -> Light:
-    """A point in its middle that gives the same irradiance at the reference point."""
+def as_point(light: Luminaire) -> Luminaire:
+    """A point in its middle that gives the same irradiance at the reference point; itself where it has no size."""
+    if light.half_size == 0:
+        return light
     return Light(**{name: getattr(light, name) for name in Luminaire.model_fields if name != "kind"})

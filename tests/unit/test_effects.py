@@ -6,7 +6,7 @@ import pytest
 import render
 import scenes
 from planner import Pictures
-from render.phenomena import REGISTER, Tolerance, choose
+from render.phenomena import EFFECTS, Tolerance, choose
 from scenes import Floor, InvalidInput, Noise, Obstacle, Picture, Pose
 from scenes.load import load, names
 
@@ -32,7 +32,7 @@ def test_register_has_every_effect_once():
         "light_size backlight spill depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern "
         "quantisation saturation pose_jitter texture"
     )
-    assert set(REGISTER) == set(wanted.split())
+    assert set(EFFECTS) == set(wanted.split())
 
 
 @pytest.mark.parametrize("name", NEEDED)
@@ -64,7 +64,7 @@ def test_tolerance_decides(task1):
 def test_decision_is_made_for_the_setting(task1):
     """An upright that shades a required edge from one light and not from the other."""
     scene = task1.model_copy(update={"obstacles": (Obstacle(corner=(14, 0, 0), size=(1, 7.5, 10)),)})
-    shades = REGISTER["cast_shadow"]
+    shades = EFFECTS["cast_shadow"]
 
     def influence(light):
         return shades.influence(Pictures.of(scene, [[30, 135]], [light]))
@@ -76,7 +76,7 @@ def test_decision_is_made_for_the_setting(task1):
 def test_named_effects_and_bad_names(task1):
     assert choose(task1, "floor,lens_blur", Tolerance()).active == {"floor", "lens_blur"}
     assert choose(task1, ["floor"], Tolerance()).active == {"floor"}
-    assert choose(task1, "all", Tolerance()).active == set(REGISTER)
+    assert choose(task1, "all", Tolerance()).active == set(EFFECTS)
     with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .*, got 'fog'"):
         choose(task1, "fog", Tolerance())
     with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
@@ -109,8 +109,9 @@ def test_saturation_only_where_levels_reach_the_end(task1):
 def test_costs(task1):
     """No effect makes a render cheaper; what says that it costs nothing costs 1; what is absent says why."""
     pictures = Pictures.of(task1, np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]]))
-    reasons = {name: effect.absent(pictures) for name, effect in REGISTER.items()}
+    every = {name: EFFECTS[name] for name in EFFECTS}
+    reasons = {name: effect.absent(pictures) for name, effect in every.items()}
     assert all(reason is None or reason for reason in reasons.values())
-    assert {name: effect.cost >= 1 for name, effect in REGISTER.items()} == dict.fromkeys(REGISTER, True)
-    free = {name for name, effect in REGISTER.items() if effect.cost == 1}
-    assert free == {name for name, effect in REGISTER.items() if "costs nothing" in effect.switch}
+    assert {name: effect.cost >= 1 for name, effect in every.items()} == dict.fromkeys(EFFECTS, True)
+    free = {name for name, effect in every.items() if effect.cost == 1}
+    assert free == {name for name, effect in every.items() if "costs nothing" in effect.switch}

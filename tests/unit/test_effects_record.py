@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from render.phenomena import REGISTER
+from render.phenomena import EFFECTS
 from scenes import InvalidInput
 from validation import run
 from validation.batch import work
@@ -24,7 +24,7 @@ def test_effects_are_recorded_and_shown(task1):
 def test_effects_that_were_asked_for_are_recorded_as_such(task1):
     every = work.effects(task1, Rendering(effects="all"))
     assert all(line["on"] for line in every)
-    assert len(every) == len(REGISTER)
+    assert len(every) == len(EFFECTS)
     named = {line["effect"]: line["on"] for line in work.effects(task1, Rendering(effects="floor,lens_blur"))}
     assert {name for name, on in named.items() if on} == {"floor", "lens_blur"}
 

@@ -7,9 +7,9 @@ import pytest
 import scenes
 from imaging.models import variance_model
 from imaging.pictures import Pictures
+from render.phenomena import EFFECTS
 from render.phenomena.base import SAFETY, Influence, Tolerance, largest
 from render.phenomena.edges import sides
-from render.phenomena.register import REGISTER
 from scenes import Floor, InvalidInput, Jitter, Lens, Noise
 from tests.oracle import axes, pinhole
 
@@ -38,15 +38,15 @@ def test_distortion_stretches_and_moves(task1):
             step = 1e-3 * np.eye(2)
             slopes = np.stack([(bent(image + h) - bent(image - h)) / 2e-3 for h in step], -1) - np.eye(2)
             most = max(most, np.sqrt((slopes**2).sum((1, 2))).max())
-    found = REGISTER["lens_distortion"].influence(Pictures.of(scene, SENSORS, LIGHTS))
+    found = EFFECTS["lens_distortion"].influence(Pictures.of(scene, SENSORS, LIGHTS))
     assert found.variance == pytest.approx(SAFETY * 6 * most, rel=1e-5)
     assert found.bias_px > 0
-    assert REGISTER["lens_distortion"].absent(Pictures.of(task1, SENSORS, LIGHTS)) == "all coefficients are 0"
+    assert EFFECTS["lens_distortion"].absent(Pictures.of(task1, SENSORS, LIGHTS)) == "all coefficients are 0"
 
 
 def test_a_floor_that_ends_before_the_edges_show_it(task1):
     """Nothing where no required edge has floor behind it, the same as a wide one where all of them have."""
-    floor = REGISTER["floor"]
+    floor = EFFECTS["floor"]
 
     def influence(half_side):
         scene = task1.model_copy(update={"floor": Floor(reflectance=0.5, height=-1.0, half_side=half_side)})
@@ -59,7 +59,7 @@ def test_a_floor_that_ends_before_the_edges_show_it(task1):
 
 def test_jitter_of_the_light_alone_moves_no_edge(task1):
     """Only contrasts change: with the square of the angle, and without bias."""
-    jitter = REGISTER["pose_jitter"]
+    jitter = EFFECTS["pose_jitter"]
 
     def influence(sensor, light):
         scene = task1.model_copy(update={"jitter": Jitter(sensor_deg=sensor, light_deg=light)})
@@ -77,7 +77,7 @@ def test_jitter_of_the_light_alone_moves_no_edge(task1):
 @pytest.mark.parametrize("height", [0.0, -2.0])
 def test_interreflection_needs_another_surface(task1, height):
     """A floor of reflectance r under faces of albedo a: proportional to r to first order, and none without."""
-    effect = REGISTER["interreflection"]
+    effect = EFFECTS["interreflection"]
 
     def influence(reflectance):
         scene = task1.model_copy(update={"floor": Floor(reflectance=reflectance, height=height)})
@@ -105,7 +105,7 @@ def test_depth_of_field_widens_the_blur(focus, task1):
             depth = scene.camera.distance - points @ out
             radius = np.abs(lens.aperture_radius * (1 - lens.focus / depth)) / lens.focus * scene.camera.focal_px
             most = max(most, (radius**2 / 4).max())
-    effect = REGISTER["depth_of_field"]
+    effect = EFFECTS["depth_of_field"]
     found = effect.influence(Pictures.of(scene, SENSORS, LIGHTS))
     assert found.variance == pytest.approx(SAFETY * ((1 + most / own) ** 3 - 1), rel=1e-9)
     assert found.bias_px > 0
@@ -116,7 +116,7 @@ def test_depth_of_field_widens_the_blur(focus, task1):
 
 def test_blur_of_the_lens(task1):
     """A point's variance is as (s^2 + s_e^2)^3."""
-    found = REGISTER["lens_blur"].influence(Pictures.of(task1, SENSORS, LIGHTS))
+    found = EFFECTS["lens_blur"].influence(Pictures.of(task1, SENSORS, LIGHTS))
     own, blur = task1.locator.scale_px**2, task1.camera.blur_px**2 + 1 / 12
     assert found.variance == pytest.approx(SAFETY * ((1 + blur / own) ** 3 - 1), rel=1e-12)
 
@@ -130,7 +130,7 @@ def test_fixed_pattern_does_not_depend_on_the_noise(sigma, task1):
     unit = variance_model("calibrated")(Pictures.of(plain, SENSORS, LIGHTS)).variance.max()
     signals = sides(Pictures.of(plain, SENSORS, LIGHTS)).levels
     pattern = 0.6**2 + (0.01 * signals.max()) ** 2
-    found = REGISTER["fixed_pattern"].influence(Pictures.of(scene, SENSORS, LIGHTS))
+    found = EFFECTS["fixed_pattern"].influence(Pictures.of(scene, SENSORS, LIGHTS))
     assert found.bias_px == pytest.approx(4 * np.sqrt(unit * pattern), rel=1e-9)
     assert found.variance == 0
 

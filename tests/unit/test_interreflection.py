@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from imaging.pictures import Pictures
-from render.phenomena import transport
-from render.phenomena.register import REGISTER
+from render.phenomena import EFFECTS, transport
 from render.phenomena.transport import _above_floor, _clearance, _form_factor, _gain, _hides, albedo
 from scenes import Floor, Material, Obstacle
 
@@ -75,7 +74,7 @@ def test_light_that_is_added(walls, task1, monkeypatch):
     floor = Floor(reflectance=0.3, height=-2.0)
     scene = task1.model_copy(update={"floor": floor, "obstacles": walls})
     pictures = Pictures.of(scene, np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]]))
-    REGISTER["interreflection"].influence(pictures)
+    EFFECTS["interreflection"].influence(pictures)
     own = transport.sides(pictures)
     albedo = (1 - scene.material.specular_fraction) * scene.material.diffuse_reflectance
     white = scene.camera.exposure * _gain(scene)

@@ -15,6 +15,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
 
+from scenes import plugins
+
 
 @dataclass(frozen=True)
 class Crew:
@@ -49,7 +51,7 @@ def local(workers: int) -> Iterator[Crew]:
         return
     context, others = _Spawn(), set(multiprocessing.active_children())
     ours, theirs = context.Pipe()
-    executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs,))
+    executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs, plugins.loaded()))
     try:
         yield Crew(executor, lambda: workers)
     except BaseException:
@@ -107,10 +109,12 @@ class _Spawn(SpawnContext):
     Process = _Deaf
 
 
-def _begin(lifeline: Connection) -> None:
-    """In a worker: leave Ctrl-C to the main process, and end when that is gone."""
+def _begin(lifeline: Connection, modules: tuple[str, ...]) -> None:
+    """In a worker: leave Ctrl-C to the main process, end when that is gone, and know the kinds that it knows."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+    for name in modules:
+        plugins.load(name)
 
 
 def _end_with(lifeline: Connection) -> None:

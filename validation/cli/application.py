@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from scenes import plugins
 from validation.cli import verbosity
 from validation.cli.commands import Commands
 
@@ -29,10 +30,21 @@ def _ice(
     verbose: Annotated[
         bool, typer.Option("-v", "--verbose", help="Say on standard error what is done. May stand anywhere.")
     ] = False,
+    plugin: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--plugin",
+            metavar="MODULE",
+            help="Module that adds kinds of lights, estimators, effects.",
+        ),
+    ] = None,
 ) -> None:
     """Predict how precisely an image will let you measure, and prove it by rendering and re-measuring.
 
     Exit status: 0 done; 1 contradicted, not measured or not finished; 2 bad input; 3 an error of this program.
     """
     verbosity.choose(quiet, verbose)
+    plugins.load_installed()
+    for name in plugin or []:
+        plugins.load(name)
     verbosity.hush()

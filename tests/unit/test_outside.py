@@ -1,0 +1,141 @@
+"""Kinds that a user adds from outside go through the commands as the project's own do (``tests/outside``)."""
+
+import json
+
+import numpy as np
+import pytest
+
+import measure
+import planner
+import render
+import scenes
+from render.phenomena import EFFECTS
+from scenes import InvalidInput, plugins
+from scenes.lights import LIGHTS
+from scenes.registry import Registry
+from tests.commands import ice
+from tests.oracle import block_image
+
+MODULES = "spotlight", "median", "vignetting"
+SENSOR, LIGHT = (30, 135), (15, 315)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def outside():
+    """The modules' kinds are known in this file's tests alone."""
+    for name in MODULES:
+        plugins.load(f"tests.outside.{name}")
+    yield
+    kinds = (LIGHTS, "spotlight"), (measure.ESTIMATORS, "median"), (EFFECTS, "vignetting")
+    for registry, name in kinds:
+        registry.remove(name)
+
+
+@pytest.fixture(scope="module")
+def lit(task1):
+    """Task 1 under a spotlight whose border runs beside the part, so that its faces get less towards their ends."""
+    spot = {"kind": "spotlight", "distance": task1.light.distance, "cutoff_deg": 20.0, "beam_deg": 2.0}
+    return task1.with_(light=spot)
+
+
+def test_a_spotlight_is_predicted_rendered_and_measured_alike(lit):
+    """It fades along the part's faces: variance and bias are others than a point's, and the renderer's are as told."""
+    clean = render.image(lit, SENSOR, LIGHT)
+    point = planner.predict(lit.with_(light={"kind": "point", "distance": lit.light.distance}), SENSOR, LIGHT)
+    found, told = measure.propagate(clean, lit, SENSOR, LIGHT), planner.predict(lit, SENSOR, LIGHT)
+    assert told.variance_px2 > 1.3 * point.variance_px2
+    assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.05)
+    off = measure.distance(clean, lit, SENSOR, LIGHT).value_px - told.value_px
+    assert abs(told.bias_px) > 10 * abs(point.bias_px)
+    assert off == pytest.approx(told.bias_px, abs=2e-3)  # margin: 0.0006 is the renderer's own, 0.013 the bias
+
+
+def test_a_spotlight_is_checked_as_every_light_is(task1):
+    with pytest.raises(InvalidInput, match=r"light\.spotlight\.cutoff_deg must be less than 90, got 200"):
+        task1.with_(light={"kind": "spotlight", "distance": 100.0, "cutoff_deg": 200.0})
+
+
+def test_a_median_s_variance_is_what_noisy_images_show(task1):
+    clean, noise = block_image(task1, SENSOR, LIGHT), task1.noise
+    images = render.expose(clean, noise, np.random.default_rng(3), 400)
+    found = measure.distance(images, task1, SENSOR, LIGHT, "median")
+    assert (found.status == "ok").all()
+    ratio = found.value_px.var(ddof=1) / found.variance_px2.mean()
+    assert abs(ratio - 1) < 4 * np.sqrt(2 / 399)  # margin: 4 standard errors
+    assert found.value_px.mean() == pytest.approx(planner.predict(task1, SENSOR, LIGHT).value_px, abs=0.02)
+    least = measure.distance(images, task1, SENSOR, LIGHT, "gradient")
+    assert not np.array_equal(found.value_px, least.value_px)
+
+
+def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):
+    names = "attached_shadow", "fall_off", "lens_blur"
+    without, seen = (render.image(task1, SENSOR, LIGHT, effects=each) for each in (names, (*names, "vignetting")))
+    y, x = np.unravel_index(without.argmax(), without.shape)
+    (height, width), focal = without.shape, task1.camera.focal_px
+    tangent2 = ((x - (width - 1) / 2) ** 2 + (y - (height - 1) / 2) ** 2) / focal**2
+    dark = task1.noise.dark_level
+    assert seen[y, x] - dark == pytest.approx((without[y, x] - dark) * np.cos(np.arctan(np.sqrt(tangent2))) ** 4)
+    assert seen[y, x] < without[y, x]
+    (decision,) = (each for each in render.effects(task1) if each.effect.name == "vignetting")
+    assert decision.influence.variance > 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("predict", "own.toml", "--sensor", "30,135", "--light", "15,315"),
+        ("effects", "own.toml"),
+        ("plan", "own.toml", "--step", "60"),
+        ("budget", "own.toml"),
+        ("validate", "own.toml", "--renders", "20", "--workers", "1"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_commands_take_them(command, tmp_path):
+    text = (scenes.load.__globals__["BUNDLED"] / "task1.toml").read_text()
+    before, _, rest = text.partition("[light]")
+    own = "[light]\nkind = 'spotlight'\ncutoff_deg = 12.0\nbeam_deg = 0.5" + rest
+    (tmp_path / "own.toml").write_text(before + own)
+    done = ice("--plugin", "tests.outside.spotlight", *command, "--json", cwd=tmp_path)
+    assert done.returncode in (0, 1), done.stderr
+    assert json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("no_such_module_here", "No module named"),
+        ("a b", "must be a module's name"),
+        ("own_kind", "light.kind must have a name of its own, got 'ring'"),
+        ("broken", "division by zero"),
+    ],
+)
+def test_a_module_that_cannot_be_loaded_is_one_line(name, says, tmp_path):
+    (tmp_path / "broken.py").write_text("1 / 0\n")
+    (tmp_path / "own_kind.py").write_text("from scenes.lights import LIGHTS, Disc\nLIGHTS.add('ring')(Disc)\n")
+    done = ice("--plugin", name, "scenes", cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert says in done.stderr
+
+
+def test_a_scene_file_loads_no_code(tmp_path):
+    """A kind that nobody has loaded is refused, by a name that a module of the folder has, too."""
+    (tmp_path / "flood.py").write_text("raise SystemExit('loaded')\n")
+    text = (scenes.load.__globals__["BUNDLED"] / "task1.toml").read_text()
+    (tmp_path / "own.toml").write_text(text.replace("[light]", "[light]\nkind = 'flood'"))
+    done = ice("show", "own.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "light must be a known kind" in done.stderr
+
+
+def test_a_name_stands_for_one_kind():
+    kinds = Registry("thing")
+    kinds.add("a")(1)
+    kinds.add("a")(1)
+    with pytest.raises(InvalidInput, match="thing must have a name of its own, got 'a'"):
+        kinds.add("a")(2)
+    with pytest.raises(InvalidInput, match="thing must be one of a, got 'b'"):
+        kinds["b"]
+    kinds.remove("a")
+    assert not len(kinds)
