@@ -76,7 +76,7 @@ def condition_of(function: Callable[[list], mpf], numbers: list) -> float:
 
 
 def dot(a, b):
-    return mp.fdot(zip(a, b, strict=True))  # ty: ignore[missing-attribute]
+    return mp.fdot(zip(a, b, strict=True))
 
 
 def minus(a, b):
