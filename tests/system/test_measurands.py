@@ -81,10 +81,14 @@ def two_holes(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def measured(two_holes):
+def clean(two_holes):
+    return render.image(two_holes[0], SENSOR, LIGHT)
+
+
+@pytest.fixture(scope="module")
+def measured(two_holes, clean):
     """The noise-free picture's prediction, and as many noisy pictures measured."""
     scene, _ = two_holes
-    clean = render.image(scene, SENSOR, LIGHT)
     pictures = render.expose(clean, scene.noise, np.random.default_rng(5), COUNT)
     told = measure.propagate(clean, scene, SENSOR, LIGHT, "gradient").measurands
     return told, measure.measure(pictures, scene, SENSOR, LIGHT, "gradient")
@@ -148,10 +152,9 @@ def test_hole_to_hole_alone(two_holes):
     assert best.prediction.variance_cm2 < told.variance_cm2
 
 
-def test_a_displaced_part_is_followed(two_holes):
+def test_a_displaced_part_is_followed(two_holes, clean):
     """The camera looks 2 px beside: lines and circles are found again, and perspective changes lengths by some 1e-3."""
     scene, _ = two_holes
-    clean = render.image(scene, SENSOR, LIGHT)
     found = measure.measure(np.roll(clean, (1, 2), (0, 1)), scene, SENSOR, LIGHT, "gradient")
     here = measure.measure(clean, scene, SENSOR, LIGHT, "gradient")
     assert found.status.tolist() == here.status.tolist()
