@@ -13,7 +13,7 @@ pytestmark = pytest.mark.render
 def levels(scene, sensor, light, points):
     """Grey levels above darkness of the pixels that look at points."""
     x, y = np.rint(project(np.array(points), np.array(sensor, float), scene.camera)).astype(int).T
-    return render.image(scene, sensor, light)[y, x] - scene.noise.dark_level
+    return render.image(scene, sensor, light, render.Quality(1, 1, 1, 1))[y, x] - scene.noise.dark_level
 
 
 def test_one_looks_through_the_plates_hole():
