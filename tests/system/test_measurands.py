@@ -18,9 +18,7 @@ from validation.statistics import sidak
 pytestmark = pytest.mark.render
 COUNT = 400
 SENSOR, LIGHT = (30, 80), (35, 335)
-QUICK = render.Quality(
-    supersample=2, edge_samples=64
-)  # values 0.5 sigma off at most, as with 4 and a quarter of its time
+QUICK = render.Quality(supersample=2, edge_samples=64)  # values 0.5 sigma off at most, as with 4 each way
 
 
 def plate_with_holes(size, holes, sections=64):

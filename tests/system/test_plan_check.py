@@ -16,9 +16,7 @@ from validation.plan_check import CheckedSetting, PlanCheck, _judged, check_plan
 from validation.statistics import p_value
 
 QUICK = Quality(samples=1, edge_samples=16, random_samples=4)
-ROUGH = Quality(
-    supersample=2, samples=1, edge_samples=64, random_samples=4
-)  # where pictures are compared among themselves
+ROUGH = Quality(supersample=2, samples=1, edge_samples=64, random_samples=4)  # compared among themselves
 IMAGES = 400
 
 
