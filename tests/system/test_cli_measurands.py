@@ -8,7 +8,6 @@ from rich.console import Console
 import planner
 import scenes
 import validation
-from render import Quality
 from scenes.load import BUNDLED
 from tests.commands import ice
 from validation.report import export, plan_table
@@ -68,7 +67,7 @@ def test_what_cannot_be_measured_is_said(image):
 def test_validate_judges_each(tmp_path):
     scene = scenes.load("plate")
     scene = scene.model_copy(update={"settings": scene.settings[:2]})
-    found = validation.run(scene, 60, seed=3, out=tmp_path, workers=1, quality=Quality(2, edge_samples=64))
+    found = validation.run(scene, 60, seed=3, out=tmp_path, workers=1)
     document = found.to_json()
     assert document["verdict"].startswith("agree")
     assert (document["judgement"]["rows"], document["judgement"]["not_proven"]) == (9, {"clutter": 1})

@@ -135,7 +135,7 @@ def test_choice_of_pixels_does_not_matter(quiet, refine):
     frozen = [edge.thinning(image[None]).kept for edge in edges]
     lines = fitted if refine == "ours" else by_parabola
     own, held = [], []
-    for noisy in exposed(image, quiet.noise.sigma, 400 if refine == "ours" else 150):
+    for noisy in exposed(image, quiet.noise.sigma, 400):
         seen = [edge.thinning(noisy) for edge in edges]
         own.append(_distances(tool.calipers, [lines(edge, s) for edge, s in zip(edges, seen, strict=True)]))
         same = [Thinned(s.parts, np.broadcast_to(kept, s.kept.shape)) for s, kept in zip(seen, frozen, strict=True)]
