@@ -67,7 +67,7 @@ def test_a_saturated_image_is_propagated_with_the_noise_that_is_left(saturated):
 @pytest.fixture(scope="module")
 def many(task1, clean):
     """1500 pictures, noisy where it is looked at."""
-    where = measure.region_of_interest(task1, SENSOR, LIGHT)
+    where = measure.region_of_interest(task1, SENSOR, LIGHT, ("gradient", "strip", "polygon"))
     return render.expose(clean, task1.noise, np.random.default_rng(7), 1500, where)
 
 
