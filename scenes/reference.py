@@ -13,6 +13,7 @@ import json
 import re
 import sys
 import textwrap
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -92,16 +93,20 @@ def _meanings(model: type[Model]) -> dict[str, str]:
     found = {}
     for each in reversed(model.__mro__):
         if issubclass(each, Model):
-            parsed = ast.parse(textwrap.dedent(inspect.getsource(each)))
-            written = next(part for part in parsed.body if isinstance(part, ast.ClassDef))
-            for key, below in pairwise(written.body):
-                if (
-                    isinstance(key, ast.AnnAssign)
-                    and isinstance(below, ast.Expr)
-                    and isinstance(below.value, ast.Constant)
-                ):
-                    found[key.target.id] = inspect.cleandoc(below.value.value)
+            found |= _said_below(each)
     return {field.alias or name: found[name] for name, field in model.model_fields.items() if name in found}
+
+
+@cache
+def _said_below(model: type[Model]) -> dict[str, str]:
+    """The strings below the keys of this class alone."""
+    parsed = ast.parse(textwrap.dedent(inspect.getsource(model)))
+    written = next(part for part in parsed.body if isinstance(part, ast.ClassDef))
+    return {
+        key.target.id: inspect.cleandoc(below.value.value)
+        for key, below in pairwise(written.body)
+        if isinstance(key, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+    }
 
 
 def _plain(model: dict[str, Any]) -> None:

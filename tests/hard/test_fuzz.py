@@ -12,17 +12,17 @@ from validation import picture_file
 pytestmark = pytest.mark.render
 
 
-def test_400_tries(tmp_path, capfd):
-    """No finding; every door refuses something, and most of them let something in."""
+def test_132_tries(tmp_path, capfd):
+    """Six at each door's place: no finding; every door refuses something, and some let something in."""
     before = fuzzing.peak_memory()
-    found = fuzzing.run(400, seed=20261121, folder=tmp_path)
+    found = fuzzing.run(132, seed=20261121, folder=tmp_path)
     capfd.readouterr()  # what the image libraries say of corrupted files
     assert not found.failures
-    assert sum(found.outcomes.values()) == 400
+    assert sum(found.outcomes.values()) == 132
     for door in {door.__name__ for door in DOORS}:
-        assert found.outcomes[f"{door}: refused"] > 5
+        assert found.outcomes[f"{door}: refused"] > 0
     answers = {door.split(":")[0] for door in found.outcomes if not door.endswith("refused")}
-    assert answers >= {"mesh", "image", "campaign", "comparison", "directory", "command", "array"}
+    assert answers >= {"comparison", "directory", "command", "lens"}
     assert fuzzing.peak_memory() < max(fuzzing.MOST_MEMORY, before + 1)
 
 

@@ -100,7 +100,7 @@ def test_each_image_is_measured_by_itself(rng):
     """
     corners = rectangle(100, 60, 22)
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
-    images = np.stack([polygon_image(corners + rng.uniform(-2.5, 2.5, 2), SHAPE, 0.7, 80.0) for _ in range(8)])
+    images = np.stack([polygon_image(corners + rng.uniform(-2.5, 2.5, 2), SHAPE, 0.7, 80.0) for _ in range(4)])
     images += 2 * rng.standard_normal(images.shape)
     for estimator in ESTIMATORS:
         together = find_shape(images, layout, estimator)

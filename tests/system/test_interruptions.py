@@ -20,6 +20,7 @@ import pytest
 import scenes
 import validation
 from scenes import InvalidInput
+from tests.commands import ice
 from tests.proofs.kill import same
 from validation.batch import cluster as clusters
 from validation.batch import pool, store
@@ -294,8 +295,7 @@ def test_workers_are_deaf_from_their_first_instruction():
 
 
 def test_log_json(small_toml, tmp_path):
-    command = [sys.executable, "-m", "validation.cli", "validate", small_toml, "--renders", "20", "--workers", "1"]
-    done = subprocess.run([*map(str, command), "--out", str(tmp_path), "--log-json"], capture_output=True, text=True)
+    done = ice("validate", small_toml, "--renders", 20, "--workers", 1, "--out", tmp_path, "--log-json")
     events = [json.loads(line) for line in done.stderr.splitlines()]
     assert [event["event"] for event in events] == ["started", *["committed"] * 4, "finished"]
     assert [event["done"] for event in events[1:5]] == [20, 40, 60, 80]

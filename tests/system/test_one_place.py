@@ -66,7 +66,7 @@ def test_shot_noise(monkeypatch):
     image = render.image(picture)
 
     def found():
-        shots = render.expose(image, scene.noise, np.random.default_rng(2), 400)
+        shots = render.expose(image, scene.noise, np.random.default_rng(2), 100)
         return np.array([
             planner.predict(picture).variance_px2,
             measure.propagate(image, picture).variance_px2,

@@ -27,7 +27,7 @@ def test_json_and_pictures(monkeypatch, capsys, tmp_path):
         "plan",
         "task1",
         "--step",
-        "10",
+        "20",
         "--json",
         "--out",
         str(tmp_path),

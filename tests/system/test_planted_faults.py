@@ -55,26 +55,31 @@ def test_a_saturated_image_is_propagated_with_the_noise_that_is_left(saturated):
     image = render.image(saturated, SENSOR, LIGHT)
     assert image.max() > 265  # margin: beyond the end of the scale at 255
     found = measure.propagate(image, saturated, SENSOR)
-    _, variance = of_digits(image, saturated.noise.sigma)
+    mean, variance = of_digits(image, saturated.noise.sigma)
     assert found.variance_px2 == pytest.approx(float((variance * found.response**2).sum()), rel=2e-3)
     endless = saturated.noise.sigma**2 + 1 / 12
     # margin: 2 %, ten times the limit of what is right
     assert float((endless * found.response**2).sum()) / found.variance_px2 > 1.02
-    mean, _ = of_digits(image, saturated.noise.sigma)
     # margin: second order of what the end takes away
     assert found.value_px == pytest.approx(float(measure.distance(mean, saturated, SENSOR).value_px), abs=1e-4)
 
 
+@pytest.fixture(scope="module")
+def many(task1, clean):
+    """1500 pictures, noisy where it is looked at."""
+    where = measure.region_of_interest(task1, SENSOR, LIGHT, ("gradient", "strip", "polygon"))
+    return render.expose(clean, task1.noise, np.random.default_rng(7), 1500, where)
+
+
 @pytest.mark.render
 @pytest.mark.parametrize("estimator", ["gradient", "strip", "polygon"])
-def test_both_corners_errors_are_those_of_many_pictures(estimator, task1, clean):
+def test_both_corners_errors_are_those_of_many_pictures(estimator, task1, many):
     """All of the joint covariance, in units in which it should be the unit matrix; beside it the reported variance.
 
     Without the covariance between the corners, or with 1.3 x the variance, the same test fails.
     """
-    count = 1500
-    pictures = render.expose(clean, task1.noise, np.random.default_rng(7), count)
-    found = measure.distance(pictures, task1, SENSOR, LIGHT, estimator)
+    count = len(many)
+    found = measure.distance(many, task1, SENSOR, LIGHT, estimator)
     assert (found.status == "ok").all()
     corners = found.corners.reshape(count, 4)
     told = found.covariance.mean(0)

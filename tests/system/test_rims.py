@@ -1,6 +1,7 @@
 """Rims of bores whose walls are lit, and send light to themselves: rendered without noise and measured."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,15 +37,21 @@ def bored(tmp_path_factory):
 POSES = [((30, 80), (35, 335)), ((12, 200), (30, 60))]
 
 
-def rendered(scene, sensor, light):
+@pytest.fixture(scope="module")
+def rendered(bored):
     """Mean of two pictures: the wall's own light comes by random ways, which move a diameter by 0.2 sigma."""
-    return np.mean([render.image(scene, sensor, light, render.Quality(seed=seed)) for seed in (1, 2)], axis=0)
+
+    @cache
+    def picture(sensor, light):
+        return np.mean([render.image(bored, sensor, light, render.Quality(seed=seed)) for seed in (1, 2)], axis=0)
+
+    return picture
 
 
 @pytest.mark.parametrize(("sensor", "light"), POSES)
-def test_the_diameter_is_unbiased(bored, sensor, light, monkeypatch):
+def test_the_diameter_is_unbiased(bored, rendered, sensor, light, monkeypatch):
     """Within 0.3 sigma with status ok, and as predicted within 10 %; without the correction for levels, far off."""
-    clean = rendered(bored, sensor, light)
+    clean = rendered(sensor, light)
     told = planner.predict(bored, sensor, light)
     found = measure.propagate(clean, bored, sensor, light).measurands
     sigma = np.sqrt(found.covariance[0, 0])
@@ -64,10 +71,10 @@ def test_the_diameter_is_unbiased(bored, sensor, light, monkeypatch):
     assert abs(off) > 1.0 * sigma  # margin: three times what `ok` allows
 
 
-def test_levels_of_the_wall_are_those_of_the_picture(bored):
+def test_levels_of_the_wall_are_those_of_the_picture(bored, rendered):
     """Contrast by the locator's slope, to 3 % at nine places of ten; not so without the wall's own light."""
     sensor, light = POSES[0]
-    clean = rendered(bored, sensor, light)
+    clean = rendered(sensor, light)
     pictures = Pictures.of(bored, sensor, light)
     name = bored.quantities[0].features[0].circle
     told = rim_look.look(pictures, bored.solid.circle(name))

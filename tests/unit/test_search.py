@@ -152,11 +152,12 @@ def test_constraints(task1):
         sensor_polar_deg=(20, 60), light_polar_deg=(30, 80), forbidden_sensor=((30, 20, 25),), min_edge_px=30,
         min_clearance_px=20, min_separation_deg=40, light_out_of_view=True,
     )  # fmt: skip
-    free, bound = planner.plan(task1, step_deg=8), planner.plan(task1, step_deg=8, constraints=limits)
+    free = planner.plan(task1, step_deg=8, refined=False)
+    bound = planner.plan(task1, step_deg=8, constraints=limits)
     assert bound.variance > free.variance  # margin: a constraint never makes it better, and this one is active
     assert limits.allows(task1, np.array(list(bound.sensor)), np.array(list(bound.light)))
     assert not limits.allows(task1, np.array(list(free.sensor)), np.array(list(free.light)))
-    mounted = planner.plan(task1, step_deg=8, constraints=planner.Constraints(same_mount=True))
+    mounted = planner.plan(task1, step_deg=8, constraints=planner.Constraints(same_mount=True), refined=False)
     assert mounted.sensor == mounted.light
     with pytest.raises(InvalidInput, match="min_edge_px must be at least 0, got -1"):
         planner.Constraints(min_edge_px=-1)

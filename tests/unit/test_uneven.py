@@ -25,6 +25,7 @@ from validation import picture_file
 from validation.cli import main as cli
 
 SENSOR, LIGHT = (30, 135), (15, 315)
+AT = ("--sensor", "30,135", "--light", "15,315")
 UNEVEN = StatisticalTexture(kind="statistical", faces=("top",), contrast=0.03, correlation=1.0)
 
 
@@ -262,7 +263,7 @@ def test_effects_tell_of_textures(task1):
 
 
 def test_plan_tells_of_textures(capsys, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["ice", "plan", "printed_label", "--step", "45", "--no-check", "--json"])
+    monkeypatch.setattr(sys, "argv", ["ice", "plan", "printed_label", *AT, "--no-check", "--json"])
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code in (0, None)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from mpmath import MPContext
 
@@ -75,7 +76,7 @@ def condition_of(function: Callable[[list], mpf], numbers: list) -> float:
 
 
 def dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
+    return mp.fdot(zip(a, b, strict=True))
 
 
 def minus(a, b):
@@ -91,6 +92,7 @@ def unit(a):
     return tuple(x / size for x in a)
 
 
+@lru_cache(maxsize=64)
 def axes(pose):
     """Away from the object, right and down of a sensor at a pose in degrees."""
     p, a = (mp.radians(angle) for angle in pose)  # ty: ignore[missing-attribute]
@@ -172,11 +174,9 @@ def contrast(scene: Scene, view: View, faces, point, fall_off: bool):
     """Difference of the two faces' grey levels at a point of their edge on a convex solid (eq. 10), with its sign."""
     away = minus(view.lamp, point)
     distance2 = dot(away, away)
+    to_light, to_sensor = unit(away), unit(minus(view.eye, point))
     levels = [
-        brightness(scene.material, view.normals[f], unit(away), unit(minus(view.eye, point)))
-        if view.seen[f]
-        else mpf(0)
-        for f in faces
+        brightness(scene.material, view.normals[f], to_light, to_sensor) if view.seen[f] else mpf(0) for f in faces
     ]
     difference = mpf(scene.camera.exposure) * (levels[0] - levels[1])
     return difference * mpf(scene.lights[0].distance) ** 2 / distance2 if fall_off else difference
