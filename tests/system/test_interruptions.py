@@ -1,5 +1,6 @@
 """What can go wrong overnight: each leaves a run that continues with the same numbers, and one clear line."""
 
+import gc
 import json
 import multiprocessing
 import operator
@@ -8,11 +9,14 @@ import re
 import signal
 import socket
 import sqlite3
+import struct
 import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import BrokenExecutor
 from contextlib import suppress
+from multiprocessing.queues import SimpleQueue
 
 import psutil
 import pytest
@@ -301,3 +305,22 @@ def test_log_json(small_toml, tmp_path):
     assert [event["done"] for event in events[1:5]] == [20, 40, 60, 80]
     assert events[0]["total"] == 80
     assert re.match("agree: |contradict: ", events[-1]["verdict"])
+
+
+def _die_sending():
+    """As a worker that is killed while it writes a result: a length, and less than that."""
+    results = next(each for each in gc.get_objects() if isinstance(each, SimpleQueue) and hasattr(each, "_writer"))
+    os.write(results._writer.fileno(), struct.pack("!i", 5000) + b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_worker_that_is_killed_while_it_sends_is_noticed():
+    """The pool waits for the rest of its result, for ever: asked, the crew says that it is gone, and ends."""
+    with pytest.raises(BrokenExecutor), pool.local(2) as crew:
+        crew.executor.submit(int).result()
+        crew.check(None)
+        dying = crew.executor.submit(_die_sending)
+        for _ in range(30):
+            with suppress(TimeoutError):
+                dying.result(timeout=1)
+            crew.check(None)

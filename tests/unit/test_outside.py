@@ -18,6 +18,7 @@ from tests.oracle import block_image
 
 MODULES = "spotlight", "median", "vignetting"
 SENSOR, LIGHT = (30, 135), (15, 315)
+PLAIN = "attached_shadow", "fall_off", "lens_blur"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -29,6 +30,7 @@ def outside():
     kinds = (LIGHTS, "spotlight"), (measure.ESTIMATORS, "median"), (EFFECTS, "vignetting")
     for registry, name in kinds:
         registry.remove(name)
+    plugins._loaded.clear()
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def lit(task1):
 
 def test_a_spotlight_is_predicted_rendered_and_measured_alike(lit):
     """It fades along the part's faces: variance and bias are others than a point's, and the renderer's are as told."""
-    clean = render.image(lit, SENSOR, LIGHT)
+    clean = render.image(lit, SENSOR, LIGHT, effects=PLAIN)
     point = planner.predict(lit.with_(light={"kind": "point", "distance": lit.light.distance}), SENSOR, LIGHT)
     found, told = measure.propagate(clean, lit, SENSOR, LIGHT), planner.predict(lit, SENSOR, LIGHT)
     assert told.variance_px2 > 1.3 * point.variance_px2
@@ -68,8 +70,7 @@ def test_a_median_s_variance_is_what_noisy_images_show(task1):
 
 
 def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):
-    names = "attached_shadow", "fall_off", "lens_blur"
-    without, seen = (render.image(task1, SENSOR, LIGHT, effects=each) for each in (names, (*names, "vignetting")))
+    without, seen = (render.image(task1, SENSOR, LIGHT, effects=each) for each in (PLAIN, (*PLAIN, "vignetting")))
     y, x = np.unravel_index(without.argmax(), without.shape)
     (height, width), focal = without.shape, task1.camera.focal_px
     tangent2 = ((x - (width - 1) / 2) ** 2 + (y - (height - 1) / 2) ** 2) / focal**2

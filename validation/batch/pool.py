@@ -8,6 +8,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -52,17 +53,34 @@ def local(workers: int) -> Iterator[Crew]:
     context, others = _Spawn(), set(multiprocessing.active_children())
     ours, theirs = context.Pipe()
     executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs, plugins.loaded()))
+    known: set[BaseProcess] = set()
+
+    def check(error: Exception | None) -> None:
+        """A worker that was killed while it sent a result leaves the pool waiting for the rest of it."""
+        here = set(multiprocessing.active_children()) - others
+        if error is None and known - here:
+            raise BrokenProcessPool("a worker process has ended")
+        known.update(here)
+
     try:
-        yield Crew(executor, lambda: workers)
+        yield Crew(executor, lambda: workers, check)
     except BaseException:
         ours.close()
         theirs.close()
         _end(set(multiprocessing.active_children()) - others)
+        _hang_up(executor)
         raise
     finally:
         executor.shutdown(cancel_futures=True)
         ours.close()
         theirs.close()
+
+
+def _hang_up(executor: ProcessPoolExecutor) -> None:
+    """Close the last writing end of the results' pipe, so that the pool's thread reads its end and not for ever."""
+    queue = getattr(executor, "_result_queue", None)
+    if queue is not None:
+        queue._writer.close()
 
 
 def _end(processes: set[BaseProcess]) -> None:
