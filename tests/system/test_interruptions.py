@@ -314,9 +314,8 @@ def _die_sending():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_worker_that_is_killed_while_it_sends_is_noticed():
-    """The pool waits for the rest of its result, for ever: asked, the crew says that it is gone, and ends."""
-    with pytest.raises(BrokenExecutor), pool.local(2) as crew:
+def _ask_for_a_death():
+    with pool.local(2) as crew:
         crew.executor.submit(int).result()
         crew.check(None)
         dying = crew.executor.submit(_die_sending)
@@ -324,3 +323,9 @@ def test_a_worker_that_is_killed_while_it_sends_is_noticed():
             with suppress(TimeoutError):
                 dying.result(timeout=1)
             crew.check(None)
+
+
+def test_a_worker_that_is_killed_while_it_sends_is_noticed():
+    """The pool waits for the rest of its result, for ever: asked, the crew says that it is gone, and ends."""
+    with pytest.raises(BrokenExecutor):
+        _ask_for_a_death()
