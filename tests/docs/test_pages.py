@@ -32,3 +32,13 @@ def test_every_page_is_in_the_contents():
     """And the contents name no other."""
     listed = re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.M)
     assert sorted([*listed, "index"]) == sorted(page.stem for page in DOCS.glob("*.md"))
+
+
+def test_what_the_architecture_names_is_there():
+    """Files and folders, of the repository or of the package whose line names them."""
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    named = {path for path in re.findall(r"`([\w./]+)`", text) if "/" in path or path.endswith((".py", ".md", ".txt"))}
+    assert len(named) > 60
+    packages = [each for each in ROOT.iterdir() if (each / "__init__.py").exists()]
+    beside = [ROOT, *packages, ROOT / "imaging" / "light", ROOT / "imaging" / "models", ROOT / "scenes" / "lights"]
+    assert [path for path in sorted(named) if not any((folder / path).exists() for folder in beside)] == []
