@@ -42,13 +42,13 @@ def _checked(model: type[Model], name: str, value: Any) -> Any:
     if name not in model.model_fields:
         raise InvalidInput(f"{name} must be a key of {model.__name__}, got {given(value)}")
     try:
-        return _adapter(model, name).validate_python(value)
+        return adapter(model, name).validate_python(value)
     except ValidationError as error:
         raise InvalidInput(describe(error, name)) from None
 
 
 @cache
-def _adapter(model: type[Model], name: str) -> TypeAdapter:
+def adapter(model: type[Model], name: str) -> TypeAdapter:
     """What checks one key's value."""
     field = model.model_fields[name]
     kind = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation

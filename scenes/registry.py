@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Any, Generic, TypeVar
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Discriminator, GetCoreSchemaHandler, Tag
 
 from scenes.errors import InvalidInput, given
 
@@ -92,9 +93,9 @@ class OneOf:
     def __init__(self, kinds: Registry, default: str) -> None:
         self._kinds, self._default = kinds, default
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        choices = {name: handler.generate_schema(self._kinds[name]) for name in self._kinds}
-        return core_schema.tagged_union_schema(choices, discriminator=self._name)
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        kinds = [Annotated[self._kinds[name], Tag(name)] for name in self._kinds]
+        return handler.generate_schema(Annotated[reduce(or_, kinds), Discriminator(self._name)])
 
     def _name(self, value: Any) -> str:
         named = value.get("kind", self._default) if isinstance(value, dict) else getattr(value, "kind", self._default)

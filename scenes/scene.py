@@ -24,7 +24,7 @@ from scenes.materials.textures import Texture, check_textures
 from scenes.materials.torrance_sparrow import FaceMaterial, Material
 from scenes.measurands.features import check_feature, check_quantity
 from scenes.measurands.measurands import Corner, Locator, Measurand, Quantity, Task, Wall, quantities_of
-from scenes.model import FileName, Model, Title
+from scenes.model import FileName, Model, Title, adapter
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
@@ -405,4 +405,10 @@ class Scene(Model):
             )
 
 
-LIGHTS.followed_by(lambda: Scene.model_rebuild(force=True))
+def _rebuilt() -> None:
+    """A kind was added or removed: what checks scenes and their keys is made anew."""
+    Scene.model_rebuild(force=True)
+    adapter.cache_clear()
+
+
+LIGHTS.followed_by(_rebuilt)

@@ -8,6 +8,8 @@ import pytest
 
 import scenes
 
+collect_ignore = ["outside"]  # imported, its modules add kinds for all tests of a process
+
 _LONG = [
     line.split(maxsplit=1)[1]
     for line in Path(__file__).with_name("long.txt").read_text().splitlines()

@@ -28,14 +28,17 @@ _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is 
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
-def calipers_for(layout: Layout, kernel_sigmas: float, trim: float = 1.0) -> tuple[Caliper, ...]:
+def calipers_for(layout: Layout, kernel_sigmas: float, trim: float | None = None) -> tuple[Caliper, ...]:
     """Calipers of a layout's edges for a locator whose kernel ends after so many smoothing scales.
 
-    ``trim`` is how much of the reach is left out beside each corner.
+    With ``trim`` that part of the reach is left out beside each corner, and an edge within the reach makes another one
+    ``clutter``; without it all of the reach is, and the predicted bias says what is ``clutter``.
     """
     optics = layout.optics
     beside = reach(optics.scale_px, optics.blur_px)
     margin = optics.window_px + kernel_sigmas * optics.scale_px + 1
+    if trim is None:
+        return edge_calipers(layout, beside, margin)
     return edge_calipers(layout, trim * beside, margin, beside)
 
 

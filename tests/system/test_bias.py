@@ -88,7 +88,7 @@ def test_correcting_needs_light_and_a_classic_locator(crowded):
     picture, image = crowded[0][:2]
     with pytest.raises(InvalidInput, match="light must be a pose to correct the bias, got nothing"):
         measure.distance(image, picture.unlit(), correct_bias=True)
-    with pytest.raises(InvalidInput, match="estimator must be one of gradient, canny to correct the bias, got 'strip'"):
+    with pytest.raises(InvalidInput, match="estimator must be one of canny, gradient to correct the bias, got 'strip'"):
         measure.distance(image, picture, estimator="strip", correct_bias=True)
 
 
