@@ -16,13 +16,6 @@ from scenes import Centre, Circle, Curved, Scene, Wall
 LEAST_SINE = 1e-2  # beside the pole a step along the circle of latitude would turn the azimuth without end
 
 
-class PoseSpread(NamedTuple):
-    """Variance (px^2, first order) and bias (px, at most; second order) of the first quantity, shape (S,) each."""
-
-    variance: np.ndarray
-    bias: np.ndarray
-
-
 class PoseScatter(NamedTuple):
     """Joint covariance (S, M, M) of all quantities as poses scatter, in the image and as they are then measured in the
     object by who trusts the pose, and bias (S, M) in the image (at most)."""
@@ -32,8 +25,8 @@ class PoseScatter(NamedTuple):
     bias: np.ndarray
 
 
-def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
-    """Spread of the projected first quantity over poses that are off as `scenes.Jitter` says.
+def pose_scatter(scene: Scene, sensors: np.ndarray) -> PoseScatter:
+    """How all quantities scatter over poses that are off as `scenes.Jitter` says.
 
     The light's pose changes contrasts alone, which is left out.
 
@@ -46,16 +39,10 @@ def pose_spread(scene: Scene, sensors: np.ndarray) -> PoseSpread:
     Examples
     --------
     >>> import scenes
-    >>> scene = scenes.load("task1").model_copy(update={"jitter": scenes.Jitter(sensor_deg=0.1)})
-    >>> pose_spread(scene, np.array([[30.0, 135.0]])).variance.round(4)
+    >>> task1 = scenes.load("task1").with_(jitter={"sensor_deg": 0.1})
+    >>> pose_scatter(task1, np.array([[30.0, 135.0]])).covariance[:, 0, 0].round(4)
     array([0.0137])
     """
-    found = pose_scatter(scene, sensors)
-    return PoseSpread(found.covariance[:, 0, 0], found.bias[:, 0])
-
-
-def pose_scatter(scene: Scene, sensors: np.ndarray) -> PoseScatter:
-    """The same for all quantities, jointly."""
     count, sigma = len(scene.quantities), scene.jitter.sensor_deg
     covariance = np.zeros((2, len(sensors), count, count))
     bias = np.zeros((len(sensors), count))

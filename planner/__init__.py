@@ -11,7 +11,7 @@ from imaging.blurred.whole import image
 from imaging.features.measurand import required_edges
 from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
-from imaging.pose_scatter import PoseSpread, pose_scatter, pose_spread
+from imaging.pose_scatter import pose_scatter
 from planner.combining import Combination, combine
 from planner.forecast import Forecast
 from planner.maps import Map, pose_map, variance_map
@@ -24,7 +24,7 @@ from planner.search.constraints import Constraints
 from planner.search.exhaustive import exhaustive
 from planner.search.robustness import Robust, Tolerances, robust
 from planner.search.varied import Chosen, Varied
-from planner.search.viewing import ViewingSpace, local_minima
+from planner.search.viewing import ViewingSpace
 from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
 
@@ -50,8 +50,8 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
-    "Forecast", "Map", "Pictures", "Plan", "PoseSpread", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
+    "Forecast", "Map", "Pictures", "Plan", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
     "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "exhaustive",
-    "image", "local_minima", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "pose_spread",
+    "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter",
     "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

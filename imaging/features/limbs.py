@@ -28,21 +28,6 @@ def _limb_rim(pictures: Pictures, curved: Curved) -> Rim:
     return rim_of(outline, seen, clear)
 
 
-def step_model_error(pictures: Pictures, curved: Curved) -> np.ndarray:
-    """What the p parameters would be off by if the limb of one picture were taken for a step, (p,).
-
-    By least squares, weighted as they are found; NaN where they are not.
-    """
-    outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
-    seen, each = limb_look(pictures, curved, outline), limb_rim(pictures, curved)
-    weight = np.where(each.clear, each.arc * each.squared / each.noise_variance, 0.0)
-    size = np.sqrt(weight @ each.design**2)
-    if not (size > 0).all():
-        return np.full(curved.count, np.nan)
-    root = np.sqrt(weight)
-    return np.linalg.lstsq(root[:, None] * each.design / size, root * seen.shift, rcond=None)[0] / size
-
-
 def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> Rim:
     """As a circle's rim; places that are not there have no contrast."""
     return Rim(np.nan_to_num(outline.design), np.nan_to_num(outline.arc), seen.squared, seen.noise_variance, clear)

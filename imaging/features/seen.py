@@ -232,8 +232,3 @@ def plane_axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def half_angle_of(each: Circle | Curved) -> float:
     """Of a cone, rad; else 0."""
     return each.half_angle if isinstance(each, Curved) else 0.0
-
-
-def feature_names(features: tuple) -> str:
-    """Names of features, for a message."""
-    return ", ".join(map(place_of, features))

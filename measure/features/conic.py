@@ -40,11 +40,6 @@ class Ellipse:
         """(x, y), px, shape (..., 2)."""
         return self.parameters[..., :2]
 
-    @property
-    def centre_covariance(self) -> np.ndarray:
-        """Covariance of the centre, px^2, shape (..., 2, 2)."""
-        return self.covariance[..., :2, :2]
-
 
 def fit_ellipse(points: np.ndarray, covariance: np.ndarray | float = 1.0, *, circle: bool = False) -> Ellipse:
     """Ellipse (or circle) of least weighted orthogonal distances.

@@ -99,18 +99,3 @@ class ViewingSpace:
     def nearest_direction(self, vectors: np.ndarray) -> np.ndarray:
         """Indices of the directions nearest to unit vectors (..., 3)."""
         return self._tree.query(vectors)[1]
-
-
-def local_minima(space: ViewingSpace, values: np.ndarray) -> np.ndarray:
-    """Indices of the finite local minima of a map, the deepest first.
-
-    Directions of equal value that touch (such as azimuth 0 and 360 on the equator) count as one.
-    """
-    a, b = space.neighbour_pairs.T
-    beaten = np.zeros(len(values), bool)
-    beaten[a[values[b] < values[a]]] = True
-    beaten[b[values[a] < values[b]]] = True
-    same = values[a] == values[b]
-    beaten[np.maximum(a[same], b[same])] = True
-    found = np.flatnonzero(~beaten & np.isfinite(values))
-    return found[np.argsort(values[found])]

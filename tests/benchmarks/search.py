@@ -11,10 +11,25 @@ import numpy as np
 import planner
 import scenes
 from planner.search.exhaustive import evaluate_pairs, exhaustive
-from planner.search.viewing import ViewingSpace, local_minima
+from planner.search.viewing import ViewingSpace
 
 PAPER_PAIR = np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]])
 TABLE_1 = (((40, 41), (4, 27), 0.1023), ((32, 140), (4, 27), 0.0960), ((32, 140), (14, 303), 0.0703))
+
+
+def local_minima(space: ViewingSpace, values: np.ndarray) -> np.ndarray:
+    """Indices of the finite local minima of a map, the deepest first.
+
+    Directions of equal value that touch (such as azimuth 0 and 360 on the equator) count as one.
+    """
+    a, b = space.neighbour_pairs.T
+    beaten = np.zeros(len(values), bool)
+    beaten[a[values[b] < values[a]]] = True
+    beaten[b[values[a] < values[b]]] = True
+    same = values[a] == values[b]
+    beaten[np.maximum(a[same], b[same])] = True
+    found = np.flatnonzero(~beaten & np.isfinite(values))
+    return found[np.argsort(values[found])]
 
 
 def main() -> None:

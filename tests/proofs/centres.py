@@ -15,12 +15,12 @@ import numpy as np
 import measure
 import render
 import scenes
-from imaging.contours import ellipse_of, image_conic
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis
 from measure.features.optics import Optics
 from measure.find.ellipse import find_ellipse
 from scenes import Backlight, Picture, Scene
+from tests.conics import ellipse_of, image_conic
 
 MOST_SIGMA = 0.3
 _ASIDE, _TILT = 11.0, 6.0  # mm that the camera looks past the ball; degrees of the sensor from the light's axis

@@ -17,7 +17,9 @@ import measure
 import planner
 import render
 import scenes
-from imaging.features.limbs import step_model_error
+from imaging.features.limb_look import limb_look
+from imaging.features.limb_outline import LIMB_POINTS, limb_outline
+from imaging.features.limbs import limb_rim
 from imaging.features.measurand import measurands
 from scenes import InvalidInput, Light, Scene
 from tests.proofs import centres, silhouettes
@@ -80,6 +82,21 @@ def poses(kind: str, rng: np.random.Generator) -> tuple[tuple[float, float], tup
     polar, azimuth = float(rng.uniform(10, 80)), float(rng.uniform(0, 360))
     turn = rng.uniform(-_MOST_LIGHT, _MOST_LIGHT, 2)
     return (polar, azimuth), (float(np.clip(polar + turn[0], 0, 85)), azimuth + float(turn[1]))
+
+
+def step_model_error(pictures: planner.Pictures, curved: scenes.Curved) -> np.ndarray:
+    """What the p parameters would be off by if the limb of one picture were taken for a step, (p,).
+
+    By least squares, weighted as they are found; NaN where they are not.
+    """
+    outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
+    seen, each = limb_look(pictures, curved, outline), limb_rim(pictures, curved)
+    weight = np.where(each.clear, each.arc * each.squared / each.noise_variance, 0.0)
+    size = np.sqrt(weight @ each.design**2)
+    if not (size > 0).all():
+        return np.full(curved.count, np.nan)
+    root = np.sqrt(weight)
+    return np.linalg.lstsq(root[:, None] * each.design / size, root * seen.shift, rcond=None)[0] / size
 
 
 def rows_at(scene: Scene, sensor, light, images: int, seed: int, quality: render.Quality = render.Quality()):

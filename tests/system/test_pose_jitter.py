@@ -21,13 +21,14 @@ def test_measured_variance_is_that_of_noise_and_poses_together(task1, tmp_path):
     measured, predicted = found.rows[0].main.empirical, found.rows[0].main.propagated
     low, high = stats.chi2.ppf([5e-4, 1 - 5e-4], RENDERS - 1) / (RENDERS - 1)
     assert low < measured / predicted < high  # margin: chance: a chi-square interval of 99.9 %
-    spread = float(planner.pose_spread(scene, np.array([list(task1.settings[0].sensor)])).variance[0])
+    spread = float(planner.pose_scatter(scene, np.array([list(task1.settings[0].sensor)])).covariance[0, 0, 0])
     assert not measured / (predicted - spread) < high  # negative control: the noise alone
 
 
 def test_exact_poses_add_nothing(task1):
-    spread = planner.pose_spread(task1, np.array([[30.0, 135.0], [0.0, 0.0]]))
-    assert spread.variance.tolist() == spread.bias.tolist() == [0.0, 0.0]
+    spread = planner.pose_scatter(task1, np.array([[30.0, 135.0], [0.0, 0.0]]))
+    assert spread.covariance.tolist() == [[[0.0]], [[0.0]]]
+    assert spread.bias.tolist() == [[0.0], [0.0]]
 
 
 def test_spread_is_that_of_sampled_poses(task1, rng):
@@ -41,5 +42,5 @@ def test_spread_is_that_of_sampled_poses(task1, rng):
     poses = np.array([list(shaken(scene, "sensor", sensor, rng)) for _ in range(4000)])
     image = project(ends, poses, scene.camera)
     sampled = np.linalg.norm(image[:, 1] - image[:, 0], axis=-1).var(ddof=1)
-    spread = planner.pose_spread(scene, np.array([list(sensor)]))
-    assert sampled == pytest.approx(float(spread.variance[0]), rel=0.1)
+    spread = planner.pose_scatter(scene, np.array([list(sensor)]))
+    assert sampled == pytest.approx(float(spread.covariance[0, 0, 0]), rel=0.1)

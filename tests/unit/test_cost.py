@@ -8,6 +8,7 @@ import pytest
 import scenes
 from render import Quality
 from scenes import InvalidInput
+from tests.sequential import simulate
 from validation.batch.campaign import Campaign
 from validation.batch.stages import Stages
 from validation.cost import goal, interval
@@ -31,7 +32,7 @@ def covered(rule, truth=1.0, width=0.1, first=300):
 def test_stopping_when_narrow_enough_keeps_the_coverage(width, truth):
     """92-98 % of 200 repetitions is asked for; 2000 have a standard error of 0.5 %."""
     first = max(interval.LEAST, int(0.8 * interval.images(width)))
-    inside, counts = covered(interval.simulate, truth, width, first)
+    inside, counts = covered(simulate, truth, width, first)
     assert 0.93 < inside < 0.97  # margin: 4 standard errors
     assert np.ptp(counts) > 0  # it did stop at different numbers
 
@@ -53,7 +54,7 @@ def test_the_half_width_reached_is_the_one_asked_for(width):
     rng = np.random.default_rng(3)
     first = int(0.8 * interval.images(width))
     for truth in (0.9, 1.0, 1.15):
-        ratio, n = interval.simulate(truth, width, first, rng)
+        ratio, n = simulate(truth, width, first, rng)
         low, high = ratio_interval(ratio, n)
         # a setting whose first look is narrow enough has all it will get
         # margin: what the last images change the ratio by

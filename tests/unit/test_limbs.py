@@ -4,10 +4,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from imaging.contours import contour, ellipse_of, image_conic, limb
+from imaging.contours import contour, limb
 from imaging.geometry.projection import frame, from_axis, sensor_position
 from scenes import Camera, InvalidInput
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Surface, Torus
+from tests.conics import ellipse_of, image_conic
 from tests.curved import SURFACES, changed
 
 CAMERA = Camera(width=1280, height=1024, focal_px=2000.0, distance=30.0, look_at=(0.5, -1.0, 0.5))

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from imaging.contours import image_conic, limb
+from imaging.contours import limb
 from imaging.geometry.projection import sensor_position
 from scenes.parts.surfaces import Quadric
+from tests.conics import image_conic
 from tests.unit.test_limbs import CAMERA, lines
 
 

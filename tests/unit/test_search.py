@@ -8,8 +8,9 @@ import scenes
 from planner.search.alternating import alternate
 from planner.search.exhaustive import _blocks, evaluate_pairs, exhaustive
 from planner.search.separable import separable
-from planner.search.viewing import ViewingSpace, local_minima
+from planner.search.viewing import ViewingSpace
 from scenes import InvalidInput
+from tests.benchmarks.search import local_minima
 from tests.scalar import variance_evaluate
 
 PAPER = np.array([30.0, 135.0]), np.array([15.0, 315.0])

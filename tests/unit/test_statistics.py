@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from validation.cost.interval import LEAST, simulate
+from tests.sequential import simulate
+from validation.cost.interval import LEAST
 from validation.statistics import ALLOWANCE, SHARES, _levels, correlation, p_value, ratio_interval, verdict
 
 

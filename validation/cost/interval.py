@@ -5,8 +5,6 @@ from __future__ import annotations
 import bisect
 from functools import lru_cache
 
-import numpy as np
-
 from scenes import InvalidInput
 from validation.statistics import ratio_interval
 
@@ -55,17 +53,3 @@ def wanted(ratio: float, n: int, width: float) -> int:
         return n
     need = images(width / ratio)
     return need if need * _PART <= n else max(n + 1, int(need * _PART))
-
-
-def simulate(ratio: float, width: float, first: int, rng: np.random.Generator) -> tuple[float, int]:
-    """Stop one setting of normal distances by `wanted`; the variance ratio it shows at the end, and of how many.
-
-    ``ratio`` is the truth, ``first`` the images of the first look.
-    """
-    values = np.sqrt(ratio) * rng.standard_normal(first)
-    while True:
-        found = float(values.var(ddof=1))
-        need = wanted(found, values.size, width)
-        if need == values.size:
-            return found, need
-        values = np.concatenate([values, np.sqrt(ratio) * rng.standard_normal(need - values.size)])

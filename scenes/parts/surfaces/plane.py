@@ -51,10 +51,6 @@ class Plane:
         """Zero: the normal does not turn."""
         return np.zeros((*np.shape(points), 3))
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative of the height along tangents: 0."""
-        return np.zeros(np.broadcast_shapes(np.shape(points), np.shape(tangents))[:-1])
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """Move along the normal for a change of height (along it) and both tilts, (..., 3)."""
         away = points - self.point

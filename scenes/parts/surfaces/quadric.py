@@ -94,13 +94,6 @@ class Quadric:
         size = np.linalg.norm(self.gradient(points), axis=-1)[..., None, None]
         return outwards(self.hollow) * flat @ (2 * self.form) @ flat / np.where(size > 0, size, np.inf)
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative of the height along tangents."""
-        normal, size = self.normals(points), np.linalg.norm(self.gradient(points), axis=-1)
-        turned = 2 * tangents @ self.form
-        bend, lean = (turned * tangents).sum(-1), (turned * normal).sum(-1)
-        return 3 * bend * lean / np.where(size > 0, size, np.inf) ** 2
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """Move along the normal for a change of each coefficient (that of xy is twice A's element), (..., 10)."""
         x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)

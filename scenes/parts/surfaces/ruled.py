@@ -79,13 +79,6 @@ class Ruled:
         bend = outwards(self.hollow) * self.cosine / far
         return bend[..., None, None] * around[..., :, None] * around[..., None, :]
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative of the height along tangents (..., 3): the curvature falls as the radius grows, (...)."""
-        _, far, radial = self.split(points)
-        around = (tangents * np.cross(self.axis, radial)).sum(-1)
-        upwards = tangents @ self.axis
-        return outwards(self.hollow) * 3 * self.cosine * around**2 * self.slope * upwards / far**2
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """Move along the normal for a change of each parameter, the half angle in rad, (..., p)."""
         normals = self.normals(points)

@@ -64,10 +64,6 @@ class Sphere:
         normal = self.normals(points)
         return outwards(self.hollow) / self.radius * (np.eye(3) - normal[..., :, None] * normal[..., None, :])
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative of the height along tangents: 0."""
-        return np.zeros(np.broadcast_shapes(points.shape, tangents.shape)[:-1])
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """Move along the normal for a change of each parameter, (..., 4)."""
         normal = self.normals(points)

@@ -43,9 +43,6 @@ class Surface(Protocol):
         v S v is the normal curvature along a unit tangent v, positive where the surface bends away from its normal.
         """
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative (...) of the height over the tangent plane along unit tangents (..., 3), 1 / length^2."""
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """How far the surface moves along its normal at points (..., 3) for a change of each parameter, (..., p)."""
 

@@ -85,19 +85,6 @@ class Torus:
         found = over[..., :, None] * over[..., None, :] / self.tube + bend * around[..., :, None] * around[..., None, :]
         return outwards(self.hollow) * found
 
-    def third(self, points: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Third derivative of the height along tangents.
-
-        By x around the axis and y over the tube: of the distance from the tube's middle, x^2 y changes alone.
-        """
-        radial, out, up = self.split(points)
-        size, around = np.hypot(out, up), np.cross(self.axis, radial)
-        over = (out[..., None] * self.axis - up[..., None] * radial) / size[..., None]
-        x, y = (tangents * around).sum(-1), (tangents * over).sum(-1)
-        far = self.radius + out
-        rate = self.radius * (up / size) / (self.tube * far**2)
-        return outwards(self.hollow) * 3 * x**2 * y * rate
-
     def shifts(self, points: np.ndarray) -> np.ndarray:
         """Move along the normal for a change of each parameter, (..., 7)."""
         normals, away = self.normals(points), points - self.centre
