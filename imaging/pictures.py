@@ -63,12 +63,12 @@ class Pictures:
 
     @property
     def sensor_at(self) -> np.ndarray:
-        """Where the sensors stand, cm, shape (..., 3)."""
+        """Where the sensors stand, scene units, shape (..., 3)."""
         return self.once("sensor_at", lambda: sensor_position(self.scene.camera, self.sensors))
 
     @property
     def lights_at(self) -> tuple[np.ndarray, ...]:
-        """Where each light's middle is, cm, shape (..., 3)."""
+        """Where each light's middle is, scene units, shape (..., 3)."""
         return self.once("lights_at", self._lights_at)
 
     @property

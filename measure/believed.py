@@ -1,4 +1,7 @@
-"""What lines and circles that are off give as values to who believes the scene: not linear in how far they are off."""
+"""Values of displaced lines and circles, evaluated with the nominal model (poses and camera as the scene says).
+
+Not linearised: displacements may be large.
+"""
 
 from __future__ import annotations
 

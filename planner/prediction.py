@@ -60,7 +60,7 @@ class Prediction(Shown):
     model : str
         ``paper``, ``calibrated`` or ``bound``.
     kind : str
-        ``distance``, ``width``, ``offset``, ``angle``, ``diameter`` or ``position``.
+        ``distance``, ``width``, ``offset``, ``angle``, ``diameter``, ``taper`` or ``position``.
     value_image, value_object : float
         The measurand itself, as the model projects it and in the object: px and the scene's unit, or degrees.
     variance_image, variance_object : float

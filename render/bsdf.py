@@ -16,7 +16,7 @@ _ROUNDING = 1e-6  # of a cosine, in single precision
 
 
 class Lamp(NamedTuple):
-    """A polarised light: its place (cm), direction of polarisation, and the angle (radians) that its size spans."""
+    """A polarised light: its place (scene units), its direction of polarisation, and the angle (rad) that it spans."""
 
     at: tuple[float, float, float]
     polarisation: tuple[float, float, float]
@@ -25,7 +25,7 @@ class Lamp(NamedTuple):
 
 @dataclass(frozen=True)
 class Surface:
-    """What the BSDF needs to know; positions and directions in space, cm.
+    """What the BSDF needs to know; positions and directions in space, scene units.
 
     ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
     surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span.

@@ -72,7 +72,7 @@ def description(
 
 
 def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
-    """Radius of the aperture as it is simulated, cm."""
+    """Radius of the aperture as it is simulated, scene units."""
     least = _TINY_APERTURE * scene.camera.distance
     return max(scene.camera.lens.aperture_radius, least) if "depth_of_field" in active else 0.0
 

@@ -47,7 +47,7 @@ class Face:
     Attributes
     ----------
     triangles : ndarray, shape (T, 3, 3)
-        Corners, cm.
+        Corners, scene units.
     places : ndarray, shape (T, 3, 2)
         Where the corners lie in the table: 0 at its first and 1 at its last row and column.
     values : ndarray, shape (rows, columns)
@@ -225,7 +225,7 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: 
         Of one picture with one light; N.L is that of its middle.
     normal : ndarray, shape (3,)
     points : ndarray, shape (..., 3)
-        cm.
+        Scene units.
     material : Material, optional
         The scene's when not given.
     """

@@ -164,7 +164,7 @@ def image_fractions(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, s
 
 
 def end_depths(scene: Scene, names: tuple[str, ...], sensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depths of both ends of each edge, cm, each (..., E, 1)."""
+    """Depths of both ends of each edge, scene units, each (..., E, 1)."""
     ends = np.array([scene.solid.vertices[list(scene.solid.edge(name).ends)] for name in names]).reshape(-1, 3)
     found = depth(ends, sensors, scene.camera).reshape(*sensors.shape[:-1], len(names), 2)
     return found[..., :1], found[..., 1:]

@@ -79,7 +79,7 @@ def _slope(points: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
 
 
 def signed_confusion(camera: Camera, depth: np.ndarray) -> np.ndarray:
-    """Radius of the circle of confusion of a thin lens at depths (cm), px; negative beyond the focus."""
+    """Radius of the circle of confusion of a thin lens at depths (scene units), px; negative beyond the focus."""
     lens = camera.lens
     return lens.aperture_radius * camera.focal_px * (1 / depth - 1 / (lens.focus or camera.distance))
 
@@ -90,7 +90,7 @@ def confusion(camera: Camera, depth: np.ndarray) -> np.ndarray:
 
 
 def blur_at(camera: Camera, depth: np.ndarray) -> np.ndarray | float:
-    """Standard deviation of the lens' blur at depths (cm), px: the Gaussian's and a quarter of the disc's r^2."""
+    """Standard deviation of the blur at depths (scene units), px: the Gaussian's and a quarter of the disc's r^2."""
     if camera.lens.aperture_radius == 0:
         return camera.blur_px
     return np.sqrt(camera.blur_px**2 + confusion(camera, depth) ** 2 / 4)

@@ -17,7 +17,7 @@ _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must
 
 
 class Frame(NamedTuple):
-    """Axes of a sensor that looks at the origin: unit vectors, shape (..., 3)."""
+    """Axes of a sensor that looks at its reference point: unit vectors, shape (..., 3)."""
 
     right: np.ndarray
     down: np.ndarray
@@ -75,12 +75,12 @@ def light_frame(camera: Camera, light: Luminaire, poses: np.ndarray) -> Frame:
 
 
 def sensor_position(camera: Camera, poses: np.ndarray) -> np.ndarray:
-    """Where the sensor stands, cm, shape (..., 3)."""
+    """Where the sensor stands, scene units, shape (..., 3)."""
     return np.array(camera.look_at) + camera.distance * direction(poses)
 
 
 def light_position(camera: Camera, light: Luminaire, poses: np.ndarray) -> np.ndarray:
-    """Where a light stands, cm, shape (..., 3): on a sphere around the point that the camera looks at.
+    """Where a light stands, scene units, shape (..., 3): on a sphere around the point that the camera looks at.
 
     One at the camera may be aside of the axis.
     """
@@ -97,7 +97,7 @@ def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        Object coordinates, cm.
+        Object coordinates, scene units.
     poses : ndarray, shape (..., 2)
         Sensor poses.
 
@@ -123,7 +123,7 @@ def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarr
 
 
 def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Distance of points (..., n, 3) from the sensor along its axis, cm, shape (..., n)."""
+    """Distance of points (..., n, 3) from the sensor along its axis, scene units, shape (..., n)."""
     return _along(points, camera, frame(poses))
 
 
@@ -132,13 +132,13 @@ def _along(points: np.ndarray, camera: Camera, axes: Frame) -> np.ndarray:
 
 
 def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Derivative of `project` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
+    """Derivative of `project` (px) by the position (scene units) of points (n, 3), shape (..., n, 2, 3)."""
     ideal = project_ideal(points, poses, camera)
     return lens_jacobian(ideal, camera) @ jacobian_ideal(points, poses, camera)
 
 
 def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Derivative of `project_ideal` (px) by the position (cm) of points (n, 3), shape (..., n, 2, 3)."""
+    """Derivative of `project_ideal` (px) by the position (scene units) of points (n, 3), shape (..., n, 2, 3)."""
     axes = camera_frame(camera, poses)
     z = _along(points, camera, axes)[..., None, None]
     screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
@@ -147,7 +147,7 @@ def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.
 
 
 def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:
-    """Which faces turn towards a position (cm, shape (..., 3)); bool, shape (..., F)."""
+    """Which faces turn towards a position (scene units, shape (..., 3)); bool, shape (..., F)."""
     return above(positions, solid.normals, solid.offsets)
 
 
@@ -161,6 +161,6 @@ def above(positions: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np
 
 
 def edge_points(solid: Solid, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:
-    """Points on E edges at fractions (n,) or (..., E, n) of their length, cm, shape (..., E, n, 3)."""
+    """Points on E edges at fractions (n,) or (..., E, n) of their length, scene units, shape (..., E, n, 3)."""
     ends = np.array([solid.vertices[list(solid.edge(name).ends)] for name in names]).reshape(-1, 2, 3)
     return ends[:, None, 0] + fractions[..., None] * (ends[:, 1] - ends[:, 0])[:, None]

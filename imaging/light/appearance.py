@@ -74,7 +74,7 @@ def signal(
     Parameters
     ----------
     points : ndarray, shape (..., k, 3) or (..., j, k, 3), ...
-        cm; the pictures' leading shape, or what broadcasts to it, then some axes of their own.
+        Scene units; the pictures' leading shape, or what broadcasts to it, then some axes of their own.
     normals : ndarray
         Unit normals, broadcast.
     axes : int
@@ -191,7 +191,7 @@ def side_signals(
     names : tuple of str
         E edges of the object.
     points : ndarray, shape (E, n, 3) or (..., E, n, 3)
-        Points on the edges, cm; the same for all pictures or for each its own.
+        Points on the edges, scene units; the same for all pictures or for each its own.
 
     Returns
     -------
@@ -255,7 +255,7 @@ def paper_contrast2(pictures: Pictures, names: tuple[str, ...], fractions: np.nd
 
 
 def side_strengths(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
-    """Signal times r^3 on both sides of each edge of a separable scene, grey levels cm^3, shape (..., E, 2).
+    """Signal times r^3 on both sides of each edge of a separable scene, grey levels scene units^3, shape (..., E, 2).
 
     On a plane, diffuse face N.(l - p) is the same for all its points p, so with r = |l - p| the signal is a constant
     over r^3: N.(l - p) / r for the cosine and 1 / r^2 for the fall-off.
@@ -264,13 +264,13 @@ def side_strengths(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
 
 
 def paper_step(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
-    """The paper's contrast times r, grey levels cm, of a separable scene; shape (..., E)."""
+    """The paper's contrast times r, grey levels times scene units, of a separable scene; shape (..., E)."""
     heights = _heights(pictures, names)
     return np.abs(heights[..., 0] - heights[..., 1])
 
 
 def edge_distance2(pictures: Pictures, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:
-    """Squared distance of the first light from points of the edges, cm^2, shape (..., E, n)."""
+    """Squared distance of the first light from points of the edges, scene units^2, shape (..., E, n)."""
     ends = np.array([pictures.scene.solid.vertices[list(pictures.scene.solid.edge(name).ends)] for name in names])
     return squared_distance(ends[:, 0], ends[:, 1], fractions, pictures.lights_at[0])
 
@@ -322,7 +322,7 @@ def behind(
     Parameters
     ----------
     points : ndarray, shape (..., n, 3)
-        cm.
+        Scene units.
     wanted : ndarray of bool, shape (..., n)
         For which points; the others get 0.
     own : tuple of int

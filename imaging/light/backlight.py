@@ -25,7 +25,7 @@ def backlit(
     which : int
         Which of the lights.
     points, vectors : ndarray, shape (..., n, 3)
-        The ray is point + t vector, t > 0; cm.
+        The ray is point + t vector, t > 0; scene units.
     analyser : ndarray, shape (..., 3), optional
         What the analyser passes: half of unpolarised light, else the squared cosine (Malus).
     """

@@ -33,11 +33,11 @@ class Emitter(NamedTuple):
     which : int
         Its place among the scene's lights.
     at : ndarray, shape (..., 3)
-        Where it is, cm.
+        Where it is, scene units.
     axis : ndarray, shape (..., 3), or None
         Normal of the surface that it stands for, None where it shines alike into all directions.
     power : float
-        Irradiance across its beam times squared distance, on its axis, over the camera's exposure, cm^2.
+        Irradiance across its beam times squared distance, on its axis, over the camera's exposure, scene units^2.
     """
 
     light: Luminaire
@@ -61,7 +61,7 @@ def emitters(scene: Scene, lights: tuple[np.ndarray, ...], fewest: int = FULL) -
 
 
 def reach_of(scene: Scene) -> float:
-    """How far from the reference point the object's vertices are, cm."""
+    """How far from the reference point the object's vertices are, scene units."""
     return float(np.linalg.norm(scene.solid.vertices - np.array(scene.camera.look_at), axis=1).max())
 
 

@@ -31,7 +31,7 @@ class Beam(NamedTuple):
 
 
 def beam(emitter: Emitter, points: np.ndarray, axes: int = 0, *, fall_off: bool = True) -> Beam:
-    """What an emitter sends to points (..., 3), cm; with ``fall_off`` by the inverse square.
+    """What an emitter sends to points (..., 3), scene units; with ``fall_off`` by the inverse square.
 
     ``axes`` is how many axes the points have of their own, behind those of the pictures.
     """
@@ -50,7 +50,7 @@ def widened(values: np.ndarray, axes: int) -> np.ndarray:
 
 
 def squared_distance(starts: np.ndarray, stops: np.ndarray, fractions: np.ndarray, light_at: np.ndarray) -> np.ndarray:
-    """Squared distance of a light (..., 3) from points at fractions of the segments (E, 3), cm^2, shape (..., E, n)."""
+    """Squared distance of a light (..., 3) from points at fractions of the segments (E, 3), shape (..., E, n)."""
     along = stops - starts
     start = (light_at**2).sum(-1, keepdims=True) - 2 * light_at @ starts.T + (starts**2).sum(-1)
     slope = np.einsum("ei,ei->e", starts, along) - light_at @ along.T

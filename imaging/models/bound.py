@@ -29,7 +29,9 @@ KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: 
 KNOWN_BLUR = 0.3  # of the blur: how well it is known
 FOLLOWS = 1.0  # px: how well other vertices are known beside the required edges; the pose is known to 2 degrees
 _STILL = 0.01  # px: the same of vertices about which an image says nothing, so that they simply follow
-_UNTOLD = 1e-10  # part of what tells a parameter, all else known, that is always added: nothing else may be told of it
+_UNTOLD = (
+    1e-10  # of a parameter's conditional information, added to it: keeps the matrix regular where nothing else informs
+)
 _LEAST = 1e-12  # information that is none
 _FURTHEST = 100.0  # px^2; what is known no better is not known, for the model is linear
 

@@ -138,7 +138,8 @@ def _fitted(parameters: Parameters, shots: tuple[Shots, ...], noise: Noise, esti
 
 
 def _with_held(parameters, shots, values, noise, estimated, known, at: np.ndarray | None) -> Fit:
-    """With what is not told held where ``at`` (q,) has it, or where it is likeliest beside the rest."""
+    """Fit with the parameters that the photographs do not determine held: at their values in ``at`` (q,), or at the
+    most likely values given the others."""
     values, which, told = values.copy(), np.arange(values.size), None
     while True:
         values, noise, told, final = _solved(parameters, shots, values, noise, which, estimated)

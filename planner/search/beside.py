@@ -1,4 +1,4 @@
-"""One picture of several, its poses let down below the grid while the others are held."""
+"""Local refinement below the grid of one picture's poses, with the other pictures of the set held."""
 
 from __future__ import annotations
 

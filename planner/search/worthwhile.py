@@ -1,4 +1,7 @@
-"""Which pairs of a grid are worth choosing from, by what a glance tells of them (S, L, M)."""
+"""Candidate pairs for sets of pictures: those of a grid that no other pair dominates, from their fast evaluation.
+
+``told`` (S, L, M) is the information (1 / variance) that each sensor x light pair has about each of M measurands.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ _GROUPS = 24  # places of what is shared that are searched on
 
 
 def worthwhile(told: np.ndarray, aim: Aim) -> np.ndarray:
-    """Pairs that no other can stand in for, and each sensor's best: for the aim, and for each quantity."""
+    """Flat indices of the pairs that no other dominates, and each sensor's best for the objective and each measurand."""
     flat = told.reshape(-1, told.shape[-1])
     best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
     best.append(alone(told, aim).argmin(1))
@@ -28,7 +31,11 @@ def alone(told: np.ndarray, aim: Aim) -> np.ndarray:
 
 
 def shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
-    """Pairs at the places of what is shared that promise most, those that no other of the place can stand in for."""
+    """The same where pictures share their sensor, or their light (``share``).
+
+    For each of its places the greedy set of ``count`` pictures is valued; the pairs that none dominates at the best
+    places are returned.
+    """
     axis = 0 if share == "sensor" else 1
     found = []
     for place in range(told.shape[axis]):

@@ -30,7 +30,7 @@ class Sides(NamedTuple):
     """Both sides of E edges at n points in S settings; levels above darkness.
 
     ``levels``, ``slopes`` (grey levels a px, into the face) have shape (S, E, 2, n); ``lit``, whether the face is seen
-    and turned to the light, too. ``points`` (cm, (E, n, 3)) and ``normals`` ((E, 2, 3)) say where.
+    and turned to the light, too. ``points`` (scene units, (E, n, 3)) and ``normals`` ((E, 2, 3)) say where.
     """
 
     levels: np.ndarray
@@ -89,7 +89,7 @@ def compare(pictures: Pictures, other: Scene) -> Influence:
 def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influence:
     """Bound of what light added smoothly to either side (grey levels, shape (S, E, n)) does to the distance.
 
-    ``near`` is the length (cm) over which it changes by its own size.
+    ``near`` is the length (scene units) over which it changes by its own size.
     """
     contrast = sides(pictures).contrast
     share = np.abs(levels / np.where(contrast == 0, np.nan, contrast))
@@ -156,7 +156,7 @@ def _loss(share: np.ndarray) -> np.ndarray:
 
 
 def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
-    """Small steps (cm) from each edge into its two faces, shape (E, 2, 3)."""
+    """Small steps (scene units) from each edge into its two faces, shape (E, 2, 3)."""
     solid = scene.solid
     steps = []
     for name, pair in zip(required(scene), faces, strict=True):
@@ -170,7 +170,7 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
 
 
 def background(pictures: Pictures, points: np.ndarray) -> np.ndarray:
-    """Where the sensor sees the floor behind points (E, n, 3), cm; NaN where it does not, shape (S, E, n, 3)."""
+    """Where the sensor sees the floor behind points (E, n, 3); NaN where it does not, scene units, (S, E, n, 3)."""
     places = pictures.sensor_at[:, None, None]
     rays = points - places
     with np.errstate(divide="ignore", invalid="ignore"):

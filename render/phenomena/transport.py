@@ -152,7 +152,7 @@ def _form_factor(solid: Solid, points: np.ndarray, normals: np.ndarray) -> np.nd
 
 
 def _clearance(points: np.ndarray, solid: Solid) -> float:
-    """Distance from points to the nearest plane of a solid that they lie outside of, cm; a lower bound."""
+    """Distance from points to the nearest plane of a solid that they lie outside of, scene units; a lower bound."""
     height = points.reshape(-1, 3) @ solid.normals.T - solid.offsets
     return float(np.clip(height.max(1), 0, None).min())
 

@@ -148,7 +148,7 @@ class Solid:
         return planes[:, :3], -planes[:, 3]
 
     def height_above(self, point: np.ndarray) -> float:
-        """How far a point lies outside the nearest plane of the convex hull, cm; zero or less in or on it."""
+        """How far a point lies outside the nearest plane of the convex hull, scene units; zero or less in or on it."""
         normals, offsets = self._hull
         return float(np.max(normals @ point - offsets))
 
