@@ -14,7 +14,7 @@ _GROUPS = 24  # places of what is shared that are searched on
 
 
 def worthwhile(told: np.ndarray, aim: Aim) -> np.ndarray:
-    """Flat indices of the pairs that no other dominates, and each sensor's best for the objective and each measurand."""
+    """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
     flat = told.reshape(-1, told.shape[-1])
     best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
     best.append(alone(told, aim).argmin(1))
