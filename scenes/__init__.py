@@ -9,7 +9,8 @@ from scenes.lights.filters import Filter, Lamp
 from scenes.load import find, load, names
 from scenes.materials.textures import ImageTexture, StatisticalTexture
 from scenes.materials.torrance_sparrow import FaceMaterial, Material
-from scenes.measurands.measurands import Centre, Corner, Locator, Measurand, Quantity, Side, Task, Tolerance, Wall
+from scenes.measurands.features import Centre, Corner, Side, Wall
+from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, Tolerance
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.curved import Curved

@@ -42,13 +42,13 @@ def _checked(model: type[Model], name: str, value: Any) -> Any:
     if name not in model.model_fields:
         raise InvalidInput(f"{name} must be a key of {model.__name__}, got {given(value)}")
     try:
-        return adapter(model, name).validate_python(value)
+        return _adapter(model, name).validate_python(value)
     except ValidationError as error:
         raise InvalidInput(describe(error, name)) from None
 
 
 @cache
-def adapter(model: type[Model], name: str) -> TypeAdapter:
+def _adapter(model: type[Model], name: str) -> TypeAdapter:
     """What checks one key's value."""
     field = model.model_fields[name]
     kind = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
@@ -67,3 +67,11 @@ def _file_name(name: str) -> str:
 FileName = Annotated[str, Field(max_length=100), AfterValidator(_file_name)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 Title = Annotated[str, Field(max_length=1000)]
+
+
+def rebuild(model: type[Model] = Model) -> None:
+    """Make anew what checks all models, parts before what they are parts of, after a change of a registry."""
+    _adapter.cache_clear()
+    for each in model.__subclasses__():
+        each.model_rebuild(force=True)
+        rebuild(each)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import Discriminator, GetCoreSchemaHandler, Tag
 
@@ -100,3 +100,13 @@ class OneOf:
     def _name(self, value: Any) -> str:
         named = value.get("kind", self._default) if isinstance(value, dict) else getattr(value, "kind", self._default)
         return named if isinstance(named, str) else repr(named)
+
+
+class NameOf:
+    """Annotation of a field whose value is the name of one of a registry's kinds."""
+
+    def __init__(self, kinds: Registry) -> None:
+        self._kinds = kinds
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        return handler.generate_schema(Literal[tuple(self._kinds)])

@@ -22,9 +22,10 @@ from scenes.lights.filters import Filter, Lamp, check_names
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
 from scenes.materials.torrance_sparrow import FaceMaterial, Material
-from scenes.measurands.features import check_feature, check_quantity
-from scenes.measurands.measurands import Corner, Locator, Measurand, Quantity, Task, Wall, quantities_of
-from scenes.model import FileName, Model, Title, adapter
+from scenes.measurands.features import Corner, Wall, check_feature
+from scenes.measurands.kinds import MEASURANDS
+from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
+from scenes.model import FileName, Model, Title, rebuild
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
 from scenes.parts.mesh_file import Mesh
@@ -405,10 +406,5 @@ class Scene(Model):
             )
 
 
-def _rebuilt() -> None:
-    """A kind was added or removed: what checks scenes and their keys is made anew."""
-    Scene.model_rebuild(force=True)
-    adapter.cache_clear()
-
-
-LIGHTS.followed_by(_rebuilt)
+LIGHTS.followed_by(rebuild)
+MEASURANDS.followed_by(rebuild)

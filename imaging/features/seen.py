@@ -17,26 +17,8 @@ import numpy as np
 
 from imaging.geometry.projection import Frame, camera_frame, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
+from scenes.measurands.evaluated import Line, Moves, Point
 from scenes.measurands.features import place_of, point_of
-
-Moves = Mapping[int, np.ndarray]
-"""Derivatives by some of the parameters, by their numbers; all others are 0."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """A point in the image (k = 2) or in space (k = 3), shape (..., k), with its derivatives (..., k)."""
-
-    at: np.ndarray
-    moves: Moves
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line through two points, the edge's ends."""
-
-    start: Point
-    stop: Point
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,78 @@
-"""The features of measurands on an object: whether it has them, where they are, and in which plane they lie."""
+"""Features of measurands - corners, circles, curved surfaces, edges - and where they are on an object."""
 
 from __future__ import annotations
 
-from itertools import combinations
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import Discriminator, Tag
 
-from scenes.measurands.measurands import Centre, Corner, Quantity, Side, Wall
+from scenes.model import Model
 from scenes.parts.solid import Solid
-from scenes.parts.surfaces import Cone, Sphere
+
+if TYPE_CHECKING:
+    from scenes.measurands.measurands import Quantity
 
 _FLAT = 1e-6  # of the object's size: how far a feature may be from the plane of the others
-_PARALLEL = 1e-6  # sine of an angle that is none
+
+
+class Corner(Model):
+    """A vertex of the object and the two edges whose images are intersected to find it."""
+
+    vertex: str
+    edges: tuple[str, str]
+
+
+class Centre(Model):
+    """A circular edge: its centre, or itself where its diameter is asked for."""
+
+    circle: str
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """The circle's own name, for it is the one edge that is needed."""
+        return (self.circle,)
+
+
+class Wall(Model):
+    """A curved surface of the object, by its limb."""
+
+    surface: str
+    """Its name."""
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Its own name."""
+        return (self.surface,)
+
+
+class Side(Model):
+    """A straight edge."""
+
+    edge: str
+    """Its name."""
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Its own name."""
+        return (self.edge,)
+
+
+def _tag_of_feature(value: Any) -> str:
+    for tag, kind, key in (("centre", Centre, "circle"), ("side", Side, "edge"), ("wall", Wall, "surface")):
+        if isinstance(value, kind) or (isinstance(value, dict) and key in value):
+            return tag
+    return "corner"
+
+
+Feature = Annotated[Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")], Discriminator(_tag_of_feature)]
+AnyFeature = Annotated[
+    Annotated[Corner, Tag("corner")]
+    | Annotated[Centre, Tag("centre")]
+    | Annotated[Side, Tag("side")]
+    | Annotated[Wall, Tag("wall")],
+    Discriminator(_tag_of_feature),
+]
 
 
 def check_feature(solid: Solid, key: str, feature: Corner | Centre | Side | Wall) -> None:
@@ -24,41 +85,6 @@ def check_feature(solid: Solid, key: str, feature: Corner | Centre | Side | Wall
     """
     check = {Corner: _check_corner, Centre: _check_centre, Side: _check_side, Wall: _check_wall}[type(feature)]
     check(solid, key, feature)
-
-
-def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:
-    """See that features, each of which is there, make a quantity: different ones, in one plane.
-
-    Raises
-    ------
-    ValueError
-        If they do not.
-    """
-    for one, other in combinations(quantity.features, 2):
-        if place_of(one) == place_of(other):
-            raise ValueError(f"{key} must be different features, got {place_of(one)!r} twice")
-    _check_shape(solid, key, quantity)
-    if quantity.kind == "distance":
-        return
-    points = points_of(solid, quantity)
-    if not _is_flat(points, solid.extent):
-        raise ValueError(f"{key} must be features in one plane, got {', '.join(quantity.edges)}")
-    along = [_along(solid, feature) for feature in quantity.features if isinstance(feature, Side)]
-    if quantity.kind == "angle" and np.linalg.norm(np.cross(*along)) < _PARALLEL:
-        raise ValueError(f"{key} must be edges that are not parallel, got {', '.join(quantity.edges)}")
-    if quantity.kind == "width" and np.linalg.norm(np.cross(*along)) > np.sin(np.radians(30)):
-        raise ValueError(f"{key} must be edges within 30 degrees of parallel, got {', '.join(quantity.edges)}")
-
-
-def _check_shape(solid: Solid, key: str, quantity: Quantity) -> None:
-    """A taper is a cone's, a position without datum edges a ball's."""
-    wanted = {"taper": Cone, "position": Sphere}.get(quantity.kind)
-    if wanted is None or not isinstance(quantity.features[0], Wall):
-        return
-    name = quantity.features[0].surface
-    if not isinstance(solid.round(name).surface, wanted):
-        word = {Cone: "a cone", Sphere: "a ball"}[wanted]
-        raise ValueError(f"{key} must be {word} for kind {quantity.kind}, got {name!r}")
 
 
 def place_of(feature: Corner | Centre | Side | Wall) -> str:
@@ -107,15 +133,16 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     return normals[0] if alike else None
 
 
-def _is_flat(points: np.ndarray, extent: float) -> bool:
-    """Whether points (n, 3) lie in one plane."""
+def is_flat(points: np.ndarray, extent: float) -> bool:
+    """Whether points (n, 3) of an object of that size lie in one plane."""
     if len(points) < 4:
         return True
     away = points - points.mean(0)
     return bool(np.abs(away @ np.linalg.svd(away)[2][2]).max() <= _FLAT * extent)
 
 
-def _along(solid: Solid, side: Side) -> np.ndarray:
+def along_of(solid: Solid, side: Side) -> np.ndarray:
+    """Unit vector along an edge, (3,)."""
     start, stop = solid.vertices[list(solid.edge(side.edge).ends)]
     return (stop - start) / np.linalg.norm(stop - start)
 

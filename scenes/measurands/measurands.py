@@ -4,88 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from scenes.measurands.features import AnyFeature, Centre, Corner, Feature, Side, Wall, place_of
+from scenes.measurands.kinds import MEASURANDS
 from scenes.model import Model, Title
+from scenes.parts.solid import Solid
 from scenes.ranges import Coordinate, Positive, Spread
-
-Kind = Literal["distance", "width", "offset", "angle", "diameter", "taper", "position"]
-_WANTED = {
-    "distance": ("pp",),
-    "width": ("ee",),
-    "offset": ("pe",),
-    "angle": ("ee",),
-    "diameter": ("r",),
-    "taper": ("s",),
-    "position": ("pee", "s"),
-}  # of each kind the features in their order: p a corner or centre, r a circle or a curved surface s, e an edge
-_WORDS = {
-    "p": "a corner or a circle",
-    "r": "a circle or a curved surface",
-    "s": "a curved surface",
-    "e": "an edge",
-}
-
-
-class Corner(Model):
-    """A vertex of the object and the two edges whose images are intersected to find it."""
-
-    vertex: str
-    edges: tuple[str, str]
-
-
-class Centre(Model):
-    """A circular edge: its centre, or itself where its diameter is asked for."""
-
-    circle: str
-
-    @property
-    def edges(self) -> tuple[str, ...]:
-        """The circle's own name, for it is the one edge that is needed."""
-        return (self.circle,)
-
-
-class Wall(Model):
-    """A curved surface of the object, by its limb."""
-
-    surface: str
-    """Its name."""
-
-    @property
-    def edges(self) -> tuple[str, ...]:
-        """Its own name."""
-        return (self.surface,)
-
-
-class Side(Model):
-    """A straight edge."""
-
-    edge: str
-    """Its name."""
-
-    @property
-    def edges(self) -> tuple[str, ...]:
-        """Its own name."""
-        return (self.edge,)
-
-
-def _tag_of_feature(value: Any) -> str:
-    for tag, kind, key in (("centre", Centre, "circle"), ("side", Side, "edge"), ("wall", Wall, "surface")):
-        if isinstance(value, kind) or (isinstance(value, dict) and key in value):
-            return tag
-    return "corner"
-
-
-Feature = Annotated[Annotated[Corner, Tag("corner")] | Annotated[Centre, Tag("centre")], Discriminator(_tag_of_feature)]
-AnyFeature = Annotated[
-    Annotated[Corner, Tag("corner")]
-    | Annotated[Centre, Tag("centre")]
-    | Annotated[Side, Tag("side")]
-    | Annotated[Wall, Tag("wall")],
-    Discriminator(_tag_of_feature),
-]
+from scenes.registry import NameOf
 
 
 class Tolerance(Model):
@@ -147,7 +76,7 @@ class Quantity:
     @property
     def is_angle(self) -> bool:
         """Whether its unit is degrees."""
-        return self.kind in ("angle", "taper")
+        return MEASURANDS[self.kind].is_angle
 
     @property
     def axis(self) -> int:
@@ -167,7 +96,7 @@ class Measurand(Model):
 
     name: Title
     """What the drawing calls it; different for each."""
-    kind: Kind
+    kind: Annotated[str, NameOf(MEASURANDS)]
     """What is measured of the features."""
     features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=3)]
     """Corners, circles and edges, in the order that the kind asks for."""
@@ -180,13 +109,12 @@ class Measurand(Model):
 
     @model_validator(mode="after")
     def _complete(self) -> Measurand:
-        wanted = _WANTED[self.kind]
+        kind = MEASURANDS[self.kind]
         if not self.name or not self.name.isprintable():
             raise ValueError(f"name must be a printable text, got {self.name!r}")
-        if not any(len(self.features) == len(each) and all(map(_is, each, self.features)) for each in wanted):
+        if not kind.takes(self.features):
             got = ", ".join(" ".join(feature.edges) for feature in self.features)
-            told = "; or ".join(map(_list, wanted))
-            raise ValueError(f"features must be {told} for kind {self.kind}, got {got}")
+            raise ValueError(f"features must be {kind.wanted} for kind {self.kind}, got {got}")
         if self.nominal is not None and isinstance(self.nominal, tuple) != (self.kind == "position"):
             number = "two numbers" if self.kind == "position" else "one number"
             raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
@@ -197,23 +125,7 @@ class Measurand(Model):
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The numbers that it consists of: one, or the two coordinates of a position."""
-        if self.kind != "position":
-            return (Quantity(self.name, self.kind, self.features, self.nominal, self.tolerance, self.weight),)
-        feature, *datums = self.features
-        each = [(datum,) for datum in datums] or [(), ()]
-        return tuple(
-            Quantity(f"{self.name}.{axis}", self.kind, (feature, *datum), nominal, self.tolerance, self.weight)
-            for axis, datum, nominal in zip("xy", each, self.nominal or (None, None), strict=True)
-        )
-
-
-def _is(wanted: str, feature: Corner | Centre | Side | Wall) -> bool:
-    kinds = {"p": (Corner, Centre), "r": (Centre, Wall), "s": Wall, "e": Side}
-    return isinstance(feature, kinds[wanted])
-
-
-def _list(wanted: str) -> str:
-    return ", then ".join(_WORDS[letter] for letter in wanted)
+        return MEASURANDS[self.kind].quantities(self, Quantity)
 
 
 class Task(Model):
@@ -270,3 +182,17 @@ class Locator(Model):
     scale_px: Annotated[float, Field(ge=0.8, le=10)] = 1.0
     window_px: Annotated[float, Field(ge=1, le=50)] = 3.0
     thresholds: tuple[Positive, ...] = (12.0, 10.0)
+
+
+def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:
+    """See that features, each of which is there, make a quantity: different ones, and what its kind asks for.
+
+    Raises
+    ------
+    ValueError
+        If they do not.
+    """
+    for one, other in combinations(quantity.features, 2):
+        if place_of(one) == place_of(other):
+            raise ValueError(f"{key} must be different features, got {place_of(one)!r} twice")
+    MEASURANDS[quantity.kind].check(solid, key, quantity)

@@ -93,7 +93,7 @@ def circle_through(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, 
     >>> angles = np.array([0, 0.1, 0.7, 2.0, 4.0])
     >>> points = np.stack([3 + 2 * np.cos(angles), 2 * np.sin(angles), 0 * angles], 1)
     >>> centre, radius, off = circle_through(points, np.array([0.0, 0, 1]))
-    >>> centre.round(9).tolist(), round(radius, 9), off < 1e-12
+    >>> (centre.round(9) + 0.0).tolist(), round(radius, 9), off < 1e-12
     ([3.0, 0.0, 0.0], 2.0, True)
     """
     points = np.asarray(points)  # a mesh tracks its arrays

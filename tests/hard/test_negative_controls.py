@@ -52,7 +52,10 @@ def test_normal_equations_fail_for_a_far_line(offset):
 
     def normal_equations():
         design = np.stack([x, np.ones(40)], 1)
-        return Answer(float(np.linalg.solve(design.T @ design, design.T @ y)[0]))
+        try:
+            return Answer(float(np.linalg.solve(design.T @ design, design.T @ y)[0]))
+        except np.linalg.LinAlgError:  # of some BLAS kernels: to the last digit singular
+            return Answer(0.0)
 
     numbers = [precise.mpf(float(v)) for v in (*x, *y)]
     truth = Reference.precise(exact(numbers), precise.condition_of(exact, numbers))

@@ -12,11 +12,12 @@ import scenes
 from render.phenomena import EFFECTS
 from scenes import InvalidInput, plugins
 from scenes.lights import LIGHTS
+from scenes.measurands.kinds import MEASURANDS
 from scenes.registry import Registry
 from tests.commands import ice
 from tests.oracle import block_image
 
-MODULES = "spotlight", "median", "vignetting"
+MODULES = "spotlight", "median", "vignetting", "concentricity"
 SENSOR, LIGHT = (30, 135), (15, 315)
 PLAIN = "attached_shadow", "fall_off", "lens_blur"
 
@@ -27,8 +28,7 @@ def outside():
     for name in MODULES:
         plugins.load(f"tests.outside.{name}")
     yield
-    kinds = (LIGHTS, "spotlight"), (measure.ESTIMATORS, "median"), (EFFECTS, "vignetting")
-    for registry, name in kinds:
+    for registry, name in zip((LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS), MODULES, strict=True):
         registry.remove(name)
     plugins._loaded.clear()
 
@@ -67,6 +67,28 @@ def test_a_median_s_variance_is_what_noisy_images_show(task1):
     assert found.value_px.mean() == pytest.approx(planner.predict(task1, SENSOR, LIGHT).value_px, abs=0.02)
     least = measure.distance(images, task1, SENSOR, LIGHT, "gradient")
     assert not np.array_equal(found.value_px, least.value_px)
+
+
+@pytest.fixture(scope="module")
+def bracket():
+    """The bracket before a camera of a fifth of the pixels each way, with the one requirement."""
+    wanted = {"name": "aligned", "kind": "concentricity", "tolerance": 0.1}
+    features = [{"circle": "c2"}, {"circle": "c4"}, {"edge": "e10"}]
+    camera = {"width": 490, "height": 410, "focal_px": 1450.0}
+    whole = scenes.load("bracket_mm").with_(measurands=[{**wanted, "features": features}])
+    return whole.model_copy(update={"camera": whole.camera.model_copy(update=camera)})
+
+
+def test_a_measurand_s_value_and_variance_are_what_noisy_images_show(bracket):
+    told = planner.predict(bracket, (20, 0), (20, 225)).measurands[0]
+    assert (told.kind, told.unit) == ("concentricity", "mm")
+    assert told.value_object == pytest.approx(18.0 - 48.0)  # of the holes, along the part's length
+    clean = render.image(bracket, (20, 0), (20, 225), effects=(*PLAIN, "cast_shadow"))
+    known = measure.propagate(clean, bracket, (20, 0), (20, 225)).measurands
+    images = render.expose(clean, bracket.noise, np.random.default_rng(5), 200)
+    found = measure.measure(images, bracket, (20, 0), (20, 225)).value[:, 0]
+    ratio = np.var(found, ddof=1) / known.covariance[0, 0]
+    assert abs(ratio - 1) < 4 * np.sqrt(2 / 199)  # margin: 4 standard errors
 
 
 def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):

@@ -1,0 +1,110 @@
+"""What a kind of measurand is: which features it asks for, when they make it, its value and derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from scenes.measurands.evaluated import Evaluated
+from scenes.measurands.features import Centre, Corner, Side, Wall, is_flat, plane_of, points_of
+from scenes.parts.solid import Solid
+from scenes.registry import Registry
+
+if TYPE_CHECKING:
+    from scenes.measurands.measurands import Measurand, Quantity
+
+_ZERO = 1e-9  # of the object's size: an offset that is none, and has no side
+WORDS = {
+    "p": "a corner or a circle",
+    "r": "a circle or a curved surface",
+    "s": "a curved surface",
+    "e": "an edge",
+}
+_FEATURES = {"p": (Corner, Centre), "r": (Centre, Wall), "s": (Wall,), "e": (Side,)}
+
+
+class MeasurandKind:
+    """A kind of measurand; made known by ``@MEASURANDS.add(name)`` of an instance.
+
+    ``seen`` is what was found in a picture, or is expected there (`imaging.features.seen.Seen`): it gives points, lines
+    and circles, in the image or on a plane, with their derivatives.
+    """
+
+    features: ClassVar[tuple[str, ...]]
+    """Orders of features that make one: p a corner or centre, r a circle or a curved surface s, e an edge."""
+    is_angle: ClassVar[bool] = False
+    """Whether its unit is degrees."""
+    is_flat: ClassVar[bool] = True
+    """Whether its features must lie in one plane."""
+
+    def takes(self, features: tuple) -> bool:
+        """Whether these features, in their order, make one."""
+        return any(
+            len(features) == len(each)
+            and all(isinstance(feature, _FEATURES[letter]) for letter, feature in zip(each, features, strict=True))
+            for each in self.features
+        )
+
+    @property
+    def wanted(self) -> str:
+        """The features that it asks for, in words."""
+        return "; or ".join(", then ".join(WORDS[letter] for letter in each) for each in self.features)
+
+    def check(self, solid: Solid, key: str, quantity: Quantity) -> None:
+        """See that features of an object make one; ValueError if not."""
+        if self.is_flat and not is_flat(points_of(solid, quantity), solid.extent):
+            raise ValueError(f"{key} must be features in one plane, got {', '.join(quantity.edges)}")
+
+    def quantities(self, measurand: Measurand, make: type[Quantity]) -> tuple[Quantity, ...]:
+        """The numbers that a measurand of this kind consists of."""
+        return (
+            make(
+                *(getattr(measurand, name) for name in ("name", "kind", "features", "nominal", "tolerance", "weight"))
+            ),
+        )
+
+    def in_image(self, seen: Any, quantity: Quantity) -> Evaluated:
+        """Value and derivatives in the image: px, or degrees."""
+        return self.evaluated(seen, quantity, None)
+
+    def on_plane(self, seen: Any, quantity: Quantity) -> Evaluated:
+        """The same on the plane of its features: the scene's unit, or degrees."""
+        return self.evaluated(seen, quantity, plane(seen, quantity))
+
+    def evaluated(self, seen: Any, quantity: Quantity, plane: np.ndarray | None) -> Evaluated:
+        """The same in the image (``plane`` None) or on a plane of unit normal (..., 3): one formula for both."""
+        raise NotImplementedError
+
+
+MEASURANDS: Registry[MeasurandKind] = Registry("measurand kind")
+
+
+def plane(seen: Any, quantity: Quantity) -> np.ndarray:
+    """Unit normal of the plane in which it is measured, towards the sensor, (..., 3).
+
+    That of `plane_of`; where that is none, the plane through both points that faces the sensor most.
+    """
+    points = points_of(seen.solid, quantity)
+    ray = points.mean(0) - seen.eye
+    normal = plane_of(seen.solid, quantity)
+    if normal is None:
+        along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
+        normal = ray - (ray @ along)[..., None] * along
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    away = np.einsum("...i,...i->...", np.broadcast_to(normal, ray.shape), ray)
+    return np.where(away[..., None] > 0, -normal, normal)
+
+
+def side(
+    seen: Any, quantity: Quantity, point: np.ndarray, line: tuple[np.ndarray, np.ndarray], *, in_space: bool
+) -> np.ndarray:
+    """+1 or -1 (...): on which side of a line (its start, its direction) a point is, so that it counts as positive.
+
+    The in-plane normal is turned one way as the sensor sees the plane, and the other way in the image, whose y axis
+    points down.
+    """
+    start, along = line
+    away = np.cross(plane(seen, quantity), along) @ (point - start)
+    sign = np.where(away < -_ZERO * seen.solid.extent * np.linalg.norm(along), -1.0, 1.0)
+    return sign if in_space else -sign
