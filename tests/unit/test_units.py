@@ -40,7 +40,8 @@ def test_the_unit_changes_no_picture(task1, unit):
 
 def test_a_scene_in_mm_gives_the_same_image(task1):
     images = [render.image(scene, (30, 135), (15, 315)) for scene in (task1, in_units(task1, "mm"))]
-    assert np.abs(images[0] - images[1]).max() < 0.01
+    # margin: a ray that meets the other side of an edge: up to 0.06 where Embree has no AVX; another unit is some 100
+    assert np.abs(images[0] - images[1]).max() < 0.3
 
 
 def as_document(name, **changes):
