@@ -2,10 +2,11 @@
 
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
-examples of its own module and the tests that read the code, then the unit tests that call the changed function and
-others of the module, the quickest first (``tests.proofs.reach``), then what the commands print, then the other test
-files that speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean
-code, where it is run, too. What survives is printed with its line: a test is missing, or the mutant is equivalent.
+examples of its own module and the tests that read the code, then the unit tests and the stored numbers that call the
+changed function and others of the module, the quickest first (``tests.proofs.reach``), then the other test files that
+speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean code, where
+it is run, too, or was when it was noted what it calls. What survives is printed with its line: a test is missing, or
+the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from tests.proofs.slips import SLIPS, places, slipped
 ROOT = Path(__file__).parents[2]
 SOURCES = ("scenes", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
-DOCUMENTS = "tests/regression/test_documents.py"  # what all commands print
+STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py")  # what was said once
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
@@ -55,9 +56,10 @@ OPERATORS = tuple(
     )
 )
 _FILES = 3  # test files that a mutant meets after the unit tests
-_UNIT_S = 20  # processor seconds of the unit tests
-_LIMIT_S = 60  # of all together
-_FIRST_S = 15  # of all together where only the unit tests are asked
+_CALLING_S = 20  # processor seconds, on clean code, of the tests that call the changed function
+_MODULE_S = 5  # of those that call others of the module
+_LIMIT_S = 90  # after which these do not end
+_OTHERS_S = 45  # of the files that are asked then
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 
@@ -96,7 +98,7 @@ def sources(root: Path = ROOT) -> list[str]:
 
 
 def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path = ROOT) -> list[str]:
-    """The unit tests that call the function around a line, then those that call others of the module.
+    """The tests that call the function around a line, then those that call others of the module.
 
     The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others.
     """
@@ -105,12 +107,14 @@ def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: P
         t: each["calls"] for t, each in tests.items() if any(c.startswith(f"{mutant.file}:") for c in each["calls"])
     }
     own = {t for t, calls in some.items() if any(c == name or c.startswith(f"{name}.") for c in calls)}
-    chosen, spent = [], 0.0
-    for test in sorted(some, key=lambda test: (test not in own, tests[test]["seconds"], test)):
-        spent += tests[test]["seconds"]
-        if chosen and spent > _UNIT_S:
-            break
-        chosen.append(test)
+    chosen: list[str] = []
+    for group, seconds in ((own, _CALLING_S), (some.keys() - own, _MODULE_S)):
+        spent = 0.0
+        for test in sorted(group, key=lambda test: (tests[test]["seconds"], test)):
+            spent += tests[test]["seconds"]
+            if spent > seconds and chosen:
+                break
+            chosen.append(test)
     return chosen
 
 
@@ -175,20 +179,28 @@ def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_firs
     path = root / mutant.file
     before = path.read_text(encoding="utf-8")
     after, line = changed(mutant, root)
-    asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
-    asked += [] if is_first else [DOCUMENTS, *nearest(mutant.file, root)]
-    limit = _FIRST_S if is_first else _LIMIT_S
+    own = [mutant.file] if ">>> " in before else []
+    near = [*own, *READERS, *calling(mutant, int(line.split(":")[1]), tests, root)]
     path.write_text(after, encoding="utf-8")
     try:
-        code, by = _tested([mutant.file, *asked], root, limit)
+        code, by = _tested(near, root, _LIMIT_S)
+        if code in _ENDED:
+            return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
+        others = [] if is_first or code not in _PASSED else nearest(mutant.file, root)
+        if others:
+            code, by = _tested(others, root, _OTHERS_S)
     finally:
         path.write_text(before, encoding="utf-8")
-    if code in (-signal.SIGXCPU, -signal.SIGKILL):
-        return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
-    if code in (0, 5):
+    if code in (*_PASSED, *_ENDED):
         return "survived", ""
-    clean, wrong = _tested([by] if by else [mutant.file, *asked], root, limit)
-    return ("killed", by) if clean in (0, 5) else ("no baseline", wrong)
+    if by in tests:
+        return "killed", by
+    clean, wrong = _tested([by] if by else others or near, root, _LIMIT_S)
+    return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
+
+
+_PASSED = 0, 5  # exit status of pytest; the second: no tests
+_ENDED = -signal.SIGXCPU, -signal.SIGKILL  # for processor time
 
 
 def _tested(tests: list[str], root: Path, seconds: int) -> tuple[int, str]:
@@ -227,11 +239,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
     parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
-    parser.add_argument("--first", action="store_true", help="Only the unit tests: what survives is for --again.")
+    parser.add_argument("--first", action="store_true", help="Only tests that call it: what survives is for --again.")
     asked = parser.parse_args()
     every, began = mutants(), time.perf_counter()
     asked.log.parent.mkdir(parents=True, exist_ok=True)
-    tests = reached(asked.log.with_name("reach.json"), sorted((ROOT / UNIT).glob("test_*.py")))
+    asked_first = [*sorted((ROOT / UNIT).glob("test_*.py")), *(ROOT / name for name in STORED)]
+    tests = reached(asked.log.with_name("reach.jsonl"), asked_first)
     chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
     known = _known(asked.log)
     tally = dict.fromkeys(("killed", "survived", "too slow", "no baseline", "equivalent", "same"), 0)
