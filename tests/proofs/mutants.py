@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import argparse
 import ast
+import compileall
 import hashlib
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -26,12 +26,12 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from queue import Queue
 from typing import Any
 
 from tests.proofs.equivalent import is_equivalent
+from tests.proofs.forked import Runner
 from tests.proofs.reach import function, reached
 from tests.proofs.slips import SLIPS, places, slipped
 
@@ -171,31 +171,34 @@ def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
     return after, f"{mutant.file}:{number}: {line.strip()}"
 
 
-def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_first: bool = False) -> tuple[str, str]:
+def judged(
+    mutant: Mutant, root: Path, runner: Runner, tests: dict[str, dict[str, Any]], is_first: bool = False
+) -> tuple[str, str]:
     """ "killed", "survived", "too slow" or "no baseline", and the test that killed, or that fails on clean code, too.
 
     ``root`` is a copy that nobody else uses.
     """
     path = root / mutant.file
-    before = path.read_text(encoding="utf-8")
+    before, times = path.read_text(encoding="utf-8"), path.stat()
     after, line = changed(mutant, root)
     own = [mutant.file] if ">>> " in before else []
     near = [*own, *READERS, *calling(mutant, int(line.split(":")[1]), tests, root)]
     path.write_text(after, encoding="utf-8")
     try:
-        code, by = _tested(near, root, _LIMIT_S)
+        code, by = _tested(near, runner, _LIMIT_S)
         if code in _ENDED:
             return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
         others = [] if is_first or code not in _PASSED else nearest(mutant.file, root)
         if others:
-            code, by = _tested(others, root, _OTHERS_S)
+            code, by = _tested(others, runner, _OTHERS_S)
     finally:
         path.write_text(before, encoding="utf-8")
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # the compiled one is of this text
     if code in (*_PASSED, *_ENDED):
         return "survived", ""
     if by in tests:
         return "killed", by
-    clean, wrong = _tested([by] if by else others or near, root, _LIMIT_S)
+    clean, wrong = _tested([by] if by else others or near, runner, _LIMIT_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
 
 
@@ -203,31 +206,26 @@ _PASSED = 0, 5  # exit status of pytest; the second: no tests
 _ENDED = -signal.SIGXCPU, -signal.SIGKILL  # for processor time
 
 
-def _tested(tests: list[str], root: Path, seconds: int) -> tuple[int, str]:
+def _tested(tests: list[str], runner: Runner, seconds: int) -> tuple[int, str]:
     """Exit status of these tests in a copy, and the one that fails, if it has a name."""
-    run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests],
-        cwd=root, env={**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
-        preexec_fn=partial(_limited, seconds),
-    )  # fmt: skip
-    return run.returncode, next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)), "")
+    code, said = runner.run(tests, seconds)
+    return code, next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, re.MULTILINE)), "")
 
 
-def _limited(seconds: int) -> None:
-    """In the process of the tests: processor time, so that other work on the machine does not matter."""
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-
-
-def copies(count: int, folder: Path) -> Queue[Path]:
-    """So many copies of what git knows."""
+def copies(count: int, folder: Path) -> Queue[tuple[Path, Runner]]:
+    """So many copies of what git knows, compiled."""
     names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
-    free: Queue[Path] = Queue()
+    free: Queue[tuple[Path, Runner]] = Queue()
     for number in range(count):
         for name in filter(None, names):
             target = folder / str(number) / name
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, target)
-        free.put(folder / str(number))
+        root = folder / str(number)
+        compileall.compile_dir(root, quiet=2)
+        collect = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "tests"]
+        subprocess.run(collect, cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True)  # compiles
+        free.put((root, Runner(root)))
     return free
 
 
@@ -252,14 +250,14 @@ def main() -> None:
         free = copies(asked.workers, Path(folder))
 
         def one(mutant: Mutant) -> tuple[str, str]:
-            root, since = free.get(), time.perf_counter()
+            (root, runner), since = free.get(), time.perf_counter()
             try:
                 line = changed(mutant, root)[1]
                 if not line or is_equivalent(mutant.operator, _bare(line)):
                     return "equivalent" if line else "same", line
                 if line in known and (known[line] == "killed" or not asked.again):
                     return known[line], line
-                outcome, by = judged(mutant, root, tests, asked.first)
+                outcome, by = judged(mutant, root, runner, tests, asked.first)
                 with asked.log.open("a", encoding="utf-8") as log:
                     seconds = round(time.perf_counter() - since)
                     log.write(
@@ -268,7 +266,7 @@ def main() -> None:
                     )
                 return outcome, line
             finally:
-                free.put(root)
+                free.put((root, runner))
 
         for outcome, line in executor.map(one, chosen):
             tally[outcome] += 1

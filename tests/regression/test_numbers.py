@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.regression.numbers import checking, measuring, parts, planning
+from tests.regression.numbers import checking, measuring, parts, planning, working
 from tests.regression.stored import differences, read, told, write
 
 pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
-CASES = {**planning.cases(), **parts.cases(), **measuring.cases(), **checking.cases()}
+CASES = {**planning.cases(), **parts.cases(), **measuring.cases(), **checking.cases(), **working.cases()}
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -114,7 +114,7 @@ def _effects(name):
     return [[each.effect.name, each.on, each.reason, each.influence] for each in found]
 
 
-def _small(name, factor):
+def small(name, factor):
     scene = load(name)
     camera = scene.camera
     return scene.model_copy(update={"camera": camera.model_copy(update={
@@ -123,7 +123,7 @@ def _small(name, factor):
 
 
 def _rendered(name, factor=4.0):
-    scene = _small(name, factor)
+    scene = small(name, factor)
     picture = scenes.Picture.of(scene, *uneven(scene))
     return render.image(picture, quality=render.Quality(supersample=2, edge_samples=4))
 
@@ -137,7 +137,7 @@ def _turned():
 
 
 def _shots():
-    scene = _small("task1", 4.0)
+    scene = small("task1", 4.0)
     return render.shots(scene, *uneven(scene), count=2, rng=np.random.default_rng(3))
 
 
