@@ -14,10 +14,11 @@ import resource
 import subprocess
 import sys
 import tempfile
+import traceback
 from pathlib import Path
 
 _LOADED = (
-    "cv2", "hypothesis", "jinja2", "matplotlib.pyplot", "mitsuba", "mpmath", "numpy", "pydantic", "pytest",
+    "cv2", "jinja2", "matplotlib.pyplot", "mitsuba", "mpmath", "numpy", "pydantic", "pytest",
     "rich.console", "rich.table", "scipy.interpolate", "scipy.ndimage", "scipy.optimize", "scipy.sparse",
     "scipy.spatial", "scipy.special", "scipy.stats", "skimage", "sqlalchemy", "trimesh", "typer.testing",
     "uncertainties",
@@ -59,8 +60,11 @@ def _child(tests: list[str], seconds: int, output: str) -> None:
         import pytest
 
         code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests]))
-        sys.stdout.flush()
+    except BaseException:
+        traceback.print_exc()
     finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
         os._exit(code)
 
 

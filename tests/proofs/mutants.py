@@ -56,8 +56,8 @@ OPERATORS = tuple(
     )
 )
 _FILES = 3  # test files that a mutant meets after the unit tests
-_CALLING_S = 20  # processor seconds, on clean code, of the tests that call the changed function
-_MODULE_S = 5  # of those that call others of the module
+_CALLING_S = 12  # processor seconds, on clean code, of the tests that call the changed function
+_MODULE_S = 3  # of those that call others of the module
 _LIMIT_S = 90  # after which these do not end
 _OTHERS_S = 45  # of the files that are asked then
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
