@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.regression.numbers import checking, measuring, parts, planning, working
+from tests.regression.numbers import checking, inside, measuring, parts, planning, working
 from tests.regression.stored import differences, read, told, write
 
 pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
-CASES = {**planning.cases(), **parts.cases(), **measuring.cases(), **checking.cases(), **working.cases()}
+_ABOUT = planning, parts, measuring, checking, working, inside
+CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
 
 @pytest.mark.parametrize("name", CASES)

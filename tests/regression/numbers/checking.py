@@ -140,9 +140,14 @@ def _folder():
     return folder
 
 
+def run_folder():
+    """Where the run lies, as ``run``, and a picture, as ``shot.npy``."""
+    return Path(_folder().name)
+
+
 def printed(*arguments):
     """What a command says in words, or as JSON."""
-    done = ice(*arguments, "-q", cwd=Path(_folder().name))
+    done = ice(*arguments, "-q", cwd=run_folder())
     said = json.loads(done.stdout) if "--json" in arguments else _words(done.stdout)
     return {"status": done.returncode, "said": said, "errors": done.stderr.splitlines()}
 
@@ -153,10 +158,10 @@ def _words(text):
 
 
 def _reported():
-    ice("report", "run", "--out", "report", "-q", cwd=Path(_folder().name))
-    folder = Path(_folder().name) / "report"
+    ice("report", "run", "--out", "report", "-q", cwd=run_folder())
+    folder = run_folder() / "report"
     found = sorted(folder.glob("*.csv")) + sorted(folder.glob("*.md"))
-    result = json.loads((Path(_folder().name) / "run" / "result.json").read_text(encoding="utf-8"))
+    result = json.loads((run_folder() / "run" / "result.json").read_text(encoding="utf-8"))
     return {"files": {path.name: _words(path.read_text(encoding="utf-8")) for path in found}, "result": result}
 
 
