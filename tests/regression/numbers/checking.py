@@ -165,6 +165,22 @@ def _reported():
     return {"files": {path.name: _words(path.read_text(encoding="utf-8")) for path in found}, "result": result}
 
 
+def _photographed():
+    """Repeated photographs of two settings in the place of renders, one of them none."""
+    scene, folder = load("task1"), run_folder() / "photos"
+    for number, setting in enumerate(scene.settings[:2]):
+        (s, k), clean = (setting.sensor, setting.light), planner.image(scene, setting.sensor, setting.light)
+        place = folder / f"sensor_{s.polar_deg:g}_{s.azimuth_deg:g}_light_{k.polar_deg:g}_{k.azimuth_deg:g}"
+        place.mkdir(parents=True, exist_ok=True)
+        noise = np.random.default_rng(number).normal(0, 2.4, (5, *clean.shape))
+        for i, shot in enumerate(clean + noise):
+            np.save(place / f"{i}.npy", shot)
+    (place / "9.npy").write_bytes(b"none")
+    done = ice("validate", "task1", "--photos", folder, "--out", "shown", "--workers", "1", "--json", "-q",
+               cwd=run_folder())  # fmt: skip
+    return {"status": done.returncode, "said": json.loads(done.stdout)}
+
+
 _POSES = ("--sensor", "33,312", "--light", "24,250")
 _PRINTED = {
     "predict": ["predict", _UNEVEN], "predict bound": ["predict", _UNEVEN, "--model", "bound", *_POSES],
@@ -198,4 +214,5 @@ def cases():
         "statistics": (CLOSED, _statistics), "compared": (CLOSED, _compared), "cost": (CLOSED, _cost),
         "uncertain": (CLOSED, _uncertain), "capable": (CLOSED, _capable), "budget in words": (CLOSED, _budget_facts),
         "messages": (CLOSED, _asked), "report": (RENDERED, _reported),
+        "photographs of settings": (SEARCHED, _photographed),
     }  # fmt: skip

@@ -9,9 +9,10 @@ import planner
 import scenes
 from measure.bounds import image_bound
 from tests.boards import SMALL, poses
-from tests.photographs import MADE, board, rectangle, tag, turned
-from tests.regression.numbers.poses import load, uneven, without_error
+from tests.photographs import MADE, board, ellipse, rectangle, tag, turned
+from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
 from tests.regression.stored import CLOSED, SEARCHED
+from validation.report import camera_table
 
 _BY_ALL = ("task1", "wedge", "calibrated_rig", "plate")
 _BY_BEST = ("glossy_metal", "low_light", "anodised", "macro", "polarised", "ball", "shaft", "two_lights",
@@ -70,7 +71,17 @@ def _boards():
     rng = np.random.default_rng(11)
     images = [SMALL.image(pose) + rng.normal(0, 1.0, (240, 320)) for pose in poses(SMALL, 3, rng, 600.0)]
     found = [measure.chessboard(image, SMALL.board) for image in images]
-    return {"boards": found, "camera": measure.calibrate_camera(found, SMALL.square, (240, 320), "k1,k2", 0.01)}
+    camera = measure.calibrate_camera(found, SMALL.square, (240, 320), "k1,k2", 0.01)
+    return {"boards": found, "camera": camera, "summary": camera_table.summary(camera).splitlines(),
+            "covariance": camera_table.covariance_file(camera).splitlines(),
+            "lens": camera_table.lens_file(camera).splitlines()}  # fmt: skip
+
+
+def _round_hole():
+    image = (
+        40 + 130 * ellipse((41.3, 36.8, 21.7, 16.4, 31.0), (74, 86)) + np.random.default_rng(6).normal(0, 1, (74, 86))
+    )
+    return measure.photograph(image, kinds=("circle", "ellipse"), most=1)
 
 
 def _conics():
@@ -98,7 +109,7 @@ def cases():
         for estimator in measure.ESTIMATORS:
             found[f"measure {name} {estimator}"] = CLOSED, partial(_measured, name, estimator)
             found[f"propagate {name} {estimator}"] = CLOSED, partial(_propagated, name, estimator)
-    for name in _BY_BEST:
+    for name in (*_BY_BEST, *CHANGED):
         found[f"measure {name}"] = CLOSED, partial(_measured, name, None)
         found[f"propagate {name}"] = CLOSED, partial(_propagated, name, None)
     for name in ("task1", "plate", "shaft"):
@@ -109,6 +120,7 @@ def cases():
         "photograph tag": (SEARCHED, lambda: measure.photograph(tag("4X4_50", 7, 1), most=2)),
         "photograph board": (SEARCHED, lambda: measure.photograph(board(), kinds=("chessboard",), most=1)),
         "sharpness": (SEARCHED, _sharpness), "lens": (SEARCHED, _lens), "noise curve": (SEARCHED, _noise),
+        "photograph hole": (SEARCHED, _round_hole),
         "boards": (SEARCHED, _boards), "conics": (CLOSED, _conics), "fit": (SEARCHED, _fitted),
         "image bound": (CLOSED, lambda: image_bound(_pictures("task1")[0], load("task1"), *uneven(load("task1")))),
     }  # fmt: skip

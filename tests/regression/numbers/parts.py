@@ -11,7 +11,7 @@ from scenes.changes import changed
 from scenes.parts.block import Block
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Torus
 from scenes.parts.turned import Turned
-from tests.regression.numbers.poses import load, uneven, without_error
+from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
 from tests.regression.stored import CLOSED, RENDERED
 
 _AXIS = np.array([0.48, -0.6, 0.64])
@@ -122,10 +122,10 @@ def small(name, factor):
         "focal_px": camera.focal_px / factor})})  # fmt: skip
 
 
-def _rendered(name, factor=4.0):
-    scene = small(name, factor)
+def _rendered(name, effects="auto"):
+    scene = small(name, 4.0)
     picture = scenes.Picture.of(scene, *uneven(scene))
-    return render.image(picture, quality=render.Quality(supersample=2, edge_samples=4))
+    return render.image(picture, quality=render.Quality(supersample=2, edge_samples=4), effects=effects)
 
 
 def _turned():
@@ -161,6 +161,10 @@ def cases():
     for name in ("task1", "glossy_metal", "plate", "ball", "two_lights", "printed_label", "polarised", "wedge", "shaft",
                  "calibrated_rig", "grey_floor", "ring_light", "backlight_plate"):  # fmt: skip
         found[f"render {name}"] = RENDERED, partial(_rendered, name)
+    for name in CHANGED:
+        found[f"render {name}"] = RENDERED, partial(_rendered, name)
+        found[f"effects {name}"] = CLOSED, partial(_effects, name)
+    found["render grey_floor with all"] = RENDERED, partial(_rendered, "grey_floor", "all")
     return found | {
         "exposed": (CLOSED, _exposed), "turned": (CLOSED, _turned), "changed": (CLOSED, _changed),
         "shots": (RENDERED, _shots), "block": (CLOSED, lambda: Block(kind="block", size=(3.0, 5.0, 7.5)).solid),
