@@ -178,7 +178,8 @@ def _photographed():
     (place / "9.npy").write_bytes(b"none")
     done = ice("validate", "task1", "--photos", folder, "--out", "shown", "--workers", "1", "--json", "-q",
                cwd=run_folder())  # fmt: skip
-    return {"status": done.returncode, "said": json.loads(done.stdout)}
+    said = json.loads(done.stdout)
+    return {"status": done.returncode, "left out": len(said.pop("left_out")), "said": said}
 
 
 _POSES = ("--sensor", "33,312", "--light", "24,250")
