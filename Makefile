@@ -68,6 +68,7 @@ reference: $(VENV)/.installed
 	ICE_VARIANT=scalar_rgb $(BIN)/ice validate tests/regression/reference.toml --renders 500 --seed 1 --workers 1 --fresh --out runs/reference
 	cp runs/reference/result.json tests/regression/reference.json
 	$(BIN)/python -m tests.regression.test_documents $$(mktemp -d)
+	$(BIN)/python -m tests.regression.test_numbers
 
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed

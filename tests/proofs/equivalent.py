@@ -24,10 +24,20 @@ EQUIVALENT: dict[str, str] = {
         "what is not above 0 is less than the least, too",
     "render/texture.py: for index in np.flatnonzero((heights[0] > _GRAZING * distances[ -1]) & "
     "(heights[1] > _GRAZING * distances[1])):": "1e-9 of either distance is nothing",
+    "measure/photo/patches.py: y, x = (part.ravel() / SIDE for part in np.mgrid[:SIDE, :SIDE] + (SIDE - 1) / 2)":
+        "polynomials up to a degree about another middle span the same, and each degree's own part of it",
+    "measure/find/distinct.py: if (a.max(0) < b.min(0)).all() or (b.max(0) < a.min(0)).any():":
+        "a shorter way: outlines apart along one axis have nothing in common in the next lines, too",
+    "measure/photo/residuals.py: low = np.maximum(np.floor(places.min(0) - _REACH - 4), 0).astype(int)":
+        "a pixel more around what is read",
+    "planner/imaging/arrangement.py: _SQUARE = np.cos(np.pi * np.arange( 10) / 8)  "
+    "# places that tell a polynomial of degree 4 well": "a place more of an exact polynomial, the last but one again",
 }  # fmt: skip
 
 # by operator and what the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
+    ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
+    ("core/NumberReplacer", r"\b(?:fontsize|labelpad|pad|zorder)= "): "how a figure's words are set, not what is shown",
     ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",
     ("core/ReplaceTrueWithFalse", r"strict=False\)"): "the lengths are equal: the argument only says so",
 }
@@ -37,6 +47,8 @@ def is_equivalent(operator: str, line: str) -> bool:
     """Whether a mutant (file and text of its line) is one of them.
 
     >>> is_equivalent("core/NumberReplacer", "a/b.py: @lru_cache(maxsize= 63)")
+    True
+    >>> is_equivalent("core/NumberReplacer", "a/b.py: axis.set_xlabel(name, fontsize= 11)")
     True
     >>> is_equivalent("core/NumberReplacer", "a/b.py: for x, y in zip(a[1:], b, strict=False):")
     False

@@ -2,21 +2,22 @@
 
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
-examples of its own module and the tests that read the code, then the unit tests that call the changed function and
-others of the module, the quickest first (``tests.proofs.reach``), then what the commands print, then the other test
-files that speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean
-code, where it is run, too. What survives is printed with its line: a test is missing, or the mutant is equivalent.
+examples of its own module and the tests that read the code, then the unit tests and the stored numbers that call the
+changed function and others of the module, the quickest first (``tests.proofs.reach``), then the other test files that
+speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean code, where
+it is run, too, or was when it was noted what it calls. What survives is printed with its line: a test is missing, or
+the mutant is equivalent.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import compileall
 import hashlib
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -25,19 +26,19 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from queue import Queue
 from typing import Any
 
 from tests.proofs.equivalent import is_equivalent
+from tests.proofs.forked import Runner
 from tests.proofs.reach import function, reached
 from tests.proofs.slips import SLIPS, places, slipped
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ("scenes", "imaging", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
-DOCUMENTS = "tests/regression/test_documents.py"  # what all commands print
+STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py")  # what was said once
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
@@ -55,9 +56,10 @@ OPERATORS = tuple(
     )
 )
 _FILES = 3  # test files that a mutant meets after the unit tests
-_UNIT_S = 20  # processor seconds of the unit tests
-_LIMIT_S = 60  # of all together
-_FIRST_S = 15  # of all together where only the unit tests are asked
+_CALLING_S = 12  # processor seconds, on clean code, of the tests that call the changed function
+_MODULE_S = 3  # of those that call others of the module
+_LIMIT_S = 90  # after which these do not end
+_OTHERS_S = 45  # of the files that are asked then
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 
@@ -96,7 +98,7 @@ def sources(root: Path = ROOT) -> list[str]:
 
 
 def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path = ROOT) -> list[str]:
-    """The unit tests that call the function around a line, then those that call others of the module.
+    """The tests that call the function around a line, then those that call others of the module.
 
     The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others.
     """
@@ -105,12 +107,14 @@ def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: P
         t: each["calls"] for t, each in tests.items() if any(c.startswith(f"{mutant.file}:") for c in each["calls"])
     }
     own = {t for t, calls in some.items() if any(c == name or c.startswith(f"{name}.") for c in calls)}
-    chosen, spent = [], 0.0
-    for test in sorted(some, key=lambda test: (test not in own, tests[test]["seconds"], test)):
-        spent += tests[test]["seconds"]
-        if chosen and spent > _UNIT_S:
-            break
-        chosen.append(test)
+    chosen: list[str] = []
+    for group, seconds in ((own, _CALLING_S), (some.keys() - own, _MODULE_S)):
+        spent = 0.0
+        for test in sorted(group, key=lambda test: (tests[test]["seconds"], test)):
+            spent += tests[test]["seconds"]
+            if spent > seconds and chosen:
+                break
+            chosen.append(test)
     return chosen
 
 
@@ -167,55 +171,61 @@ def changed(mutant: Mutant, root: Path) -> tuple[str, str]:
     return after, f"{mutant.file}:{number}: {line.strip()}"
 
 
-def judged(mutant: Mutant, root: Path, tests: dict[str, dict[str, Any]], is_first: bool = False) -> tuple[str, str]:
+def judged(
+    mutant: Mutant, root: Path, runner: Runner, tests: dict[str, dict[str, Any]], is_first: bool = False
+) -> tuple[str, str]:
     """ "killed", "survived", "too slow" or "no baseline", and the test that killed, or that fails on clean code, too.
 
     ``root`` is a copy that nobody else uses.
     """
     path = root / mutant.file
-    before = path.read_text(encoding="utf-8")
+    before, times = path.read_text(encoding="utf-8"), path.stat()
     after, line = changed(mutant, root)
-    asked = READERS + calling(mutant, int(line.split(":")[1]), tests, root)
-    asked += [] if is_first else [DOCUMENTS, *nearest(mutant.file, root)]
-    limit = _FIRST_S if is_first else _LIMIT_S
+    own = [mutant.file] if ">>> " in before else []
+    near = [*own, *READERS, *calling(mutant, int(line.split(":")[1]), tests, root)]
     path.write_text(after, encoding="utf-8")
     try:
-        code, by = _tested([mutant.file, *asked], root, limit)
+        code, by = _tested(near, runner, _LIMIT_S)
+        if code in _ENDED:
+            return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
+        others = [] if is_first or code not in _PASSED else nearest(mutant.file, root)
+        if others:
+            code, by = _tested(others, runner, _OTHERS_S)
     finally:
         path.write_text(before, encoding="utf-8")
-    if code in (-signal.SIGXCPU, -signal.SIGKILL):
-        return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
-    if code in (0, 5):
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # the compiled one is of this text
+    if code in (*_PASSED, *_ENDED):
         return "survived", ""
-    clean, wrong = _tested([by] if by else [mutant.file, *asked], root, limit)
-    return ("killed", by) if clean in (0, 5) else ("no baseline", wrong)
+    if by in tests:
+        return "killed", by
+    clean, wrong = _tested([by] if by else others or near, runner, _LIMIT_S)
+    return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
 
 
-def _tested(tests: list[str], root: Path, seconds: int) -> tuple[int, str]:
+_PASSED = 0, 5  # exit status of pytest; the second: no tests
+_ENDED = -signal.SIGXCPU, -signal.SIGKILL  # for processor time
+
+
+def _tested(tests: list[str], runner: Runner, seconds: int) -> tuple[int, str]:
     """Exit status of these tests in a copy, and the one that fails, if it has a name."""
-    run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests],
-        cwd=root, env={**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
-        preexec_fn=partial(_limited, seconds),
-    )  # fmt: skip
-    return run.returncode, next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)), "")
+    code, said = runner.run(tests, seconds)
+    return code, next(iter(re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", said, re.MULTILINE)), "")
 
 
-def _limited(seconds: int) -> None:
-    """In the process of the tests: processor time, so that other work on the machine does not matter."""
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-
-
-def copies(count: int, folder: Path) -> Queue[Path]:
-    """So many copies of what git knows."""
+def copies(count: int, folder: Path) -> Queue[tuple[Path, Runner]]:
+    """So many copies of what git knows, compiled."""
     names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
-    free: Queue[Path] = Queue()
+    free: Queue[tuple[Path, Runner]] = Queue()
     for number in range(count):
         for name in filter(None, names):
             target = folder / str(number) / name
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, target)
-        free.put(folder / str(number))
+        root = folder / str(number)
+        compileall.compile_dir(root, quiet=2)
+        collect = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "tests"]
+        subprocess.run(collect, cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True)  # compiles
+        free.put((root, Runner(root)))
     return free
 
 
@@ -227,11 +237,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
     parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
-    parser.add_argument("--first", action="store_true", help="Only the unit tests: what survives is for --again.")
+    parser.add_argument("--first", action="store_true", help="Only tests that call it: what survives is for --again.")
     asked = parser.parse_args()
     every, began = mutants(), time.perf_counter()
     asked.log.parent.mkdir(parents=True, exist_ok=True)
-    tests = reached(asked.log.with_name("reach.json"), sorted((ROOT / UNIT).glob("test_*.py")))
+    asked_first = [*sorted((ROOT / UNIT).glob("test_*.py")), *(ROOT / name for name in STORED)]
+    tests = reached(asked.log.with_name("reach.jsonl"), asked_first)
     chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
     known = _known(asked.log)
     tally = dict.fromkeys(("killed", "survived", "too slow", "no baseline", "equivalent", "same"), 0)
@@ -239,14 +250,14 @@ def main() -> None:
         free = copies(asked.workers, Path(folder))
 
         def one(mutant: Mutant) -> tuple[str, str]:
-            root, since = free.get(), time.perf_counter()
+            (root, runner), since = free.get(), time.perf_counter()
             try:
                 line = changed(mutant, root)[1]
                 if not line or is_equivalent(mutant.operator, _bare(line)):
                     return "equivalent" if line else "same", line
                 if line in known and (known[line] == "killed" or not asked.again):
                     return known[line], line
-                outcome, by = judged(mutant, root, tests, asked.first)
+                outcome, by = judged(mutant, root, runner, tests, asked.first)
                 with asked.log.open("a", encoding="utf-8") as log:
                     seconds = round(time.perf_counter() - since)
                     log.write(
@@ -255,7 +266,7 @@ def main() -> None:
                     )
                 return outcome, line
             finally:
-                free.put(root)
+                free.put((root, runner))
 
         for outcome, line in executor.map(one, chosen):
             tally[outcome] += 1

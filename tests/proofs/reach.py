@@ -1,7 +1,7 @@
-"""Which functions of the packages each unit test calls, and what it costs: whom ``make mutants`` asks about a slip.
+"""Which functions of the packages each test calls, and what it costs: whom ``make mutants`` asks about a slip.
 
-A map file holds it by test file with the file's hash, so that only what changed is run again. As a pytest plugin it
-writes what the tests of one run call.
+A map file holds a line for each test file, with its hash, so that only what changed is run again: all of it in one
+process, by this module as a pytest plugin. What does not pass on clean code is noted, too: nobody asks it.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-_RESULT = "REACHED"  # names the file that the plugin writes
-_found: dict[str, dict[str, Any]] = {}
+_RESULT = "REACHED"  # names the map file that the plugin adds to
+_found: dict[str, dict[str, dict[str, Any]]] = {}  # by test file and test
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Note every function called by a test and by the fixtures made for it."""
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """Note every function called by a test and by the fixtures made for it; a file's last test writes them."""
     codes: set[Any] = set()
 
-    def note(frame: Any, event: str, _: Any) -> None:
+    def note(frame: Any, event: str, _: Any, add: Any = codes.add) -> None:
         if event == "call":
-            codes.add(frame.f_code)
+            add(frame.f_code)
 
     began = time.process_time()
     threading.setprofile(note)
@@ -43,34 +43,52 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     places = ((Path(code.co_filename), code.co_qualname.replace(".<locals>", "")) for code in codes)
     names = {f"{path.relative_to(ROOT)}:{name}" for path, name in places if path.is_relative_to(ROOT)}
     ours = sorted(name for name in names if not name.startswith("tests") and "<module>" not in name)
-    _found[item.nodeid] = {"seconds": round(time.process_time() - began, 2), "calls": ours}
+    kept = _found.setdefault(str(item.path.relative_to(ROOT)), {}).setdefault(item.nodeid, {"passed": True})
+    kept |= {"seconds": round(time.process_time() - began, 2), "calls": ours}
+    if nextitem is None or nextitem.path != item.path:
+        _write(item.path)
 
 
-def pytest_sessionfinish() -> None:
-    """Write what was noted."""
-    if _RESULT in os.environ:
-        Path(os.environ[_RESULT]).write_text(json.dumps(_found), encoding="utf-8")
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Note what fails on clean code."""
+    if report.failed:
+        _found.setdefault(report.nodeid.split("::")[0], {}).setdefault(report.nodeid, {})["passed"] = False
+
+
+def _write(path: Path) -> None:
+    name = str(path.relative_to(ROOT))
+    with Path(os.environ[_RESULT]).open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"file": name, "hash": _mark(path), "tests": _found[name]}) + "\n")
+
+
+def _mark(path: Path) -> str:
+    """Of a test file and of what it compares with."""
+    return hashlib.sha256(b"".join(each.read_bytes() for each in _with_stored(path))).hexdigest()
+
+
+def _with_stored(path: Path) -> list[Path]:
+    stored = path.with_name(path.name.removeprefix("test_")).with_suffix(".json")
+    return [path, stored] if stored.exists() else [path]
 
 
 def reached(kept: Path, files: list[Path]) -> dict[str, dict[str, Any]]:
-    """By test: processor seconds, and the functions called as ``file:qualified name``; what ``kept`` knows is kept."""
-    known = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    """By test that passes: processor seconds, and the functions called as ``file:qualified name``."""
+    missing = [path for path in files if not _known(kept).get((str(path.relative_to(ROOT)), _mark(path)))]
+    if missing:
+        environment = {**os.environ, _RESULT: str(kept.absolute()), "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.proofs.reach"]
+        subprocess.run([*command, "-m", "not long", *map(str, missing)], cwd=ROOT, env=environment, capture_output=True)
+    known = _known(kept)
     every: dict[str, dict[str, Any]] = {}
     for path in files:
-        name, mark = str(path.relative_to(ROOT)), hashlib.sha256(path.read_bytes()).hexdigest()
-        if known.get(name, {}).get("hash") != mark:
-            known[name] = {"hash": mark, "tests": _noted(name, kept.with_suffix(".part"))}
-            kept.write_text(json.dumps(known), encoding="utf-8")
-        every |= known[name]["tests"]
-    return every
+        every |= known.get((str(path.relative_to(ROOT)), _mark(path)), {})
+    return {test: each for test, each in every.items() if each.get("passed") and "calls" in each}
 
 
-def _noted(test_file: str, result: Path) -> dict[str, Any]:
-    environment = {**os.environ, _RESULT: str(result.absolute()), "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.proofs.reach", test_file]
-    result.unlink(missing_ok=True)
-    subprocess.run(command, cwd=ROOT, env=environment, capture_output=True)
-    return json.loads(result.read_text(encoding="utf-8"))
+def _known(kept: Path) -> dict[tuple[str, str], dict[str, Any]]:
+    """What a map file holds, by test file and its hash."""
+    lines = kept.read_text(encoding="utf-8").splitlines() if kept.exists() else []
+    return {(each["file"], each["hash"]): each["tests"] for each in map(json.loads, lines)}
 
 
 def function(text: str, line: int) -> str:

@@ -9,8 +9,6 @@ renders by what another instruction set makes of a ray.
 from __future__ import annotations
 
 import json
-import math
-import re
 import sys
 from pathlib import Path
 
@@ -20,13 +18,13 @@ import pytest
 import planner
 import scenes
 from tests.commands import ice
+from tests.regression.stored import CLOSED, RENDERED, SEARCHED, differences, read, write
 
 pytestmark = pytest.mark.render
 
 SCENE = Path(__file__).with_name("uneven.toml")
 STORED = Path(__file__).with_name("documents.json")
 POSES = ("--sensor", "33,312", "--light", "24,250")
-CLOSED, SEARCHED, RENDERED = 1e-6, 2e-3, 5e-3  # relative; measured: 1e-12, 1e-6, 1e-4
 CASES = {
     "predict": (CLOSED, ["predict", SCENE]),
     "predict at a pose": (CLOSED, ["predict", SCENE, "--sensor", "25,300", "--light", "30,200"]),
@@ -42,8 +40,6 @@ CASES = {
     "views": (SEARCHED, ["plan", SCENE, "--step", "45", "--no-check", "--views", "2"]),
     "validate": (RENDERED, ["validate", SCENE, "--renders", "40", "--workers", "1", "--seed", "3", "--out", "run"]),
 }  # fmt: skip
-_ELSEWHERE = ("seconds", "variant", "machines", "file", "dask")  # keys of what another machine may say
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def document(name: str, folder: Path) -> dict:
@@ -57,38 +53,6 @@ def document(name: str, folder: Path) -> dict:
     return json.loads(done.stdout)
 
 
-def differences(stored, found, rel, where="", size=0.0):
-    """Where two documents differ, as "key: stored, found"; ``size`` is what a number near zero is small against."""
-    if isinstance(stored, dict) and isinstance(found, dict):
-        spread = _spread(stored)
-        for key in dict.fromkeys([*stored, *found]):
-            if key not in _ELSEWHERE:
-                yield from differences(stored.get(key), found.get(key), rel, f"{where}.{key}", spread)
-    elif isinstance(stored, list) and isinstance(found, list) and len(stored) == len(found):
-        numbers = [abs(value) for value in stored if isinstance(value, int | float)]
-        for i, pair in enumerate(zip(stored, found, strict=True)):
-            yield from differences(*pair, rel, f"{where}[{i}]", max(numbers, default=size))
-    elif not _alike(stored, found, rel, size):
-        yield f"{where.lstrip('.')}: {stored}, {found}"
-
-
-def _spread(row: dict) -> float:
-    """One standard deviation of what a row is about, which its biases are small against."""
-    variances = [row.get(key) for key in ("empirical", "variance", "variance_object") if row.get(key)]
-    sigmas = [row.get(key) for key in ("sigma", "u") if row.get(key)]
-    return max([*(math.sqrt(v) for v in variances), *sigmas], default=0.0)
-
-
-def _alike(stored, found, rel, size):
-    if isinstance(stored, str) and isinstance(found, str):
-        pairs = zip(_NUMBER.findall(stored), _NUMBER.findall(found), strict=False)
-        same = _NUMBER.sub("#", stored) == _NUMBER.sub("#", found)
-        return same and all(math.isclose(float(a), float(b), rel_tol=0.05) for a, b in pairs)  # a last digit of two
-    if isinstance(stored, bool) or stored is None or isinstance(stored, int):
-        return stored == found
-    return isinstance(found, int | float) and math.isclose(stored, found, rel_tol=rel, abs_tol=rel * size + 1e-13)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("documents")
@@ -96,7 +60,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_numbers_are_those_that_were_stored(name, folder):
-    stored = json.loads(STORED.read_text(encoding="utf-8"))[name]
+    stored = read(STORED)[name]
     assert list(differences(stored, document(name, folder), CASES[name][0])) == []
 
 
@@ -113,4 +77,4 @@ def test_a_slip_is_a_difference():
 if __name__ == "__main__":
     made = Path(sys.argv[1])
     documents = {name: document(name, made) for name in CASES}
-    STORED.write_text(json.dumps(documents, indent=1) + "\n", encoding="utf-8")
+    write(STORED, documents)

@@ -1,0 +1,221 @@
+"""Checks that render, costs, the hard catalogue, and what figures show: small pictures, few of them."""
+
+import tempfile
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import measure
+import planner
+import render
+import scenes
+from measure.calibration import calibrate
+from measure.photo.photograph import photograph
+from render import Quality
+from tests.commands import ice
+from tests.photographs import rectangle, turned
+from tests.regression.numbers.parts import small
+from tests.regression.numbers.poses import load, uneven, without_error
+from tests.regression.stored import CLOSED, RENDERED, SEARCHED
+from validation import fitted_scene, hard, plan_check, vary_check, views_check
+from validation.batch.campaign import Campaign
+from validation.cost import grid, locators, pareto, points, rays, sampling, scaling
+from validation.cost.model import CostModel, Rendered
+from validation.cost.trial import spread_cases
+from validation.cost.watch import Watch
+from validation.explore import preview, save, sphere
+from validation.explore.state import State
+from validation.report import (
+    budget_figure,
+    calibration_figure,
+    cost_figures,
+    overlay,
+    plan_figures,
+    precision_figure,
+    residuals,
+    scene_figure,
+    sharpness,
+    views_figure,
+)  # fmt: skip
+
+_QUICK = Quality(supersample=2, edge_samples=4)
+_HARD = ("reflectance", "limb", "fit")
+
+
+def shown(draw):
+    """What figures hold that are drawn: numbers of lines, marks, pictures and areas, words, ends of axes."""
+    found = []
+
+    def keep(figure, *_, **__):
+        found.append([_axis(axis) for axis in figure.axes] + [[text.get_text() for text in figure.texts]])
+
+    with mock.patch.object(Figure, "savefig", keep), tempfile.TemporaryDirectory() as folder:
+        draw(Path(folder) / "figure.png")
+    return found
+
+
+def _axis(axis):
+    texts = (axis.title, axis.xaxis.label, axis.yaxis.label, *axis.texts)
+    return {
+        "lines": [line.get_xydata() for line in axis.lines],
+        "marks": [np.asarray(each.get_offsets(), float) for each in axis.collections],
+        "pictures": [np.asarray(each.get_array(), float) for each in axis.images],
+        "areas": [each.get_patch_transform().transform(each.get_path().vertices) for each in axis.patches],
+        "words": [text.get_text() for text in texts], "scales": [axis.get_xscale(), axis.get_yscale()],
+        "ends": [*axis.get_xlim(), *axis.get_ylim()] if axis.name == "rectilinear" else [],
+        "ticks": [label.get_text() for label in (*axis.get_xticklabels(), *axis.get_yticklabels())],
+    }  # fmt: skip
+
+
+@cache
+def _plan(name, step=45.0, **how):
+    return planner.plan(small(name, 2.0), step_deg=step, refined=False, **how)
+
+
+@cache
+def _views():
+    return planner.plan_views(small("calibrated_rig", 2.0), 2, step_deg=45.0, refined=False)
+
+
+def _varied():
+    scene = small("copper", 2.0)
+    return planner.plan(scene, vary=("band",), sensor=(31.3, 137.1), light=(17.1, 311.3), refined=False)
+
+
+@cache
+def _fit():
+    scene = small("calibrated_rig", 2.0)
+    sensor, light = uneven(scene)
+    clean = planner.image(scene, sensor, light)
+    image = clean + np.random.default_rng(9).normal(0, 2.0, clean.shape)
+    return measure.fit(scene, [image], sensor, light), image
+
+
+def _campaign():
+    scene = small("task1", 2.0)
+    return Campaign.of(scene.model_copy(update={"settings": scene.settings[5:9]}))
+
+
+def _cost(name):
+    """One parameter, without its seconds."""
+    campaign, variant = _campaign(), render.variant.choose()
+    cases = spread_cases(campaign, 2)
+    if name in ("images", "estimators"):
+        images = [render.image(c.scene, c.setting.sensor, c.setting.light, _QUICK, variant) for c in cases]
+    watch = Watch(0.0)
+    made = {
+        "points": lambda: points.points_parameter(cases[0]), "grid": lambda: grid.grid_parameter(cases[0].scene, watch),
+        "rays": lambda: rays.rays_parameter(cases[:1], variant, watch),
+        "images": lambda: sampling.images_parameter(cases[0], images[0], 3, watch),
+        "estimators": lambda: locators.estimators_parameter(cases, images, 3, watch),
+        "scaling": lambda: scaling.scaling_parameter(_model()), "pareto": lambda: pareto.pareto_parameter(_model()),
+    }[name]()  # fmt: skip
+    told = [name in ("scaling", "pareto") or not _is_time(column) for column in made.columns]
+    rows = [[value for value, is_told in zip(row, told, strict=True) if is_told] for row in made.rows]
+    return {"columns": made.columns, "rows": rows, "note": made.note, "title": made.title}
+
+
+def _is_time(column):
+    return any(word in column for word in ("second", "ms", " s", "time", "us"))
+
+
+def _model():
+    rendered = tuple(Rendered(Quality(edge_samples=n), 0.1 * n, 0.18 / n) for n in (4, 9, 25))
+    return CostModel(7, 3, "scalar_rgb", rendered, 0.007, 0.002, 1.3, 0.21, 0.0017, 0.9, 3.1)
+
+
+def _hard(area):
+    rows = [hard.run(case) for case in hard.catalogue() if case.area == area]
+    return [replace(row, seconds=0.0, error=None) for row in rows]
+
+
+def _few_hard():
+    cases = [each for each in hard.catalogue() if each.area in ("measure", "render")]
+    rows = [
+        hard.run(each)
+        for each in cases
+        if each.measurand.startswith(("gradient", "grey")) and "corner" not in each.name
+    ]
+    return [(row.name, row.measurand, row.verdict, row.reference, row.tolerance, row.condition) for row in rows]
+
+
+def _precise():
+    cases = {each.area: each for each in hard.catalogue()}
+    return [(area, each.name, each.measurand, each.refusals) for area, each in cases.items()]
+
+
+def _explored(name):
+    scene = load(name)
+    state = State.first(scene)
+    picture = state.picture(scene)
+    part = preview.window(scene, picture)
+    cells = sphere.cells(30.0)
+    moved = [np.concatenate(list(sphere.values(scene, replace(state, moving=moving), cells.poses)))
+             for moving in range(-1, len(state.lights))]  # fmt: skip
+    return {"window": part, "drawn": preview.drawn(scene, picture, part).astype(float), "cells": cells, "moved": moved,
+            "key": sphere.key(state), "setting": save.setting(state)}  # fmt: skip
+
+
+def _without_seconds(found):
+    return replace(found, seconds=0.0) if hasattr(found, "seconds") else found
+
+
+def _new():
+    with tempfile.TemporaryDirectory() as folder:
+        part = Path(scenes.__file__).with_name("wedge.stl")
+        done = ice("new", part, "--units", "mm", "-o", "new.toml", cwd=Path(folder))
+        text = (Path(folder) / "new.toml").read_text(encoding="utf-8").splitlines()
+    return {"status": done.returncode, "text": [line for line in text if "file" not in line and "Made" not in line]}
+
+
+def _fitted():
+    fit, _ = _fit()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "fitted.toml"
+        without_error(lambda: fitted_scene.write(fit, "calibrated_rig", path))
+        text = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return {"text": text, "errors": fit.standard_errors}
+
+
+_FIGURES = {
+    "scene": lambda path: scene_figure.draw(load("plate"), uneven(load("plate"))[0], path),
+    "block": lambda path: scene_figure.draw(load("task1"), uneven(load("task1"))[0], path),
+    "plan": lambda path: plan_figures.draw(_plan("task1"), path.parent, path),
+    "views": lambda path: views_figure.draw(_views(), path.parent),
+    "residuals": lambda path: residuals.draw(_fit()[0], [_fit()[1]], path),
+    "budget": lambda path: budget_figure.draw(planner.budget(load("plate"), *uneven(load("plate"))).measurands, path),
+    "precision": lambda path: precision_figure.draw(path, 30.0),
+    "sharpness": lambda path: sharpness.write(path, [(0, measure.mtf(rectangle(120, 70, 13), turned(120, 70, 13), 0))]),
+    "overlay": lambda path: overlay.write(path, rectangle(120, 70, 13), photograph(rectangle(120, 70, 13), most=1)),
+    "calibration": lambda path: calibration_figure.draw(_calibrated(), path),
+    "cost": lambda path: [cost_figures._draw(made, path) for made in (
+        scaling.scaling_parameter(_model()), pareto.pareto_parameter(_model()))],
+}  # fmt: skip
+
+
+@cache
+def _calibrated():
+    with mock.patch("measure.calibration.RATIOS", np.array([0.02, 0.05, 0.11])):
+        return calibrate(small("task1", 2.0), 2, 5)
+
+
+def cases():
+    """By name: relative tolerance, and what makes the result."""
+    found = {f"hard {area}": (CLOSED, partial(_hard, area)) for area in _HARD}
+    for name in ("points", "grid", "rays", "images", "estimators", "scaling", "pareto"):
+        found[f"cost {name}"] = RENDERED, partial(_cost, name)
+    for name, draw in _FIGURES.items():
+        found[f"figure {name}"] = SEARCHED, partial(shown, draw)
+    for name in ("task1", "plate", "two_lights"):
+        found[f"explorer {name}"] = CLOSED, partial(_explored, name)
+    return found | {
+        "hard pictures": (SEARCHED, _few_hard), "hard cases": (CLOSED, _precise),
+        "calibrate": (SEARCHED, _calibrated), "new": (SEARCHED, _new), "fitted": (SEARCHED, _fitted),
+        "check of a plan": (RENDERED, lambda: _without_seconds(plan_check.check_plan(_plan("task1"), 2, _QUICK))),
+        "check of views": (RENDERED, lambda: _without_seconds(views_check.check_views(_views(), 12, 3, _QUICK))),
+        "check of lamps": (RENDERED, lambda: vary_check.check_varied(_varied(), 20, _QUICK, 3)),
+    }  # fmt: skip
