@@ -30,7 +30,7 @@ EQUIVALENT: dict[str, str] = {
         "a shorter way: outlines apart along one axis have nothing in common in the next lines, too",
     "measure/photo/residuals.py: low = np.maximum(np.floor(places.min(0) - _REACH - 4), 0).astype(int)":
         "a pixel more around what is read",
-    "planner/imaging/arrangement.py: _SQUARE = np.cos(np.pi * np.arange( 10) / 8)  "
+    "imaging/blurred/arrangement.py: _SQUARE = np.cos(np.pi * np.arange( 10) / 8)  "
     "# places that tell a polynomial of degree 4 well": "a place more of an exact polynomial, the last but one again",
 }  # fmt: skip
 

@@ -6,7 +6,9 @@ import numpy as np
 
 import render
 import scenes
-from planner.imaging import lens, projection, reflectance, sensor, visibility
+from imaging import sensor
+from imaging.geometry import lens, projection, visibility
+from imaging.light import reflectance
 from scenes.changes import changed
 from scenes.parts.block import Block
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Torus
@@ -35,7 +37,7 @@ def _surface(name):
     origins = points - 6 * away
     found = {
         "values": surface.values(points), "normals": surface.normals(points), "bend": surface.shape_operator(points),
-        "third": surface.third(points, np.cross(surface.normals(points), away)), "shifts": surface.shifts(points),
+        "shifts": surface.shifts(points),
         "hits": surface.intersections(origins, away), "within": surface.within(points),
     }  # fmt: skip
     if hasattr(surface, "area_points"):

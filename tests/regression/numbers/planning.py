@@ -6,10 +6,10 @@ import numpy as np
 
 import planner
 import scenes
+from imaging.models import variance_model
+from imaging.models.bias import bias, cluttered
+from imaging.pictures import Pictures
 from planner.budgeting.sensitivities import sensitivities
-from planner.imaging.pictures import Pictures
-from planner.models import variance_model
-from planner.models.bias import bias, cluttered
 from planner.search.viewing import ViewingSpace
 from planner.uncertainty import improve, risks
 from scenes import Pose
@@ -136,7 +136,7 @@ def _risks():
 def _jitter(name):
     scene = load(name)
     sensors = np.array([list(uneven(scene, n)[0]) for n in range(len(scene.settings))])
-    return {"spread": planner.jitter.pose_spread(scene, sensors), "scatter": planner.pose_scatter(scene, sensors)}
+    return {"scatter": planner.pose_scatter(scene, sensors)}
 
 
 def _with_choices():

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 import measure
 import planner
 import render
-import scenes
 from measure.calibration import calibrate
 from measure.photo.photograph import photograph
 from render import Quality
@@ -166,7 +165,7 @@ def _without_seconds(found):
 
 def _new():
     with tempfile.TemporaryDirectory() as folder:
-        part = Path(scenes.__file__).with_name("wedge.stl")
+        part = BUNDLED / "wedge.stl"
         done = ice("new", part, "--units", "mm", "-o", "new.toml", cwd=Path(folder))
         text = (Path(folder) / "new.toml").read_text(encoding="utf-8").splitlines()
     return {"status": done.returncode, "text": [line for line in text if "file" not in line and "Made" not in line]}
