@@ -15,6 +15,7 @@ import render
 from measure.calibration import calibrate
 from measure.photo.photograph import photograph
 from render import Quality
+from scenes.load import BUNDLED
 from tests.commands import ice
 from tests.photographs import rectangle, turned
 from tests.regression.numbers.parts import small
