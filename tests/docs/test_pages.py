@@ -40,5 +40,12 @@ def test_what_the_architecture_names_is_there():
     named = {path for path in re.findall(r"`([\w./]+)`", text) if "/" in path or path.endswith((".py", ".md", ".txt"))}
     assert len(named) > 60
     packages = [each for each in ROOT.iterdir() if (each / "__init__.py").exists()]
-    beside = [ROOT, *packages, ROOT / "imaging" / "light", ROOT / "imaging" / "models", ROOT / "scenes" / "lights"]
+    beside = [
+        ROOT,
+        *packages,
+        ROOT / "imaging" / "light",
+        ROOT / "imaging" / "models",
+        ROOT / "scenes" / "lights",
+        ROOT / "scenes" / "measurands",
+    ]
     assert [path for path in sorted(named) if not any((folder / path).exists() for folder in beside)] == []
