@@ -17,7 +17,7 @@ from planner.uncertainty.groups import Group
 from render import Quality
 from tests.commands import ice
 from tests.regression.numbers.poses import load, uneven, without_error
-from tests.regression.stored import CLOSED, RENDERED, SEARCHED
+from tests.regression.stored import CLOSED, SEARCHED
 from tests.sequential import simulate
 from validation import budgets, comparison, statistics
 from validation.cost import interval
@@ -158,14 +158,6 @@ def _words(text):
     return [line for line in _SECONDS.sub("# s", text).splitlines() if not _ELSEWHERE.search(line)]
 
 
-def _reported():
-    ice("report", "run", "--out", "report", "-q", cwd=run_folder())
-    folder = run_folder() / "report"
-    found = sorted(folder.glob("*.csv")) + sorted(folder.glob("*.md"))
-    result = json.loads((run_folder() / "run" / "result.json").read_text(encoding="utf-8"))
-    return {"files": {path.name: _words(path.read_text(encoding="utf-8")) for path in found}, "result": result}
-
-
 def _photographed():
     """Repeated photographs of two settings in the place of renders, one of them none."""
     scene, folder = load("task1"), run_folder() / "photos"
@@ -190,7 +182,7 @@ _PRINTED = {
     "effects": ["effects", _UNEVEN], "show": ["show", _UNEVEN], "show plate": ["show", "plate"], "scenes": ["scenes"],
     "measure": ["measure", "shot.npy", _UNEVEN, *_POSES], "compare": ["compare", "run", _REFERENCE],
     "measure a photograph": ["measure", "shot.npy", "--kind", "quadrilateral", "--json"],
-    "plan": ["plan", "wedge", "--step", "45", "--no-check"],
+    "plan": ["plan", "wedge", "--step", "45", "--no-check", "--sensor", "31,133"],
     "plan views": ["plan", "calibrated_rig", "--step", "60", "--no-check", "--views", "2"],
     "plan capability": ["plan", _UNEVEN, "--step", "45", "--no-check", "--objective", "capability",
                         "--sensor", "21,305", "--light-polar", "20,60"],
@@ -215,6 +207,6 @@ def cases():
         "verdict of far ones": (CLOSED, partial(_verdict, ratios=np.linspace(0.6, 1.7, 7), level=0.05)),
         "statistics": (CLOSED, _statistics), "compared": (CLOSED, _compared), "cost": (CLOSED, _cost),
         "uncertain": (CLOSED, _uncertain), "capable": (CLOSED, _capable), "budget in words": (CLOSED, _budget_facts),
-        "messages": (CLOSED, _asked), "report": (RENDERED, _reported),
+        "messages": (CLOSED, _asked),
         "photographs of settings": (SEARCHED, _photographed),
     }  # fmt: skip
