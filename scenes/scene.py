@@ -19,9 +19,10 @@ from scenes.changes import changed
 from scenes.errors import InvalidInput
 from scenes.lights import LIGHTS, AnyLight
 from scenes.lights.filters import Filter, Lamp, check_names
+from scenes.materials.kinds import MATERIALS, AnyMaterial
+from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.materials.torrance_sparrow import FaceMaterial, Material
 from scenes.measurands.features import Corner, Wall, check_feature
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
@@ -115,9 +116,9 @@ class Scene(Model):
     """What it is about, for tables."""
     object: Object
     """What is measured."""
-    material: Material
+    material: AnyMaterial
     """Of the object and the obstacles, where ``materials`` say nothing else."""
-    materials: tuple[FaceMaterial, ...] = ()
+    materials: tuple[AnyFaceMaterial, ...] = ()
     """Of some faces of the object."""
     textures: tuple[Texture, ...] = ()
     """What is printed on faces, or how unevenly they reflect."""
@@ -407,4 +408,5 @@ class Scene(Model):
 
 
 LIGHTS.followed_by(rebuild)
+MATERIALS.followed_by(rebuild)
 MEASURANDS.followed_by(rebuild)

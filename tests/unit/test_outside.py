@@ -12,12 +12,13 @@ import scenes
 from render.phenomena import EFFECTS
 from scenes import InvalidInput, plugins
 from scenes.lights import LIGHTS
+from scenes.materials import MATERIALS
 from scenes.measurands.kinds import MEASURANDS
 from scenes.registry import Registry
 from tests.commands import ice
 from tests.oracle import block_image
 
-MODULES = "spotlight", "median", "vignetting", "concentricity"
+MODULES = "spotlight", "median", "vignetting", "concentricity", "satin"
 SENSOR, LIGHT = (30, 135), (15, 315)
 PLAIN = "attached_shadow", "fall_off", "lens_blur"
 
@@ -28,7 +29,7 @@ def outside():
     for name in MODULES:
         plugins.load(f"tests.outside.{name}")
     yield
-    for registry, name in zip((LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS), MODULES, strict=True):
+    for registry, name in zip((LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS, MATERIALS), MODULES, strict=True):
         registry.remove(name)
     plugins._loaded.clear()
 
@@ -53,7 +54,7 @@ def test_a_spotlight_is_predicted_rendered_and_measured_alike(lit):
 
 
 def test_a_spotlight_is_checked_as_every_light_is(task1):
-    with pytest.raises(InvalidInput, match=r"light\.spotlight\.cutoff_deg must be less than 90, got 200"):
+    with pytest.raises(InvalidInput, match=r"light\.cutoff_deg must be less than 90, got 200"):
         task1.with_(light={"kind": "spotlight", "distance": 100.0, "cutoff_deg": 200.0})
 
 
@@ -103,6 +104,45 @@ def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):
     assert decision.influence.variance > 0
 
 
+GLEAM = (40, 135), (40, 315)  # the top face mirrors the light to the sensor
+
+
+@pytest.fixture(scope="module")
+def satin(task1):
+    return task1.with_(material={"kind": "satin", "reflectance": 0.4, "mirrored": 0.05, "exponent": 30})
+
+
+def test_a_material_s_lobe_is_rendered_as_it_is_predicted(satin):
+    """Level by level inside the top face, most of which is the lobe's; and the edges are found where they are."""
+    clean = render.image(satin, *GLEAM, effects=(*PLAIN, "specular_lobe"))
+    matt = render.image(satin.with_(material={"kind": "satin", "reflectance": 0.4, "mirrored": 0.0}), *GLEAM)
+    expected = planner.image(satin, *GLEAM)
+    inside = (expected - matt) > 0.5 * (expected - matt).max()
+    assert inside.sum() > 500
+    assert (clean - matt)[inside] == pytest.approx((expected - matt)[inside], rel=0.01)  # margin: 1e-3 is measured
+    told, found = planner.predict(satin, *GLEAM), measure.propagate(clean, satin, *GLEAM)
+    assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.02)
+    assert measure.distance(clean, satin, *GLEAM).value_px == pytest.approx(told.value_px + told.bias_px, abs=3e-3)
+
+
+def test_effects_know_a_material_s_lobe(satin):
+    (lobe,) = (each for each in render.effects(satin) if each.effect.name == "specular_lobe")
+    assert lobe.influence.variance > 0.1
+    dull = satin.with_(material={"kind": "satin", "mirrored": 0.0})
+    (lobe,) = (each for each in render.effects(dull) if each.effect.name == "specular_lobe")
+    assert lobe.reason == "mirrored is 0"
+
+
+def test_one_face_may_be_of_a_material_of_one_s_own(task1):
+    top = {"kind": "satin", "name": "plate", "where": "top", "mirrored": 0.05}
+    scene = task1.with_(materials=[top])
+    assert [each.kind for each in scene.surfaces.used] == ["torrance_sparrow", "satin"]
+    assert scene.materials[0].material == scene.surfaces.materials[1]
+    assert scenes.Scene.model_validate(scene.model_dump()).materials == scene.materials
+    with pytest.raises(InvalidInput, match=r"materials\[0\].exponent must be at least 1, got 0"):
+        task1.with_(materials=[{**top, "exponent": 0}])
+
+
 @pytest.mark.parametrize(
     "command",
     [
@@ -118,8 +158,10 @@ def test_commands_take_them(command, tmp_path):
     text = (scenes.load.__globals__["BUNDLED"] / "task1.toml").read_text()
     before, _, rest = text.partition("[light]")
     own = "[light]\nkind = 'spotlight'\ncutoff_deg = 12.0\nbeam_deg = 0.5" + rest
+    own += "\n[[materials]]\nname = 'gloss'\nkind = 'satin'\nwhere = 'top'\nmirrored = 0.01\n"
     (tmp_path / "own.toml").write_text(before + own)
-    done = ice("--plugin", "tests.outside.spotlight", *command, "--json", cwd=tmp_path)
+    modules = "--plugin", "tests.outside.spotlight", "--plugin", "tests.outside.satin"
+    done = ice(*modules, *command, "--json", cwd=tmp_path)
     assert done.returncode in (0, 1), done.stderr
     assert json.loads(done.stdout)
 
@@ -149,7 +191,7 @@ def test_a_scene_file_loads_no_code(tmp_path):
     (tmp_path / "own.toml").write_text(text.replace("[light]", "[light]\nkind = 'flood'"))
     done = ice("show", "own.toml", cwd=tmp_path)
     assert done.returncode == 2
-    assert "light must be a known kind" in done.stderr
+    assert "light.kind must be one of " in done.stderr
 
 
 def test_a_name_stands_for_one_kind():
