@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.cameras.data_sheet import completed
+from scenes.cameras.lens_model import LENSES
 from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
@@ -407,6 +408,7 @@ class Scene(Model):
             )
 
 
+LENSES.followed_by(rebuild)
 LIGHTS.followed_by(rebuild)
 MATERIALS.followed_by(rebuild)
 MEASURANDS.followed_by(rebuild)

@@ -119,8 +119,9 @@ def _calibrated(scene: Scene) -> Iterator[Source]:
             yield Source(name, 0.0, told, "px", "geometry", 100.0, move)
         else:
             place = ("k1", "k2", "p1", "p2", "k3").index(name)
-            move = _number_moved(f"camera.lens.distortion[{place}]")
-            yield Source(name, camera.lens.coefficients[place], told, "", "geometry", 1e-2, move)
+            key = f"camera.lens.distortion[{place}]"
+            move = _number_moved(key)
+            yield Source(name, number_at(scene, key), told, "", "geometry", 1e-2, move)
 
 
 def _stretched(focal: float, axes: tuple[int, ...]) -> Callable[[Station, float], Station]:

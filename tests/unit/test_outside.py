@@ -2,6 +2,7 @@
 
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,8 +10,11 @@ import measure
 import planner
 import render
 import scenes
+from imaging.geometry.lens import lens_jacobian, recorded, undistorted
+from imaging.geometry.projection import project, project_ideal
 from render.phenomena import EFFECTS
 from scenes import InvalidInput, plugins
+from scenes.cameras import LENSES
 from scenes.lights import LIGHTS
 from scenes.materials import MATERIALS
 from scenes.measurands.kinds import MEASURANDS
@@ -18,7 +22,7 @@ from scenes.registry import Registry
 from tests.commands import ice
 from tests.oracle import block_image
 
-MODULES = "spotlight", "median", "vignetting", "concentricity", "satin"
+MODULES = "spotlight", "median", "vignetting", "concentricity", "satin", "fisheye"
 SENSOR, LIGHT = (30, 135), (15, 315)
 PLAIN = "attached_shadow", "fall_off", "lens_blur"
 
@@ -29,7 +33,9 @@ def outside():
     for name in MODULES:
         plugins.load(f"tests.outside.{name}")
     yield
-    for registry, name in zip((LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS, MATERIALS), MODULES, strict=True):
+    for registry, name in zip(
+        (LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS, MATERIALS, LENSES), MODULES, strict=True
+    ):
         registry.remove(name)
     plugins._loaded.clear()
 
@@ -131,6 +137,36 @@ def test_effects_know_a_material_s_lobe(satin):
     dull = satin.with_(material={"kind": "satin", "mirrored": 0.0})
     (lobe,) = (each for each in render.effects(dull) if each.effect.name == "specular_lobe")
     assert lobe.reason == "mirrored is 0"
+
+
+@pytest.fixture(scope="module")
+def bent(task1):
+    return task1.with_(camera={**task1.camera.model_dump(), "lens": {"kind": "fisheye"}})
+
+
+def test_a_fisheye_records_points_where_opencv_s_does(bent):
+    camera, points = bent.camera, bent.solid.vertices
+    middle = (camera.width - 1) / 2, (camera.height - 1) / 2
+    matrix = np.array([[camera.focal_px, 0, middle[0]], [0, camera.focal_px, middle[1]], [0, 0, 1]])
+    ideal = project_ideal(points, np.array(SENSOR), camera)
+    rays = np.column_stack([(ideal - middle) / camera.focal_px, np.ones(len(points))])
+    expected = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), matrix, np.zeros(4))[0][:, 0]
+    found = project(points, np.array(SENSOR), camera)
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert np.abs(found - ideal).max() > 0.1  # px: the distortion is seen
+    step = 1e-6 * np.eye(2)[:, None]
+    slope = (recorded(ideal + step, camera) - recorded(ideal - step, camera)) / 2e-6
+    assert lens_jacobian(ideal, camera) == pytest.approx(np.moveaxis(slope, 0, -1), abs=1e-6)
+    assert undistorted(found, camera) == pytest.approx(ideal, abs=1e-8)
+
+
+def test_through_a_fisheye_is_measured_what_a_pinhole_would_show(bent, task1):
+    clean = render.image(bent, SENSOR, LIGHT, effects=(*PLAIN, "lens_distortion"))
+    told, found = planner.predict(bent, SENSOR, LIGHT), measure.propagate(clean, bent, SENSOR, LIGHT)
+    assert told.value_px == pytest.approx(planner.predict(task1, SENSOR, LIGHT).value_px)
+    assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.05)
+    assert measure.distance(clean, bent, SENSOR, LIGHT).value_px == pytest.approx(told.value_px, abs=6e-3)
+    assert abs(measure.distance(clean, task1, SENSOR, LIGHT).value_px - told.value_px) > 0.03  # as if it were none
 
 
 def test_one_face_may_be_of_a_material_of_one_s_own(task1):
