@@ -7,7 +7,7 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
-from pydantic import Discriminator, GetCoreSchemaHandler, Tag
+from pydantic import AfterValidator, Discriminator, GetCoreSchemaHandler, Tag
 
 from scenes.errors import KIND, InvalidInput, given
 
@@ -91,12 +91,19 @@ class Registry(Collection[str], Generic[Kind]):
 class OneOf:
     """Annotation of a field whose value is a model of one of a registry's kinds, told by its key ``kind``."""
 
-    def __init__(self, kinds: Registry, default: str) -> None:
+    def __init__(self, kinds: Registry, default: str = "") -> None:
         self._kinds, self._default = kinds, default
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
         kinds = [Annotated[self._kinds[name], Tag(KIND + name)] for name in self._kinds]
+        if not kinds:
+            return handler.generate_schema(Annotated[dict, AfterValidator(self._unknown)])
         return handler.generate_schema(Annotated[reduce(or_, kinds), Discriminator(self._name)])
+
+    def _unknown(self, value: dict) -> Any:
+        raise ValueError(
+            f"{self._kinds.noun} must be one that a module of your own adds, got {given(value.get('kind'))}"
+        )
 
     def _name(self, value: Any) -> str:
         named = value.get("kind", self._default) if isinstance(value, dict) else getattr(value, "kind", self._default)

@@ -18,6 +18,7 @@ from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
 from scenes.errors import InvalidInput
+from scenes.influences import INFLUENCES
 from scenes.lights import LIGHTS, AnyLight
 from scenes.lights.filters import Filter, Lamp, check_names
 from scenes.materials.kinds import MATERIALS, AnyMaterial
@@ -408,6 +409,7 @@ class Scene(Model):
             )
 
 
+INFLUENCES.followed_by(rebuild)
 LENSES.followed_by(rebuild)
 LIGHTS.followed_by(rebuild)
 MATERIALS.followed_by(rebuild)

@@ -53,7 +53,13 @@ class Source:
 
 def sources(scene: Scene) -> tuple[Source, ...]:
     """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
-    return (*_numbers(scene), *_poses(scene), *_calibrated(scene))
+    return (*_numbers(scene), *_poses(scene), *_calibrated(scene), *_influences(scene))
+
+
+def _influences(scene: Scene) -> Iterator[Source]:
+    """Those of a user's own kinds."""
+    for each in scene.uncertainty.influences:
+        yield Source(each.kind, 0.0, each, each.unit, each.moves, each.small, each.moved)
 
 
 def _numbers(scene: Scene) -> Iterator[Source]:

@@ -15,6 +15,7 @@ from imaging.geometry.projection import project, project_ideal
 from render.phenomena import EFFECTS
 from scenes import InvalidInput, plugins
 from scenes.cameras import LENSES
+from scenes.influences import INFLUENCES
 from scenes.lights import LIGHTS
 from scenes.materials import MATERIALS
 from scenes.measurands.kinds import MEASURANDS
@@ -22,7 +23,10 @@ from scenes.registry import Registry
 from tests.commands import ice
 from tests.oracle import block_image
 
-MODULES = "spotlight", "median", "vignetting", "concentricity", "satin", "fisheye"
+KINDS = {
+    "spotlight": LIGHTS, "median": measure.ESTIMATORS, "vignetting": EFFECTS, "concentricity": MEASURANDS,
+    "satin": MATERIALS, "fisheye": LENSES, "fixture_expansion": INFLUENCES,
+}  # fmt: skip
 SENSOR, LIGHT = (30, 135), (15, 315)
 PLAIN = "attached_shadow", "fall_off", "lens_blur"
 
@@ -30,12 +34,10 @@ PLAIN = "attached_shadow", "fall_off", "lens_blur"
 @pytest.fixture(scope="module", autouse=True)
 def outside():
     """The modules' kinds are known in this file's tests alone."""
-    for name in MODULES:
+    for name in KINDS:
         plugins.load(f"tests.outside.{name}")
     yield
-    for registry, name in zip(
-        (LIGHTS, measure.ESTIMATORS, EFFECTS, MEASURANDS, MATERIALS, LENSES), MODULES, strict=True
-    ):
+    for name, registry in KINDS.items():
         registry.remove(name)
     plugins._loaded.clear()
 
@@ -167,6 +169,20 @@ def test_through_a_fisheye_is_measured_what_a_pinhole_would_show(bent, task1):
     assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.05)
     assert measure.distance(clean, bent, SENSOR, LIGHT).value_px == pytest.approx(told.value_px, abs=6e-3)
     assert abs(measure.distance(clean, task1, SENSOR, LIGHT).value_px - told.value_px) > 0.03  # as if it were none
+
+
+def test_a_fixture_s_expansion_is_in_the_budget_as_the_part_s_shift(task1):
+    """100 cm of steel of which the temperature is known to 2 K lift the part by 12e-6 x 100 x 2."""
+    steel = {"kind": "fixture_expansion", "sd": 2.0, "height": 100.0, "expansion_per_K": 12e-6}
+    lift = planner.budget(task1.with_(uncertainty={"part_shift": 12e-6 * 100 * 2}), SENSOR, LIGHT).measurands[0]
+    found = planner.budget(task1.with_(uncertainty={"influences": [steel]}), SENSOR, LIGHT).measurands[0]
+    by_name = {row.source: row for row in found.contributions}
+    expected = {row.source: row for row in lift.contributions}["part_shift.z"]
+    assert by_name["fixture_expansion"].contribution == pytest.approx(expected.contribution, rel=1e-6)
+    assert by_name["fixture_expansion"].contribution > 0
+    assert by_name["fixture_expansion"].sensitivity == pytest.approx(12e-4 * expected.sensitivity, rel=1e-6)
+    with pytest.raises(InvalidInput, match=r"uncertainty\.influences must be of different kinds, got fixture_exp"):
+        task1.with_(uncertainty={"influences": [steel, steel]})
 
 
 def test_one_face_may_be_of_a_material_of_one_s_own(task1):
