@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class Brdf(Model):
         polarisation: Vector | None,
         analyser: Vector | None,
         ops: Ops,
-    ):
+    ) -> Any:
         """What is added to `brightness` by the lobe where light and sensor stand before the surface; as written there.
 
         Written with ``ops`` and `scenes.materials.vectors`, it serves NumPy and the renderer alike.
@@ -103,7 +103,7 @@ class Brdf(Model):
         polarisation: Vector | None = None,
         analyser: Vector | None = None,
         ops: Ops = NUMPY,
-    ):
+    ) -> Any:
         """N.L (R_par J_par + R_perp J_perp), J_par + J_perp = 1 (eq. 1): 1 for a white diffuse surface facing it.
 
         Parameters

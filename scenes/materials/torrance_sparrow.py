@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -68,7 +68,16 @@ class Material(Brdf):
         """The table of indices."""
         return self.index_table
 
-    def lobe(self, index, normal, to_light, to_sensor, polarisation, analyser, ops):
+    def lobe(
+        self,
+        index: tuple[Index, ...],
+        normal: Vector,
+        to_light: Vector,
+        to_sensor: Vector,
+        polarisation: Vector | None,
+        analyser: Vector | None,
+        ops: Ops,
+    ) -> Any:
         """The specular term of eq. 1 times N.L."""
         args = ops, self.roughness, index, normal, to_light, to_sensor, polarisation, analyser
         return self.specular_fraction * _specular(*args)
