@@ -197,24 +197,31 @@ def form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> n
 
 
 def _form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
-    away = patches.points - points[:, None]
-    distance2 = (away**2).sum(-1)
-    here = np.einsum("npi,ni->np", away, normals)
-    there = -np.einsum("npi,pi->np", away, patches.normals)
-    corners = [away + offset for offset in patches.corners]
-    heights = np.stack([np.einsum("npi,ni->np", corner, normals) for corner in corners])
-    whole = 0.0
+    found = np.zeros((len(points), len(patches.points)))
+    heights = points @ patches.normals.T - np.einsum("pi,pi->p", patches.points, patches.normals)
+    n, p = np.nonzero((heights > 0) & (_highest(points, normals, patches) > 0))
+    away, normal, there = patches.points[p] - points[n], normals[n], heights[n, p]
+    distance2, area, cell = (away**2).sum(-1), patches.areas[p], patches.cells[p]
+    corners = [away + offset[p] for offset in patches.corners]
     with np.errstate(divide="ignore", invalid="ignore"):
-        disc = np.maximum(here, 0) / distance2 * there / (np.pi * distance2 + patches.areas) * patches.areas
-        for k, corner in enumerate(corners):
-            onward = corners[(k + 1) % 4]
+        disc = np.maximum((away * normal).sum(-1), 0) / distance2 * there / (np.pi * distance2 + area) * area
+        whole = 0.0
+        for corner, onward in zip(corners, [*corners[1:], corners[0]], strict=True):
             turn = np.cross(corner, onward)
             size = np.linalg.norm(turn, axis=-1)
             angle = np.arctan2(size, (corner * onward).sum(-1))
-            whole = whole + angle / size * np.einsum("npi,ni->np", turn, normals)
-        whole = np.abs(whole) / (2 * np.pi) * patches.areas / patches.cells
-    over = (heights >= -_FLAT * patches.cells**0.5).all(0) & np.isfinite(whole)
-    return np.where(there > 0, np.nan_to_num(np.where(over, whole, disc)), 0.0)
+            whole = whole + angle / size * (turn * normal).sum(-1)
+        whole = np.abs(whole) / (2 * np.pi) * area / cell
+    lowest = np.min([(corner * normal).sum(-1) for corner in corners], axis=0)
+    over = (lowest >= -_FLAT * cell**0.5) & np.isfinite(whole)
+    found[n, p] = np.nan_to_num(np.where(over, whole, disc))
+    return found
+
+
+def _highest(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
+    """At least how high the highest corner of each patch stands over each point's horizon, (n, p)."""
+    middles = normals @ patches.points.T - np.einsum("ni,ni->n", points, normals)[:, None]
+    return middles + np.linalg.norm(patches.corners, axis=-1).max(0)
 
 
 def _seen_factors(solid: Solid, points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
