@@ -8,6 +8,8 @@ import measure
 import planner
 import render
 import scenes
+from imaging.features import rim_look
+from imaging.light import appearance
 from imaging.pictures import Pictures
 from measure import bounds, calibration
 from measure.boards import adjustment, parameters
@@ -20,7 +22,9 @@ from measure.find import choose, four_sides
 from measure.fitting import photograph as fitted
 from measure.fitting import start
 from measure.fitting.parameters import Parameters
-from measure.photo import lens, mtf
+from measure.goodness import p_value
+from measure.photo import lens, mtf, noise_curve
+from measure.photo.noise_curve import NoiseCurve
 from render import adaptive, curved, large, testing, texture, variant
 from render.phenomena import register
 from render.rays import Rays
@@ -143,7 +147,9 @@ def _photographs_of_poses():
     return {
         "groups": groups, "coarse": [groups[0].coarse(3, smooth) for smooth in (0.0, 1.3)],
         "around": [[each.x, each.y, each.shape] for each in around],
-        "outline": [start._outline(each) for each in (dots, dots * 0, dots + 4)], "dark": start._dark(dots + 3.5),
+        "outline": [start._outline(each) for each in (dots, dots * 0, dots + 4)],
+        "dark": [start._dark(each) for each in (dots + 3.5, np.add.outer(
+            np.arange(12.0) ** 2, 3 * np.arange(9.0) ** 1.5))],
         "shown": [start.shows_something(each, Noise(sigma=s)) for each in groups for s in (0.5, 400.0)],
         "turned": [start._turned(Parameters.of((pictures,)), Parameters.of((pictures,)).start(), turn) for turn in (
             (12.0, 0, 0), (0, -12.0, 0), (1.0, 2.0, 3.0))],
@@ -155,7 +161,8 @@ def _cameras():
     asked = [
         (boards[:1], SMALL.square, size), (boards, 0.0, size), (boards, True, size), (boards, SMALL.square, (240,)),
         (boards, SMALL.square, (240, 40000)), (boards, SMALL.square, size, "k9"), (boards, SMALL.square, size, "k1,k1"),
-        (boards, SMALL.square, size, ""), (boards, SMALL.square, size, "k1", -1.0), ("x", SMALL.square, size),
+        (boards, SMALL.square, size, ""), (boards, SMALL.square, size, "abc" * 70), (boards, SMALL.square, size,
+        "k1", -1.0), ("x", SMALL.square, size),
     ]  # fmt: skip
     told = {model: without_error(partial(calibrate_camera, boards, SMALL.square, size, model, 0.02)) for model in (
         "f", "k1,k2,p1,p2,k3")}  # fmt: skip
@@ -342,13 +349,64 @@ def _textured():
         step=adaptive.MISSED)}  # fmt: skip
 
 
+def _few_patches():
+    """As many smooth patches as tell the noise, and one row less; levels that are whole, or whole fours, or neither."""
+    rng = np.random.default_rng(8)
+    image = 60 + rng.normal(0, 1.7, (35, 28)) + np.arange(28)
+    ends = np.clip(np.rint(image * 2), 0, 200)
+    made = {
+        "rounded": np.rint(image),
+        "fours": 4 * np.rint(image),
+        "real": image,
+        "ends": ends,
+        "high": np.rint(40 * image),
+    }
+    told = {name: [measure.noise_curve(each), measure.noise_curve(each[:28])] for name, each in made.items()}
+    curves = [curve for each in told.values() for curve in each]
+    return told | {"variance": [curve.variance(np.array([0.0, 70.0, 190.0])) for curve in curves],
+                   "noise": [curve.noise for curve in curves], "full": measure.noise_curve(ends, 200.0),
+                   "scales": [noise_curve.scale_of(each, full) for each in made.values() for full in (None, 150.0)],
+                   "falling": NoiseCurve(4.0, -0.1, 3.0, 1.0, 8).variance(np.array([0.0, 3.0, 20.0,
+                   90.0]))}  # fmt: skip
+
+
+def _goodness():
+    """Of one part, of two, of none; at the ends of what is told."""
+    squares = np.array([[9.0, 40.0], [0.9, 0.0], [1.1, 22.0], [80.0, 20.0], [10.0, 20.0], [0.5, 3.0]])
+    freedom = np.array([[10.0, 20.0], [10.0, 0.0], [10.0, 20.0], [10.0, 20.0], [0.0, 0.0], [1.0, 2.0]])
+    return {"two": p_value(squares, freedom), "one": p_value(squares[:, :1], freedom[:, :1])}
+
+
+def _floors():
+    floor = load("plate on a floor").floor
+    points = np.array([[0.0, 0, 5.0], [1.0, 2, floor.height], [3.0, 1, -9.0], [0.0, 0, 2.0], [4.0, 4, 4.0]])
+    ways = np.array([[0.1, 0.2, -1.0], [0.3, 0.1, -1.0], [0.0, 0.1, -1.0], [1e6, 3.0, -1.0], [0.2, 0.1, 1.0]])
+    met = [appearance._on_floor(floor, points, ways, np.full(5, t)) for t in (np.inf, 4.0)]
+    ends = [appearance._on_floor(floor, np.array([[half, 0.0, floor.height + 1.0], [0.0, -half, floor.height + 2.0]]),
+                                 np.array([[0.0, 0, -1.0]] * 2), np.full(2, np.inf))[1]
+            for half in (floor.half_side * 0.999, floor.half_side, floor.half_side * 1.001)]  # fmt: skip
+    return {"met": met, "ends": ends}
+
+
+def _around_rims():
+    found = {}
+    for name in ("plate", "flange"):
+        pictures = Pictures.of(Picture.of(load(name), *uneven(load(name))))
+        found[name] = [rim_look.places_around(pictures, each, spacing, most) for each in load(name).solid.circles[:4]
+                       for spacing in (0.3, 2.0, 9.0) for most in (2, 64)]  # fmt: skip
+    return found
+
+
 def cases():
     """By name: relative tolerance, and what makes the result."""
     found = {
         "distances": _distances, "bounds": _bounds, "arranged": _arranged,
         "poses of photographs": _photographs_of_poses,
-        "cameras": _cameras, "lenses": _lenses, "edges of mtf": _edges, "curves of calibration": _calibrated,
+        "lenses": _lenses, "edges of mtf": _edges, "curves of calibration": _calibrated,
         "shapes that are none": _shapes_found, "agreeing": _agreeing, "pieces of large images": _pieces,
         "random rays": _random_rays, "curved shapes": _curved, "effects by name": _effects_named, "textured": _textured,
+        "few patches": _few_patches, "goodness": _goodness, "floors": _floors, "around rims": _around_rims,
     }  # fmt: skip
-    return {name: (CLOSED, make) for name, make in found.items()} | {"fits": (SEARCHED, _fits)}
+    return {name: (CLOSED, make) for name, make in found.items()} | {
+        "fits": (SEARCHED, _fits), "cameras": (SEARCHED, _cameras),
+    }  # fmt: skip

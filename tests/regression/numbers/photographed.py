@@ -162,13 +162,13 @@ def _measured_round(**how):
 
 
 def _edges():
-    image, flat = _shown(), np.full(_SHAPE, 7.0)
+    image = _shown()
     found = residuals.of_sides(rectangle(60, 41, 17, (90, 120)), turned(60.8, 40.1, 16.5, (90, 120)))
     short = residuals.of_sides(image, np.array([[40.0, 30], [43, 30.5], [42, 34]]))
     return {
         "sides": found, "rms": [each.rms for each in found], "short": short, "round": residuals.of_ellipse(image, _AT),
         "blur": [residuals.ellipse_blur(_shown(blur=b), _AT) for b in (0.31, 0.8, 1.7)],
-        "flat": residuals.ellipse_blur(flat, _AT), "dark": residuals.ellipse_blur(-image, _AT),
+        "dark": residuals.ellipse_blur(-image, _AT),
         "around": residuals.around(_AT, 5),
     }  # fmt: skip
 
@@ -311,7 +311,8 @@ def _noisy_board():
     cut = measured(np.clip(image, 0, 215), grid, 1.2)
     grown, alike = board_noise.board_covariance(image, board, grid, seen)
     white = board_noise.board_covariance(image, board, grid, recording(Photograph(clean + _noise(1.0, clean.shape))))
-    return {"board": board, "covariance": grown, "alike": alike, "white": white, "far": far, "faint": faint, "cut": cut,
+    return {"board": board, "covariance": grown, "alike": alike, "white": white, "far": far, "faint": faint.status,
+        "cut": cut,
             "none": board_noise.respond(image, far, grid * 0.1).nnz}  # fmt: skip
 
 

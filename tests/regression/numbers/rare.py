@@ -33,6 +33,7 @@ _STATION = {
     "part_shift": 0.007, "part_tilt_deg": {"half_width": 0.03}, "principal_point_px": 0.6, "rounding": 0.002,
     "temperature_K": {"value": 0.7, "half_width": 1.0}, "expansion_per_K": {"value": 11.5e-6, "half_width": 1e-6},
 }  # fmt: skip
+_CLOSED_FORM = {"cylinder", "cone", "narrowing cone", "sphere", "torus", "hollow torus"}
 _OFF = ("plate", "ball", "shaft", "task1", "calibrated_rig", "two_lights", "flange", "block through a lens")
 
 
@@ -53,7 +54,9 @@ def _contours(name):
         seen = limb(surface, pose, CAMERA, 9)
         inside = np.array([0.05, 0.7, 3.1])
         levels = [shading.levels_inside(surface, each, pose, CAMERA, inside, _LAMPS) for each in seen.strands]
-        found.append({"status": seen.status, "strands": seen.strands, "levels": levels})
+        known = name in _CLOSED_FORM  # of the others an eigenvector's sign says where they begin
+        found.append({"status": seen.status, "count": len(levels)} | {
+            "strands": seen.strands, "levels": levels} if known else [seen.status, len(levels)])  # fmt: skip
     return found
 
 
@@ -342,6 +345,8 @@ def _of_budgets():
         "joint": (numbers["length"] - 2 * numbers["width"]).std_dev,
         "needed": [improve.needed(found, wanted * found.U, source) for wanted in (0.3, 0.8, 0.95, 1.2)
                    for source in ("scale", "angle", "pair")],
+        "at the limit": [[one.reachable, one.u is None or one.u < 1e-6] for one in (
+            improve.needed(found, found.without(each).U, each) for each in ("scale", "angle", "pair"))],
         "free": [improve.needed(free, wanted, source) for wanted in (0.3, 0.1) for source in ("s", "t")],
         "improvements": improve.improvements(found, 0.5), "rows": found.as_rows(),
         "refused": [_words(e) for e in asked],
