@@ -23,7 +23,7 @@ from measure.fitting import photograph as fitted
 from measure.fitting import start
 from measure.fitting.parameters import Parameters
 from measure.goodness import p_value
-from measure.photo import lens, mtf, noise_curve
+from measure.photo import lens, mtf, noise_curve, profiles
 from measure.photo.noise_curve import NoiseCurve
 from render import adaptive, curved, large, testing, texture, variant
 from render.phenomena import register
@@ -31,7 +31,7 @@ from render.rays import Rays
 from scenes import Noise, Picture
 from tests.boards import SMALL
 from tests.oracle import polygon_image
-from tests.photographs import rectangle, turned
+from tests.photographs import MADE, rectangle, turned
 from tests.regression.numbers import measuring
 from tests.regression.numbers.parts import small
 from tests.regression.numbers.poses import load, uneven, without_error
@@ -349,6 +349,22 @@ def _textured():
         step=adaptive.MISSED)}  # fmt: skip
 
 
+def _rough_sides():
+    """Sides with notches and bumps, in a picture that is not square."""
+    rng, image = np.random.default_rng(7), polygon_image(_SQUARE, (105, 120), 0.8, 110.0, 40.0)
+    for x, y, size in ((60, 29, 4), (92, 55, 2), (40, 75, 3), (27, 45, 2)):
+        image[y - size // 2 : y + size // 2, x - size // 2 : x + size] += 30.0 * (-1) ** size
+    image += rng.normal(0, 1.2, image.shape)
+    return {"found": measure.find(image, ("quadrilateral",)), "refined": profiles.refined(image, _SQUARE + 0.6),
+            "sigma": profiles.edge_sigma(image, _SQUARE), "bent": adaptive.bent(image, 0.05), "diagonal": adaptive.bent(
+                np.maximum(np.add.outer(2.0 * np.arange(9), np.arange(11.0)) - 11, 0.3 * np.arange(11.0)), 0.03),
+            "flat": [adaptive.bent(image[:1], 0.05), adaptive.bent(image[:, :1], 0.05)]}  # fmt: skip
+
+
+def _found_in(name):
+    return without_error(lambda: measure.find(MADE[name].image()))
+
+
 def _few_patches():
     """As many smooth patches as tell the noise, and one row less; levels that are whole, or whole fours, or neither."""
     rng = np.random.default_rng(8)
@@ -407,6 +423,9 @@ def cases():
         "random rays": _random_rays, "curved shapes": _curved, "effects by name": _effects_named, "textured": _textured,
         "few patches": _few_patches, "goodness": _goodness, "floors": _floors, "around rims": _around_rims,
     }  # fmt: skip
+    for name in ("square on its corner", "frame", "block", "ArUco", "tripod", "plain"):
+        found[f"found in {name}"] = partial(_found_in, name)
+    found["rough sides"] = _rough_sides
     return {name: (CLOSED, make) for name, make in found.items()} | {
         "fits": (SEARCHED, _fits), "cameras": (SEARCHED, _cameras),
     }  # fmt: skip
