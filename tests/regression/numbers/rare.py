@@ -20,7 +20,7 @@ from planner.search.viewing import ViewingSpace
 from planner.uncertainty import Input, budget, conformity, gauge, improve, inputs, risks, uncertainty_ratio
 from planner.uncertainty.groups import Group, draw
 from planner.uncertainty.ufloats import as_ufloats
-from scenes import Noise, Picture, Tolerance
+from scenes import Noise, Picture, Pose, Tolerance
 from scenes.parts.surfaces import Torus
 from tests.curved import SURFACES
 from tests.regression.numbers.poses import load, uneven, without_error
@@ -378,6 +378,34 @@ def _decisions():
     }  # fmt: skip
 
 
+_SEEN = planner.Constraints(sensor_polar_deg=(5.0, 70.0), sensor_azimuth_deg=(10.0, 170.0))
+_FIXED = {"sensor": Pose(31.3, 131.7)}
+_MORE_PLANS = {
+    "wedge by the bound": ("wedge", {"model": "bound", "step_deg": 60.0, "constraints": _SEEN}),
+    "wedge in the image": ("wedge", {"objective": "image", "step_deg": 45.0, **_FIXED}),
+    "plate, sum": ("plate", {"over": "sum", "step_deg": 60.0, **_FIXED}),
+    "plate, refined": ("plate", {"step_deg": 60.0, "refined": True, **_FIXED}),
+    "two lights, refined": ("two_lights", {"step_deg": 60.0, "refined": True, "light": (
+        Pose(58.3, 275.1), Pose(37.1, 283.3))}),
+    "rig, alternating": ("calibrated_rig", {"step_deg": 30.0, "search": "alternating", "constraints": _SEEN}),
+    "rig, best edges": ("calibrated_rig", {"step_deg": 60.0, "edges": "best", **_FIXED}),
+    "lens": ("block through a lens", {"step_deg": 45.0, "constraints": _SEEN}),
+}  # fmt: skip
+
+
+def _planned(name, **how):
+    found = planner.plan(load(name), **({"refined": False} | how))
+    return {"sensor": found.sensor, "light": found.light, "variance": found.variance, "grid": [
+                found.grid_sensor, found.grid_light, found.grid_variance], "guarantee": found.guarantee,
+            "counts": [found.pairs, found.evaluated, len(found.candidates)], "gap": found.gap, "shares": found.shares,
+            "candidates": sorted(each.variance for each in found.candidates), "alone": found.alone,
+            "limiting": found.limiting, "line": str(found)}  # fmt: skip
+
+
+def _views(name, count, **how):
+    return planner.plan_views(load(name), count, step_deg=60.0, refined=False, **how)
+
+
 def cases():
     """By name: relative tolerance, and what makes the result."""
     found = {
@@ -395,4 +423,8 @@ def cases():
         _full_budget, "block through a lens", ("fx", "cx", "cy", "k1")
     )
     found["full budget of two focal lengths"] = partial(_full_budget, "block through a lens", ("fx", "fy", "cx", "p2"))
+    found |= {f"plan more {name}": partial(_planned, scene, **how) for name, (scene, how) in _MORE_PLANS.items()}
+    for name, count, how in (("plate", 2, {}), ("plate", 4, {"over": "sum"}), ("wedge", 3, {"share": "sensor"}),
+                             ("ball", 3, {})):  # fmt: skip
+        found[f"more views {name} {count}"] = partial(_views, name, count, **how)
     return {name: (SEARCHED if "rays" in name else CLOSED, make) for name, make in found.items()}
