@@ -1,4 +1,4 @@
-"""The paper's reflectance as a Mitsuba BSDF, in Dr.Jit arithmetic: runs compiled under LLVM and CUDA, and in scalar."""
+"""A material's reflectance as a Mitsuba BSDF, in Dr.Jit arithmetic: compiled under LLVM and CUDA, or scalar."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from imaging.light.reflectance import Index, Ops, across, brightness, diffuse
 from render.texture import Face, bitmap
-from scenes import Material
+from scenes import Brdf
+from scenes.materials.brdf import Index
+from scenes.materials.vectors import Ops, across
 
-NAME = "ice_torrance_sparrow"
+NAME = "ice_brdf"
 _ROUNDING = 1e-6  # of a cosine, in single precision
 
 
@@ -32,7 +33,7 @@ class Surface:
     ``texture`` has factors of the diffuse reflectance.
     """
 
-    material: Material
+    material: Brdf
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
     lamps: tuple[Lamp, ...] = ()
@@ -60,7 +61,7 @@ def _register(variant: str) -> None:
 
     ops = Ops(dr.sqrt, dr.exp, dr.log, dr.minimum, dr.maximum, dr.select, tiny=1e-30, flat=1e-10)
 
-    class TorranceSparrow(mi.BSDF):
+    class Reflecting(mi.BSDF):
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
             self.surface = _surfaces[int(props["surface"])]
@@ -101,10 +102,10 @@ def _register(variant: str) -> None:
             known = self.surface
             up = (0.0 * wi.x, 0.0 * wi.x, 1.0 + 0.0 * wi.x)
             light, sensor = (wo.x, wo.y, wo.z), (wi.x, wi.y, wi.z)
-            value = brightness(known.material, known.index, up, light, sensor, polarisation, analyser, ops)
+            value = known.material.brightness(known.index, up, light, sensor, polarisation, analyser, ops)
             if self.texture is None:
                 return value
-            matt = (factor - 1) * diffuse(known.material, analyser is not None) * wo.z
+            matt = (factor - 1) * known.material.diffuse(analyser is not None) * wo.z
             return value + dr.select((wo.z > 0) & (wi.z > 0), matt, 0.0)
 
         def pdf(self, ctx, si, wo, active=True):
@@ -115,13 +116,13 @@ def _register(variant: str) -> None:
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
         def to_string(self):
-            return f"TorranceSparrow[{self.surface}]"
+            return f"Reflecting[{self.surface}]"
 
     def _local(dr, mi, si, axis, beam):
         local = si.to_local(mi.Vector3f(*axis))
         return across((local.x, local.y, local.z), (beam.x, beam.y, beam.z), ops)
 
-    mi.register_bsdf(NAME, lambda props: TorranceSparrow(props))
+    mi.register_bsdf(NAME, lambda props: Reflecting(props))
 
 
 def _along(dr, mi, si, position, way, angle: float):

@@ -10,7 +10,6 @@ import numpy as np
 from imaging.geometry.projection import camera_frame
 from imaging.light.appearance import analyser_axis
 from imaging.light.irradiance import bands
-from imaging.light.reflectance import Index, diffuse
 from imaging.light.sheets import sheets
 from render import bsdf, lights
 from render.curved import curved_shapes, stands_for
@@ -18,7 +17,7 @@ from render.meshes import mesh
 from render.parts import Part
 from render.rays import SURFACES
 from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
-from scenes import Floor, Material, Picture, Scene, Solid
+from scenes import Brdf, Floor, Picture, Scene, Solid
 from scenes.lights.luminaire import BLACK
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
@@ -99,7 +98,7 @@ def _solids(scene: Scene, active: frozenset[str]) -> list[Solid]:
     return [scene.solid, *(obstacle.solid for obstacle in (scene.obstacles if "cast_shadow" in active else ()))]
 
 
-def _materials(scene: Scene, solid: Solid) -> list[Material]:
+def _materials(scene: Scene, solid: Solid) -> list[Brdf]:
     """Of each face of the object, or of an obstacle."""
     known = scene.surfaces
     return [known.of(face) if solid is scene.solid else scene.material for face in range(len(solid.faces))]
@@ -130,21 +129,19 @@ def _of_material(mitsuba, solid: Solid, here: np.ndarray, bsdf: dict) -> list[An
     return plane + curved_shapes(mitsuba, solid, bsdf, here)
 
 
-def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Material, part: Face | None = None) -> dict:
+def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Brdf, part: Face | None = None) -> dict:
     """A material as a BSDF; ``part`` has the factors of its diffuse reflectance."""
     scene = picture.scene
     if not active & CUSTOM:
         if part is not None:
-            return {"type": "diffuse", "reflectance": bitmap(mitsuba, diffuse(material) * part.values)}
-        return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": diffuse(material)}}
+            return {"type": "diffuse", "reflectance": bitmap(mitsuba, material.diffuse() * part.values)}
+        return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": material.diffuse()}}
     analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
     return bsdf.describe(
         mitsuba,
         bsdf.Surface(
             material,
-            bands(scene, material=material)
-            if "wavelength" in active
-            else (Index(material.refractive_index, material.extinction),),
+            bands(scene, material=material if "wavelength" in active else material.with_dispersion(())),
             tuple(scene.position("sensor", picture.sensor).tolist()),
             lights.lamps(picture, active),
             analyser=None if analyser is None else tuple(analyser.tolist()),

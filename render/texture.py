@@ -21,13 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from imaging.light.appearance import matt_part, signal
+from imaging.light.appearance import signal
 from imaging.light.emitters import emitters, is_point
 from imaging.light.irradiance import beam
 from imaging.light.sheets import Sheet
 from imaging.pictures import Pictures
 from render.meshes import mesh
-from scenes import Material, Picture, Scene, Solid, as_point
+from scenes import Brdf, Picture, Scene, Solid, as_point
 from scenes.lights import SMOOTH
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -62,7 +62,7 @@ class Face:
 def faces(
     solid: Solid,
     picture: Picture,
-    materials: Sequence[Material] | None = None,
+    materials: Sequence[Brdf] | None = None,
     uneven: Mapping[int, Sheet] = MappingProxyType({}),
 ) -> tuple[Face, ...] | None:
     """The solid's surface in parts, or None where a table would need too many nodes or a light's middle is too low.
@@ -74,7 +74,7 @@ def faces(
     solid : Solid
     picture : Picture
         Of one light, which is rendered as a point in its middle; parts that are not simulated are neutral.
-    materials : sequence of Material, optional
+    materials : sequence of Brdf, optional
         Of each face; the scene's when not given.
     uneven : mapping of int to Sheet
         Textures of faces.
@@ -139,7 +139,7 @@ def uneven_part(solid: Solid, face: int, sheet: Sheet) -> Face:
 
 
 def _face(
-    triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet | None
+    triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Brdf, sheet: Sheet | None
 ) -> Face | None:
     """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
     sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
@@ -159,7 +159,7 @@ def _face(
     return None if values is None else Face(triangles, (flat - low) / (high - low), values)
 
 
-def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material: Material, sheet: Sheet):
+def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material: Brdf, sheet: Sheet):
     """A table of brightness with the texture's factors on the diffuse part, on nodes that hold those of both."""
     counts = [
         (texture - 1) * math.ceil((table - 1) / (texture - 1))
@@ -172,14 +172,14 @@ def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material
     rows = []
     for first in range(0, down.size, share):
         points = at(across, down[first : first + share])
-        matt = shade(pictures, normal, points, matt_part(material))
+        matt = shade(pictures, normal, points, material.matt())
         rows.append(shade(pictures, normal, points, material) + (sheet.at(points) - 1) * matt)
     return np.concatenate(rows)
 
 
-def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Material) -> np.ndarray | None:
+def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Brdf) -> np.ndarray | None:
     """Values on a grid with as many intervals each way as they need; None if that is too many."""
-    counts = _first_counts(at, normal, pictures, material.roughness)
+    counts = _first_counts(at, normal, pictures, material.lobe_slope)
     while (counts[0] + 1) * (counts[1] + 1) <= _MOST:
         across, down = (np.linspace(0, 1, count + 1) for count in counts)
         share = max(_AT_ONCE // across.size, 1)
@@ -195,10 +195,10 @@ def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Materia
     return None
 
 
-def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures, roughness: float) -> list[int]:
+def _first_counts(at: Points, normal: np.ndarray, pictures: Pictures, lobe_slope: float) -> list[int]:
     """Intervals across and down with which no lobe falls between two nodes, powers of two."""
     few = np.linspace(0, 1, _FEWEST + 1)
-    slope = _slope(at(few, few), normal, pictures) / (_LOBE * roughness)
+    slope = _slope(at(few, few), normal, pictures) / (_LOBE * lobe_slope)
     steps = [np.linalg.norm(np.diff(slope, axis=axis), axis=-1).max() for axis in (1, 0)]
     return [_FEWEST << max(math.ceil(math.log2(max(step, 1.0))), 0) for step in steps]
 
@@ -216,7 +216,7 @@ def _slope(points: np.ndarray, normal: np.ndarray, pictures: Pictures) -> np.nda
     return half / (half @ normal)[..., None] - normal
 
 
-def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: Material | None = None) -> np.ndarray:
+def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: Brdf | None = None) -> np.ndarray:
     """Brightness over N.L of points of a plane that is lit and seen, shape (...).
 
     Parameters
@@ -226,7 +226,7 @@ def shade(pictures: Pictures, normal: np.ndarray, points: np.ndarray, material: 
     normal : ndarray, shape (3,)
     points : ndarray, shape (..., 3)
         Scene units.
-    material : Material, optional
+    material : Brdf, optional
         The scene's when not given.
     """
     scene = pictures.scene

@@ -7,8 +7,10 @@ from scenes.errors import InvalidInput
 from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.lights.filters import Filter, Lamp
 from scenes.load import find, load, names
+from scenes.materials.brdf import Brdf
+from scenes.materials.on_faces import FaceMaterial
 from scenes.materials.textures import ImageTexture, StatisticalTexture
-from scenes.materials.torrance_sparrow import FaceMaterial, Material
+from scenes.materials.torrance_sparrow import Material
 from scenes.measurands.features import Centre, Corner, Side, Wall
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, Tolerance
 from scenes.parts.ball import Ball
@@ -27,7 +29,7 @@ from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "AnyLight", "Backlight", "Ball", "Bar", "Block", "Camera", "Centre", "Circle", "Corner", "Curved",
+    "UNITS", "AnyLight", "Backlight", "Ball", "Bar", "Block", "Brdf", "Camera", "Centre", "Circle", "Corner", "Curved",
     "Disc", "Dome", "Edge", "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp",
     "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture",
     "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task",

@@ -33,12 +33,9 @@ _KINDS = {
 }
 
 
-_TAGS = (
-    "block", "mesh", "step", "corner", "centre", "side", "statistical", "image", "str", "Where",
-    "point", "disc", "bar", "ring", "dome", "backlight",
-)  # fmt: skip  # alternatives of the model, no keys of the file
-
-
+_TAGS = "block", "mesh", "step", "corner", "centre", "side", "statistical", "image", "str", "Where"
+KIND = "kind "  # before the name of a registered kind where pydantic says which it took
+# both are alternatives of the model, no keys of the file
 _MOST = 600  # characters of a message: enough for a path, a key and what was given
 
 
@@ -80,13 +77,16 @@ def describe(error: ValidationError, *where: int | str) -> str:
     if problem["type"] == "value_error" and " must " in str(problem["ctx"]["error"]):
         text = str(problem["ctx"]["error"])
         return text if not location or "." in text.split(" must ")[0] else f"{_key(location)}: {text}"
+    if problem["type"] == "union_tag_invalid" and problem["ctx"]["tag"].startswith(KIND):
+        known, got = (problem["ctx"][name].replace(KIND, "") for name in ("expected_tags", "tag"))
+        return f"{_key((*location, 'kind'))} must be one of {known}, got '{got}'"
     return f"{_key(location)} must be {_requirement(problem)}, got {_shown(problem)}"
 
 
 def _key(location: tuple[int | str, ...]) -> str:
     """("settings", 3, "light") becomes settings[3].light."""
     key = ""
-    for part in (part for part in location if part not in _TAGS):
+    for part in (part for part in location if part not in _TAGS and not str(part).startswith(KIND)):
         key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
     return key or "the scene"
 

@@ -179,7 +179,8 @@ def _kind(facts: dict[str, Any], whole: dict[str, Any]) -> str:
             return f"list of {len(inside)}: {', '.join(dict.fromkeys(_kind(item, whole) for item in inside))}"
         return f"list of {_kind(facts['items'], whole)}" if facts.get("items") else "list"
     if facts.get("type") == "object":
-        return f"table of {_kind(facts.get('additionalProperties') or {}, whole)}"
+        inner = facts.get("additionalProperties")
+        return f"table of {_kind(inner, whole)}" if isinstance(inner, dict) else "table"
     return {"integer": "whole number", "string": "text", "boolean": "true or false"}.get(
         facts.get("type", ""), facts.get("type", "pair")
     )

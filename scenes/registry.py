@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar, cast
 
-from pydantic import Discriminator, GetCoreSchemaHandler, Tag
+from pydantic import AfterValidator, Discriminator, GetCoreSchemaHandler, Tag
 
-from scenes.errors import InvalidInput, given
+from scenes.errors import KIND, InvalidInput, given
 
 Kind = TypeVar("Kind")
+Given = TypeVar("Given")  # what a decorator is given, it gives back
 
 
 class Registry(Collection[str], Generic[Kind]):
@@ -36,7 +37,7 @@ class Registry(Collection[str], Generic[Kind]):
         self._kinds: dict[str, Kind] = {}
         self._dependants: list[Callable[[], Any]] = []
 
-    def add(self, name: str) -> Callable[[Kind], Kind]:
+    def add(self, name: str) -> Callable[[Given], Given]:
         """A decorator that makes a kind known by its name.
 
         Raises
@@ -45,11 +46,11 @@ class Registry(Collection[str], Generic[Kind]):
             If another kind has the name.
         """
 
-        def known(kind: Kind) -> Kind:
+        def known(kind: Given) -> Given:
             other = self._kinds.get(name)
             if other is not None and other != kind:
                 raise InvalidInput(f"{self.noun} must have a name of its own, got {name!r}, which is {other!r}")
-            self._kinds[name] = kind
+            self._kinds[name] = cast("Kind", kind)
             for rebuild in self._dependants:
                 rebuild()
             return kind
@@ -90,16 +91,23 @@ class Registry(Collection[str], Generic[Kind]):
 class OneOf:
     """Annotation of a field whose value is a model of one of a registry's kinds, told by its key ``kind``."""
 
-    def __init__(self, kinds: Registry, default: str) -> None:
+    def __init__(self, kinds: Registry, default: str = "") -> None:
         self._kinds, self._default = kinds, default
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
-        kinds = [Annotated[self._kinds[name], Tag(name)] for name in self._kinds]
+        kinds = [Annotated[self._kinds[name], Tag(KIND + name)] for name in self._kinds]
+        if not kinds:
+            return handler.generate_schema(Annotated[dict, AfterValidator(self._unknown)])
         return handler.generate_schema(Annotated[reduce(or_, kinds), Discriminator(self._name)])
+
+    def _unknown(self, value: dict) -> Any:
+        raise ValueError(
+            f"{self._kinds.noun} must be one that a module of your own adds, got {given(value.get('kind'))}"
+        )
 
     def _name(self, value: Any) -> str:
         named = value.get("kind", self._default) if isinstance(value, dict) else getattr(value, "kind", self._default)
-        return named if isinstance(named, str) else repr(named)
+        return KIND + (named if isinstance(named, str) else repr(named))
 
 
 class NameOf:

@@ -13,15 +13,18 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.cameras.data_sheet import completed
+from scenes.cameras.lens_model import LENSES
 from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
 from scenes.errors import InvalidInput
+from scenes.influences import INFLUENCES
 from scenes.lights import LIGHTS, AnyLight
 from scenes.lights.filters import Filter, Lamp, check_names
+from scenes.materials.kinds import MATERIALS, AnyMaterial
+from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.materials.torrance_sparrow import FaceMaterial, Material
 from scenes.measurands.features import Corner, Wall, check_feature
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
@@ -115,9 +118,9 @@ class Scene(Model):
     """What it is about, for tables."""
     object: Object
     """What is measured."""
-    material: Material
+    material: AnyMaterial
     """Of the object and the obstacles, where ``materials`` say nothing else."""
-    materials: tuple[FaceMaterial, ...] = ()
+    materials: tuple[AnyFaceMaterial, ...] = ()
     """Of some faces of the object."""
     textures: tuple[Texture, ...] = ()
     """What is printed on faces, or how unevenly they reflect."""
@@ -406,5 +409,8 @@ class Scene(Model):
             )
 
 
+INFLUENCES.followed_by(rebuild)
+LENSES.followed_by(rebuild)
 LIGHTS.followed_by(rebuild)
+MATERIALS.followed_by(rebuild)
 MEASURANDS.followed_by(rebuild)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ValidationInfo, model_validator
 
 from scenes.cameras.covariance import ORDER, Covariance, of_document
+from scenes.influences import AnyInfluence
 from scenes.model import Model
 from scenes.ranges import Rounding, Spread
 from scenes.uncertain import Uncertain, UncertainNumber
@@ -72,13 +73,19 @@ class Uncertainty(Model):
         None
     )
     """Of a camera calibration: a file's name, relative to the scene's file, or names and matrix."""
+    influences: tuple[AnyInfluence, ...] = ()
+    """Influence quantities of kinds that a module of your own adds (`ice --plugin MODULE`)."""
 
     @model_validator(mode="after")
     def _deviations(self) -> Uncertainty:
         for name in type(self).model_fields:
             given = getattr(self, name)
-            if isinstance(given, Uncertain) and given.value and name not in _WITH_VALUE:
-                raise ValueError(f"{name}.value must be 0, as of every deviation, got {given.value:g}")
+            for each in given if isinstance(given, tuple) else (given,):
+                if isinstance(each, Uncertain) and each.value and name not in _WITH_VALUE:
+                    raise ValueError(f"{name}.value must be 0, as of every deviation, got {each.value:g}")
+        names = [each.kind for each in self.influences]
+        if len(set(names)) < len(names):
+            raise ValueError(f"uncertainty.influences must be of different kinds, got {', '.join(names)}")
         if self.expansion_per_K is not None and self.expansion_per_K.value is None:
             raise ValueError("expansion_per_K.value must be given, got nothing")
         return self

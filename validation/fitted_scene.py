@@ -8,7 +8,7 @@ from typing import Any
 
 import scenes
 from measure.fitting.result import Fit
-from scenes import InvalidInput
+from scenes import InvalidInput, Lens
 from scenes.files.door import read_toml
 from scenes.files.written import toml
 from scenes.numbers import number_at
@@ -49,8 +49,9 @@ def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
     camera = {key: value for key, value in document["camera"].items() if key not in _SAID_ELSE}
     camera |= {key: number_at(scene, f"camera.{key}") for key in _CAMERA}
     camera["look_at"] = list(scene.camera.look_at)
-    if any(scene.camera.lens.coefficients):
-        camera["lens"] = {**camera.get("lens", {}), "distortion": list(scene.camera.lens.coefficients)}
+    lens = scene.camera.lens
+    if isinstance(lens, Lens) and lens.bends:
+        camera["lens"] = {**camera.get("lens", {}), "distortion": list(lens.coefficients)}
     noise = document["noise"] | {key: number_at(scene, f"noise.{key}") for key in _NOISE}
     settings = [setting.model_dump(mode="json", exclude_none=True) for setting in scene.settings]
     return document | {"camera": camera, "noise": noise, "settings": settings, "same_scale": []}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.features.limb_outline import LimbOutline
-from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from scenes import Scene
 
@@ -33,4 +32,4 @@ def unlent(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
 
 def _white(scene: Scene) -> float:
     """Of obstacles."""
-    return diffuse(scene.material, scene.camera.analyser_deg is not None)
+    return scene.material.diffuse(scene.camera.analyser_deg is not None)

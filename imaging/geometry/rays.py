@@ -1,14 +1,22 @@
-"""What a ray meets first, by trying every triangle."""
+"""What a ray meets first: Embree finds it, in single precision, and double precision says where; or every triangle is
+tried, where Embree has no wheel."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from scenes import Solid
+
+try:  # has wheels for x86-64
+    from embreex import rtcore_scene
+    from embreex.mesh_construction import TriangleMesh
+except ImportError:
+    rtcore_scene = None
 
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
@@ -17,6 +25,8 @@ _LEAST = 16  # rays from one place that are a bundle of their own
 _CELLS = 32  # a bundle's rays end in one of so many strips across the part
 _ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
+_PAST = 1e-6  # of the part's size: how far behind what a ray has met from inside it is followed on
+_MOST_PASSED = 10_000  # triangles that a ray passes from inside
 
 
 def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]):
@@ -36,18 +46,71 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
     t : ndarray, shape (...)
         Infinite where nothing is met.
     """
-    plates = _plates(solid)
+    shape = origins.shape[:-1]
+    rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
+    face, t = (by_embree if rtcore_scene else by_trial)(_plates(solid), *rays, own)
+    return face.reshape(shape), t.reshape(shape)
+
+
+def by_trial(
+    plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`first_face` of rays (n, 3), every triangle tried that may be near."""
     if own:
         plates = plates.some(~np.isin(plates.faces, own))
-    shape = origins.shape[:-1]
-    origins, vectors = origins.reshape(-1, 3), vectors.reshape(-1, 3)
     if len(plates.faces) <= _MANY:
-        face, t = _in_bundles(plates, origins, vectors, (_BUNDLE,))
-    else:
-        face, t = np.empty(len(origins), int), np.empty(len(origins))
-        order = _alike(origins, vectors)
-        face[order], t[order] = _in_bundles(plates, origins[order], vectors[order], (_BUNDLE, _FEW))
-    return face.reshape(shape), t.reshape(shape)
+        return _in_bundles(plates, origins, vectors, (_BUNDLE,))
+    face, t = np.empty(len(origins), int), np.empty(len(origins))
+    order = _alike(origins, vectors)
+    face[order], t[order] = _in_bundles(plates, origins[order], vectors[order], (_BUNDLE, _FEW))
+    return face, t
+
+
+def by_embree(
+    plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`first_face` of rays (n, 3): Embree names triangles, one behind the other, until one is met from outside.
+
+    Places are those of the triangles' planes in double precision. Rays begin where they enter the sphere about the
+    part, so that single precision is that of the part and not of its distance: what passes an outer edge within about
+    1e-7 of the part's size may count as met or not.
+    """
+    face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    lengths = np.linalg.norm(vectors, axis=1)
+    at, rays = _entries(plates, origins, vectors, lengths)
+    passed, last = np.isin(plates.faces, own), np.full(len(origins), -1)
+    step = np.full(len(origins), _PAST * plates.radius)
+    for _ in range(_MOST_PASSED):
+        if not rays.size:
+            break
+        ways = vectors[rays] / lengths[rays, None]
+        starts = (origins[rays] + at[rays, None] * vectors[rays] - plates.centre) / plates.radius
+        found = plates.tree.run(starts.astype(np.float32), ways.astype(np.float32), query="INTERSECT", output=1)
+        met = found["primID"] >= 0
+        rays, which, away = rays[met], found["primID"][met], found["tfar"][met]
+        fall = np.einsum("ni,ni->n", vectors[rays], plates.normals[which])
+        over = np.einsum("ni,ni->n", origins[rays], plates.normals[which]) - plates.heights[which]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = -over / fall
+        outside = (fall < 0) & (over > 0) & (place > _STEP) & ~passed[which]
+        face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
+        rays, which, away = rays[~outside], which[~outside], away[~outside]
+        step[rays] = np.where(which == last[rays], 2 * step[rays], _PAST * plates.radius)
+        last[rays] = which
+        at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
+    return face, t
+
+
+def _entries(
+    plates: Plates, origins: np.ndarray, vectors: np.ndarray, lengths: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where rays enter the sphere about the triangles, t (n,), and the indices of those that do or begin in it."""
+    with np.errstate(all="ignore"):
+        along = np.einsum("ni,ni->n", plates.centre - origins, vectors) / lengths
+        aside2 = ((plates.centre - origins) ** 2).sum(1) - along**2
+        half = np.sqrt(1.1 * plates.radius**2 - aside2)  # NaN for rays that pass it
+        at = np.maximum(along - half, 0.0) / lengths
+        return at, np.flatnonzero((along + half > 0) & np.isfinite(at))
 
 
 def _alike(origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -61,7 +124,7 @@ def _alike(origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _in_bundles(
-    plates: _Plates, origins: np.ndarray, vectors: np.ndarray, sizes: tuple[int, ...]
+    plates: Plates, origins: np.ndarray, vectors: np.ndarray, sizes: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """`_first`, for bundles of rays of the first size, each divided into some of the next."""
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
@@ -84,7 +147,7 @@ def _bundles(origins: np.ndarray, size: int) -> Iterator[slice]:
         start = stop
 
 
-def _first(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _first(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Face and t of what rays (n, 3) meet first, as `first_face` gives them."""
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
     size = max(1, _CHUNK // max(len(plates.faces), 1))
@@ -99,7 +162,7 @@ def _first(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[n
     return face, t
 
 
-def _may_meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _may_meet(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Triangles that a bundle of rays (n, 3) comes near: within the box across their mean direction that they fill from
     the nearest to the farthest triangle, bool (T,). All of them where the rays do not run one way."""
     every = np.ones(len(plates.faces), bool)
@@ -143,7 +206,7 @@ def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.nd
 
 
 @dataclass(frozen=True, eq=False)
-class _Plates:
+class Plates:
     """T triangles: their face, corners (3, T, 3), plane, and (x - corner) . dual, coordinates of a place x along two
     sides."""
 
@@ -159,14 +222,31 @@ class _Plates:
         """Largest coordinate of a corner."""
         return float(np.abs(self.corners).max(initial=0.0))
 
-    def some(self, which: np.ndarray) -> _Plates:
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """Of the box about them, (3,)."""
+        return (self.corners.min((0, 1)) + self.corners.max((0, 1))) / 2
+
+    @cached_property
+    def radius(self) -> float:
+        """Of the sphere about that box."""
+        return float(np.linalg.norm(np.ptp(self.corners, (0, 1)))) / 2
+
+    @cached_property
+    def tree(self) -> Any:
+        """Embree's, of the triangles in a sphere of radius 1."""
+        scene = rtcore_scene.EmbreeScene(robust=True)
+        TriangleMesh(scene, ((self.corners.swapaxes(0, 1) - self.centre) / self.radius).astype(np.float32))
+        return scene
+
+    def some(self, which: np.ndarray) -> Plates:
         """Those of them."""
         planes = self.normals[which], self.heights[which]
-        return _Plates(self.faces[which], self.corners[:, which], *planes, self.duals[:, which], self.shifts[:, which])
+        return Plates(self.faces[which], self.corners[:, which], *planes, self.duals[:, which], self.shifts[:, which])
 
 
 @lru_cache(maxsize=16)
-def _plates(solid: Solid) -> _Plates:
+def _plates(solid: Solid) -> Plates:
     triangles, normals = solid.triangles, solid.normals[solid.triangle_faces]
     corner, one, two = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     gram = np.einsum("ti,ti->t", one, one), np.einsum("ti,ti->t", one, two), np.einsum("ti,ti->t", two, two)
@@ -175,10 +255,10 @@ def _plates(solid: Solid) -> _Plates:
     duals = duals / size[:, None]
     shifts = np.einsum("kti,ti->kt", duals, corner)
     corners = np.ascontiguousarray(triangles.swapaxes(0, 1))
-    return _Plates(solid.triangle_faces, corners, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
+    return Plates(solid.triangle_faces, corners, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
 
 
-def _meet(plates: _Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _meet(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Faces (T,) of triangles whose outside a ray may meet, and each ray's t, infinite where it misses, (rays, T)."""
     fall, over = vectors @ plates.normals.T, origins @ plates.normals.T - plates.heights
     some = ((fall < 0) & (over > 0)).any(0)

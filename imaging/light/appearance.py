@@ -19,10 +19,9 @@ from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.light.emitters import is_point
 from imaging.light.irradiance import bands, beam, electric_field, squared_distance, widened
-from imaging.light.reflectance import diffuse, reflected
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
-from scenes import Edge, Floor, Material, Scene
+from scenes import Brdf, Edge, Floor, Material, Scene
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
@@ -66,7 +65,7 @@ def signal(
     axes: int,
     lit: tuple[np.ndarray, ...] | None = None,
     *,
-    material: Material | None = None,
+    material: Brdf | None = None,
     fall_off: bool = True,
 ) -> np.ndarray:
     """Signal of surface points from all lights, with attached shadows; 0 where a surface is turned away.
@@ -81,7 +80,7 @@ def signal(
         How many axes the points have of their own.
     lit : tuple of ndarray of bool, optional
         For each emitter where it reaches the points; everywhere when not given.
-    material : Material, optional
+    material : Brdf, optional
         The object's when not given.
     fall_off : bool
         Whether irradiance falls with the squared distance from the light, as it does; eq. 1 has no such term.
@@ -94,7 +93,7 @@ def signal(
         fields = polarisation_axis(scene, emitter.which, pictures.lights_at[emitter.which]), analyser
         across = (None if axis is None else widened(axis, axes) for axis in fields)
         index = bands(scene, emitter.light, material)
-        value = reflected(material, index, normals, arriving.to_light, to_sensor, *across)
+        value = material.reflected(index, normals, arriving.to_light, to_sensor, *across)
         value = scene.camera.exposure * arriving.strength * value
         total = total + (value if lit is None else np.where(lit[i], value, 0.0))
     return total
@@ -154,14 +153,8 @@ def diffuse_signal(
     fall_off: bool = True,
 ) -> np.ndarray:
     """The diffuse part of the signal of points on a face, without its texture; parameters as of `signal`."""
-    matt, normal = matt_part(pictures.scene.surfaces.of(face)), pictures.scene.bodies.normals[face]
+    matt, normal = pictures.scene.surfaces.of(face).matt(), pictures.scene.bodies.normals[face]
     return signal(pictures, points, normal, axes, lit, material=matt, fall_off=fall_off)
-
-
-@lru_cache(maxsize=64)
-def matt_part(material: Material) -> Material:
-    """A material's diffuse term alone."""
-    return Material(diffuse_reflectance=diffuse(material))
 
 
 def analyser_axis(scene: Scene, sensors: np.ndarray) -> np.ndarray | None:
@@ -285,7 +278,7 @@ def _heights(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
 
 def whites(scene: Scene) -> np.ndarray:
     """Signal of each face of the bodies by unit irradiance from everywhere, its diffuse part, grey levels, (F,)."""
-    each = [diffuse(material, scene.camera.analyser_deg is not None) for material in scene.surfaces.materials]
+    each = [material.diffuse(scene.camera.analyser_deg is not None) for material in scene.surfaces.materials]
     return scene.camera.exposure * np.array(each)[scene.surfaces.kinds]
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters
 from imaging.light.exchange import Exchanged, exchanged
-from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from scenes import Scene
 from scenes.lights import GLANCE
@@ -37,7 +36,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
         if inside.any():
             found[inside] = _of_wall(scene, shining, bore).ev(*place_in(bore, points[inside]))
     analysed = scene.camera.analyser_deg is not None
-    white = np.array([diffuse(material, analysed) for material in scene.surfaces.materials])
+    white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
     return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
 
 

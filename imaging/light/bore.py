@@ -18,7 +18,6 @@ from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.exchange import Exchange, Exchanged, factors_through
 from imaging.light.irradiance import beam
-from imaging.light.reflectance import diffuse
 from scenes import Circle, Scene, Solid
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ def light_in_bore(
     """
     from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
 
-    white = diffuse(scene.surfaces.of(bore.faces[0]))
+    white = scene.surfaces.of(bore.faces[0]).diffuse()
     form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
     outside = 0.0, 0.0
     if others is not None:

@@ -17,7 +17,6 @@ import numpy as np
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
-from imaging.light.reflectance import diffuse
 from scenes import Scene, Solid
 
 if TYPE_CHECKING:
@@ -236,7 +235,7 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     if exchange is None:
         return None
     white = np.concatenate(
-        [np.full(len(sheet.patches), diffuse(scene.surfaces.of(sheet.face))) for sheet in exchange.sheets]
+        [np.full(len(sheet.patches), scene.surfaces.of(sheet.face).diffuse()) for sheet in exchange.sheets]
     )
     direct = _direct(scene, exchange.patches, emitters)
     sent = np.linalg.solve(np.eye(direct.size) - white[:, None] * exchange.between, white * direct)

@@ -1,7 +1,6 @@
 """The light that arrives at points of the scene: its direction, its strength, its polarisation, its wavelengths.
 
-A new kind of light needs a class in `scenes.lights.lights`, its nodes in `imaging.light.emitters`, and its description
-in `render.lights`.
+What lights are is in `scenes.lights`, what surfaces make of it in `scenes.materials`.
 """
 
 from __future__ import annotations
@@ -11,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging.light.emitters import Emitter
-from imaging.light.reflectance import Index
-from scenes import Luminaire, Material, Scene
+from scenes import Brdf, Luminaire, Scene
+from scenes.materials.brdf import Index
 
 
 class Beam(NamedTuple):
@@ -78,21 +77,7 @@ def electric_field(beam_axis: np.ndarray, angle_deg: float) -> np.ndarray:
     return np.cos(angle) * down + np.sin(angle) * right
 
 
-def bands(scene: Scene, light: Luminaire | None = None, material: Material | None = None) -> tuple[Index, ...]:
-    """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the material's table.
-
-    Shares add up to 1, so that the exposure keeps its meaning: the grey level of a white diffuse surface.
-    One band without a table, for then nothing depends on the wavelength.
-    """
-    material = material or scene.material
-    if not material.index_table:
-        return (Index(material.refractive_index, material.extinction, 1.0),)
-    wavelength, n, k = np.array(material.index_table).T
-    width = np.gradient(wavelength) if len(wavelength) > 2 else np.ones(len(wavelength))
-    width[[0, -1]] = np.diff(wavelength)[[0, -1]] / 2 if len(wavelength) > 2 else 1.0
-    share = width.copy()
-    for curve in (scene.camera.transmission, scene.camera.responsivity, (light or scene.lights[0]).spectrum):
-        if curve:
-            share *= np.interp(wavelength, *np.array(curve).T)
-    share /= share.sum()
-    return tuple(Index(*map(float, row)) for row in zip(n, k, share, strict=True))
+def bands(scene: Scene, light: Luminaire | None = None, material: Brdf | None = None) -> tuple[Index, ...]:
+    """What a material's lobe is summed over (`Brdf.indices`): the scene's own where not given, its first light."""
+    curves = scene.camera.transmission, scene.camera.responsivity, (light or scene.lights[0]).spectrum
+    return (material or scene.material).indices(curves)

@@ -16,7 +16,6 @@ import numpy as np
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter, emitters
 from imaging.light.irradiance import beam
-from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from scenes import Curved, Scene, Solid
 from scenes.lights import GLANCE
@@ -96,7 +95,7 @@ def light_around(pictures: Pictures, curved: Curved, points: np.ndarray) -> np.n
     told = pictures.once(("around", curved.name), lambda: _told(pictures, rings, curved.name))
     away = points - rings.origin
     angle = np.arctan2(away @ rings.axes[1], away @ rings.axes[0]) % (2 * np.pi)
-    white = diffuse(scene.surfaces.of(curved.faces[0]), scene.camera.analyser_deg is not None)
+    white = scene.surfaces.of(curved.faces[0]).diffuse(scene.camera.analyser_deg is not None)
     return scene.camera.exposure * white * np.maximum(told.ev(away @ rings.axes[2], angle), 0.0)
 
 
@@ -223,7 +222,7 @@ def _told(pictures: Pictures, rings: Rings, name: str) -> RectBivariateSpline:
     """Light that arrives at a wall from elsewhere on the part, by height and angle."""
     scene = pictures.scene
     analysed = scene.camera.analyser_deg is not None
-    white = np.array([diffuse(scene.surfaces.of(faces[0]), analysed) if faces else 0.0 for faces in rings.own])
+    white = np.array([scene.surfaces.of(faces[0]).diffuse(analysed) if faces else 0.0 for faces in rings.own])
     direct = sum(_direct(scene, rings, each) for each in emitters(scene, pictures.lights, GLANCE))
     factors, arriving = _factors(rings), np.zeros_like(direct)
     for _ in range(_BOUNCES):

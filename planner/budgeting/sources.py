@@ -53,7 +53,13 @@ class Source:
 
 def sources(scene: Scene) -> tuple[Source, ...]:
     """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
-    return (*_numbers(scene), *_poses(scene), *_calibrated(scene))
+    return (*_numbers(scene), *_poses(scene), *_calibrated(scene), *_influences(scene))
+
+
+def _influences(scene: Scene) -> Iterator[Source]:
+    """Those of a user's own kinds."""
+    for each in scene.uncertainty.influences:
+        yield Source(each.kind, 0.0, each, each.unit, each.moves, each.small, each.moved)
 
 
 def _numbers(scene: Scene) -> Iterator[Source]:
@@ -119,8 +125,9 @@ def _calibrated(scene: Scene) -> Iterator[Source]:
             yield Source(name, 0.0, told, "px", "geometry", 100.0, move)
         else:
             place = ("k1", "k2", "p1", "p2", "k3").index(name)
-            move = _number_moved(f"camera.lens.distortion[{place}]")
-            yield Source(name, camera.lens.coefficients[place], told, "", "geometry", 1e-2, move)
+            key = f"camera.lens.distortion[{place}]"
+            move = _number_moved(key)
+            yield Source(name, number_at(scene, key), told, "", "geometry", 1e-2, move)
 
 
 def _stretched(focal: float, axes: tuple[int, ...]) -> Callable[[Station, float], Station]:

@@ -1,7 +1,7 @@
 """What a plan may choose beside poses: the angles of two polarisers, a lamp and a filter; and what light they cost.
 
 The one place that turns a choice into a scene. A polarised light is a lamp behind an ideal polariser, which passes half
-of it; an analyser passes half of unpolarised light (`imaging.light.reflectance`); a lamp brings its power, a filter
+of it; an analyser passes half of unpolarised light (`scenes.Brdf`); a lamp brings its power, a filter
 passes what the lamp's spectrum, the lens and the sensor leave of it.
 """
 
@@ -13,7 +13,6 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from imaging.light.reflectance import diffuse
 from scenes import Filter, InvalidInput, Lamp, Material, Scene
 
 Vary = Literal["analyser", "polarisation", "band"]
@@ -77,13 +76,13 @@ def check_vary(scene: Scene, vary: tuple[str, ...], hold: str) -> None:
 def _check_bands(scene: Scene) -> None:
     if not scene.lamps and not scene.filters:
         raise InvalidInput(f"{scene.name}: lamps or filters must be given to vary the band, got none")
-    if not scene.material.index_table:
+    if not scene.material.dispersion:
         raise InvalidInput(
             f"{scene.name}: material.index_table must be given to vary the band (else nothing but the amount of light"
             " depends on it), got none"
         )
     if len(bands_of(scene)) < 2:
-        table = scene.material.index_table
+        table = scene.material.dispersion
         raise InvalidInput(
             f"{scene.name}: lamps and filters must let some light pass within material.index_table"
             f" ({table[0][0]:g} to {table[-1][0]:g} nm), got none"
@@ -131,7 +130,7 @@ def exposure_time(scene: Scene, choice: Choice, hold: Hold) -> float:
     """
     if hold == "time":
         return 1.0
-    passed = [diffuse(_WHITE, c.analyser_deg is not None) for c in (own_choice(scene), choice)]
+    passed = [_WHITE.diffuse(c.analyser_deg is not None) for c in (own_choice(scene), choice)]
     return passed[0] / passed[1] / throughput(scene, choice)
 
 
@@ -156,7 +155,7 @@ def with_choice(scene: Scene, choice: Choice, hold: Hold = DEFAULT_HOLD) -> Scen
     update: dict = {}
     if lamp or filter_:
         wavelengths = _wavelengths(scene, lamp, filter_)
-        update["material"] = scene.material.model_copy(update={"index_table": _resampled(scene, wavelengths)})
+        update["material"] = scene.material.with_dispersion(_resampled(scene, wavelengths))
         if lamp:
             light["spectrum"] = lamp.spectrum
         if filter_:
@@ -193,7 +192,7 @@ def _filter(scene: Scene, choice: Choice) -> Filter | None:
 
 def _wavelengths(scene: Scene, lamp: Lamp | None, filter_: Filter | None) -> np.ndarray:
     """Those of the material's table, and within it of all curves, so that none falls between two, nm."""
-    table = [row[0] for row in scene.material.index_table]
+    table = [row[0] for row in scene.material.dispersion]
     curves = scene.camera.transmission, scene.camera.responsivity
     own = lamp.spectrum if lamp else scene.lights[0].spectrum
     rows = [row[0] for curve in (*curves, own, filter_.transmission if filter_ else ()) for row in curve]
@@ -205,7 +204,7 @@ def _at(wavelengths: np.ndarray, curve: tuple) -> np.ndarray:
 
 
 def _resampled(scene: Scene, wavelengths: np.ndarray) -> tuple:
-    table = np.array(scene.material.index_table)
+    table = np.array(scene.material.dispersion)
     return tuple(
         map(tuple, np.column_stack([wavelengths, *(_at(wavelengths, table[:, [0, i]]) for i in (1, 2))]).tolist())
     )

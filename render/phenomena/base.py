@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from imaging.pictures import Pictures
-from scenes import InvalidInput, Luminaire, Picture, Scene
+from scenes import Brdf, InvalidInput, Luminaire, Picture, Scene
 from scenes.registry import Registry
 
 SAFETY = 2.0  # estimates are of first order; twice them is taken as the bound
@@ -106,10 +106,10 @@ def relit(scene: Scene, change: Callable[[Luminaire], Luminaire]) -> Scene:
     return scene.lit_by(*map(change, scene.lights))
 
 
-def with_materials(scene: Scene, **values) -> Scene:
-    """The scene with values of all its materials replaced."""
-    others = tuple(each.model_copy(update=values) for each in scene.materials)
-    return changed(scene, "material", **values).model_copy(update={"materials": others})
+def with_materials(scene: Scene, change: Callable[[Brdf], Brdf]) -> Scene:
+    """The scene with all its materials changed."""
+    others = tuple(map(change, scene.materials))
+    return scene.model_copy(update={"material": change(scene.material), "materials": others})
 
 
 def largest(bias: np.ndarray, variance: np.ndarray) -> Influence:

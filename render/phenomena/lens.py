@@ -10,7 +10,7 @@ from imaging.geometry.projection import depth, edge_points, project_ideal
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
 from render.phenomena.edges import lever, required, sides
-from scenes import Lens, Scene
+from scenes import Scene
 
 
 class LensBlur(Effect):
@@ -53,7 +53,7 @@ class LensDistortion(Effect):
         return largest((lever(pictures) * bias).sum(-1), 6 * stretch)
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "camera", lens=scene.camera.lens.model_copy(update={"distortion": Lens().distortion}))
+        return changed(scene, "camera", lens=scene.camera.lens.straight())
 
 
 class DepthOfField(Effect):

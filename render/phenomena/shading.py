@@ -59,17 +59,15 @@ class SpecularLobe(Effect):
     switch = "the paper's reflectance as a BSDF instead of a diffuse one"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        if all(material.specular_fraction == 0 for material in scene.surfaces.used):
-            return "specular_fraction is 0"
-        return "n = 1 and k = 0: no Fresnel reflection" if scene.surfaces.is_diffuse else None
+        reasons = [material.dull for material in pictures.scene.surfaces.used]
+        return None if None in reasons else "; ".join(sorted({str(each) for each in reasons}))
 
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return with_materials(scene, refractive_index=1.0, extinction=0.0, index_table=())
+        return with_materials(scene, lambda each: each.matt())
 
 
 class Polarisation(Effect):
@@ -123,7 +121,7 @@ class Wavelength(Effect):
         scene = pictures.scene
         if scene.surfaces.is_diffuse:
             return "the diffuse term does not depend on the index"
-        known = any(material.index_table for material in scene.surfaces.used)
+        known = any(material.dispersion for material in scene.surfaces.used)
         return None if known else "the material has no table of indices"
 
     def influence(self, pictures: Pictures) -> Influence:
@@ -131,7 +129,7 @@ class Wavelength(Effect):
         return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
-        return with_materials(scene, index_table=())
+        return with_materials(scene, lambda each: each.with_dispersion(()))
 
 
 class Texture(Effect):

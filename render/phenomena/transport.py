@@ -9,7 +9,7 @@ from imaging.light.appearance import floor_material, signal
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides
-from scenes import Material, Scene, Solid
+from scenes import Scene, Solid
 
 
 class CastShadow(Effect):
@@ -105,13 +105,7 @@ def _bodies(scene: Scene) -> list[Solid]:
 
 def albedo(scene: Scene) -> float:
     """At most this part of the light is sent on."""
-    return max(map(_sent_on, scene.surfaces.used))
-
-
-def _sent_on(material: Material) -> float:
-    return (1 - material.specular_fraction) * material.diffuse_reflectance + (
-        0.0 if material.is_diffuse else material.specular_fraction
-    )
+    return max(material.lambertian + material.lobe_reflectance for material in scene.surfaces.used)
 
 
 def _gain(scene: Scene) -> float:

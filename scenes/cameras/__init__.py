@@ -1,1 +1,6 @@
-"""The camera: pinhole with a lens, sensor noise (EMVA 1288), data sheets, calibrations, tone curves."""
+"""The camera: its sensor and noise, its lens, its data sheet."""
+
+from scenes.cameras.lens import Lens
+from scenes.cameras.lens_model import LENSES, AnyLens, LensModel
+
+__all__ = ["LENSES", "AnyLens", "Lens", "LensModel"]

@@ -1,13 +1,14 @@
-"""What makes a lens more than a pinhole."""
+"""A lens with radial and tangential distortion."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from functools import lru_cache
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
-from scenes.model import Model
-from scenes.ranges import NotNegative, Positive
+from scenes.cameras.lens_model import LENSES, LensModel
 
 COEFFICIENTS = 5  # k1, k2, p1, p2, k3
 
@@ -25,8 +26,9 @@ Distortion = Annotated[
 ]
 
 
-class Lens(Model):
-    """What makes the lens more than a pinhole.
+@LENSES.add("brown_conrady")
+class Lens(LensModel):
+    """Radial and tangential distortion (Brown and Conrady's, in OpenCV's form).
 
     A point that a pinhole camera sees at (x, y) focal lengths from the image's centre is recorded at (x, y) (1 + k1 r^2
     + k2 r^4 + k3 r^6), and tangentially displaced by (2 p1 x y + p2 (r^2 + 2 x^2), p1 (r^2 + 2 y^2) + 2 p2 x y).
@@ -37,10 +39,8 @@ class Lens(Model):
     (-0.2, 0.0, 0.0, 0.0, 0.0)
     """
 
-    aperture_radius: NotNegative = 0.0
-    """Of a thin lens; 0 for a pinhole [length]."""
-    focus: Positive | None = None
-    """Distance at which it is focused; that of ``look_at`` when not given [length]."""
+    kind: Literal["brown_conrady"] = "brown_conrady"
+    """Polynomials in the distance from the axis."""
     distortion: Distortion = (0.0,) * COEFFICIENTS
     """OpenCV's k1, k2, p1, p2, k3, or k1 alone."""
 
@@ -53,3 +53,39 @@ class Lens(Model):
     def bends(self) -> bool:
         """Whether straight edges are recorded bent."""
         return any(self.coefficients)
+
+    def straight(self) -> Self:
+        """The same without distortion."""
+        return self.tried(distortion=(0.0,) * COEFFICIENTS)
+
+    def bent(self, points: np.ndarray) -> np.ndarray:
+        """OpenCV's model at points (..., 2) in focal lengths; NaN beyond the radius at which it folds the image."""
+        k1, k2, p1, p2, k3 = self.coefficients
+        x, y = points[..., 0], points[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        moved = np.stack(
+            [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
+            -1,
+        )
+        return np.where((r2 < _fold(k1, k2, k3))[..., None], moved, np.nan)
+
+    def slope(self, points: np.ndarray) -> np.ndarray:
+        """Its derivative, (..., 2, 2)."""
+        k1, k2, p1, p2, k3 = self.coefficients
+        x, y = points[..., 0], points[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        grows = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # of the radial factor with r^2 / 2
+        mixed = grows * x * y + 2 * p1 * x + 2 * p2 * y
+        xx = radial + grows * x * x + 2 * p1 * y + 6 * p2 * x
+        yy = radial + grows * y * y + 6 * p1 * y + 2 * p2 * x
+        return np.stack([np.stack([xx, mixed], -1), np.stack([mixed, yy], -1)], -2)
+
+
+@lru_cache(maxsize=16)
+def _fold(k1: float, k2: float, k3: float) -> float:
+    """Squared radius at which r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops growing; infinite where it never does."""
+    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    real = roots[(np.abs(roots.imag) < 1e-12) & (roots.real > 0)].real
+    return float(real.min(initial=np.inf))

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from scenes.cameras.lens import Lens
+from scenes.cameras.lens_model import AnyLens
 from scenes.model import Model
 from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
 
@@ -37,7 +38,7 @@ class Camera(Model):
     roll_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
     """By which it is turned about its axis, from its image's right towards down; what is mounted at it turns too
     [degrees]."""
-    lens: Lens = Lens()
+    lens: AnyLens = Lens()
     """What makes the lens more than a pinhole."""
     analyser_deg: float | None = None
     """Direction that an ideal polariser before the lens lets through, from the image's x to its y [degrees]."""

@@ -7,7 +7,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from scenes.materials.torrance_sparrow import FaceMaterial, Material
+from scenes.materials.brdf import Brdf
+from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.parts.solid import Solid
 
 
@@ -17,21 +18,21 @@ class Surfaces:
 
     Attributes
     ----------
-    materials : tuple of Material
+    materials : tuple of Brdf
         The different ones; the first is that of all faces that nothing else is said of, and of the obstacles.
     kinds : ndarray of int, shape (F,)
         For each face of object and obstacles which of them it is made of.
     """
 
-    materials: tuple[Material, ...]
+    materials: tuple[Brdf, ...]
     kinds: np.ndarray
 
-    def of(self, face: int) -> Material:
+    def of(self, face: int) -> Brdf:
         """The material of a face."""
         return self.materials[self.kinds[face]]
 
     @cached_property
-    def used(self) -> tuple[Material, ...]:
+    def used(self) -> tuple[Brdf, ...]:
         """The materials that any face is made of."""
         return tuple(self.materials[kind] for kind in np.unique(self.kinds))
 
@@ -42,7 +43,7 @@ class Surfaces:
 
 
 @lru_cache(maxsize=64)
-def surfaces(material: Material, materials: tuple[FaceMaterial, ...], measured: Solid, faces: int) -> Surfaces:
+def surfaces(material: Brdf, materials: tuple[AnyFaceMaterial, ...], measured: Solid, faces: int) -> Surfaces:
     """Of an object and obstacles of so many ``faces`` together.
 
     Raises

@@ -1,22 +1,20 @@
-"""What surfaces are made of."""
+"""The paper's reflectance (its eq. 1 and section 2): polarised Torrance-Sparrow."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator
 
-from scenes.model import Model, Name
+from scenes.materials.brdf import Brdf, Curves, Index
+from scenes.materials.kinds import MATERIALS
+from scenes.materials.vectors import NUMPY, Ops, Vector, cross, dot, unit
 from scenes.ranges import Fraction, Positive, rising
-from scenes.selection import OnFaces
-
-_UNPRICED = {
-    "measured": "a table of measured reflectance has no formula that planner and renderer could share",
-    "principled": "its lobe is another one than the paper's, which planner and renderer share",
-}
 
 
-class Material(Model):
+@MATERIALS.add("torrance_sparrow")
+class Material(Brdf):
     """Reflectance of the surface: the paper's Torrance-Sparrow model (its section 2).
 
     With n = 1 and k = 0 the Fresnel term vanishes and the surface is purely diffuse, reflecting (1 - s) R_d.
@@ -37,33 +35,163 @@ class Material(Model):
     index_table: tuple[tuple[Positive, Positive, Annotated[float, Field(ge=0, le=1e6)]], ...] = ()
     """n and k by wavelength, instead of the two: rows [nm, n, k] of rising wavelengths."""
 
-    @field_validator("kind", mode="before")
-    @classmethod
-    def _priced(cls, kind: Any) -> Any:
-        """What could be rendered but not predicted is refused, with the reason."""
-        if kind in _UNPRICED:
-            raise ValueError(f"kind must be 'torrance_sparrow', got {kind!r}: {_UNPRICED[kind]}")
-        return kind
-
     @field_validator("index_table")
     @classmethod
     def _in_order(cls, rows: tuple) -> tuple:
         return rising("material.index_table", rows)
 
     @property
-    def is_diffuse(self) -> bool:
-        """Whether the specular term is exactly zero."""
-        indices = [row[1:] for row in self.index_table] or [(self.refractive_index, self.extinction)]
-        return self.specular_fraction == 0 or all(index == (1, 0) for index in indices)
-
-
-class FaceMaterial(Material, OnFaces):
-    """What some faces of the object are made of, instead of `material`."""
-
-    name: Name
-    """For messages and tables."""
+    def lambertian(self) -> float:
+        """(1 - s) R_d."""
+        return (1 - self.specular_fraction) * self.diffuse_reflectance
 
     @property
-    def material(self) -> Material:
-        """The material itself."""
-        return Material(**{key: getattr(self, key) for key in Material.model_fields})
+    def dull(self) -> str | None:
+        """Why the specular term is exactly zero; None where it is not."""
+        if self.specular_fraction == 0:
+            return "specular_fraction is 0"
+        table = [row[1:] for row in self.index_table] or [(self.refractive_index, self.extinction)]
+        return "n = 1 and k = 0: no Fresnel reflection" if all(index == (1, 0) for index in table) else None
+
+    @property
+    def lobe_reflectance(self) -> float:
+        """s, as if every facet were a perfect mirror."""
+        return 0.0 if self.is_diffuse else self.specular_fraction
+
+    @property
+    def lobe_slope(self) -> float:
+        """m."""
+        return self.roughness
+
+    @property
+    def dispersion(self) -> tuple[tuple[float, float, float], ...]:
+        """The table of indices."""
+        return self.index_table
+
+    def lobe(
+        self,
+        index: tuple[Index, ...],
+        normal: Vector,
+        to_light: Vector,
+        to_sensor: Vector,
+        polarisation: Vector | None,
+        analyser: Vector | None,
+        ops: Ops,
+    ) -> Any:
+        """The specular term of eq. 1 times N.L."""
+        args = ops, self.roughness, index, normal, to_light, to_sensor, polarisation, analyser
+        return self.specular_fraction * _specular(*args)
+
+    def matt(self) -> Self:
+        """The same with n = 1 and k = 0."""
+        return self.tried(refractive_index=1.0, extinction=0.0, index_table=())
+
+    def indices(self, curves: Curves = ()) -> tuple[Index, ...]:
+        """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the table.
+
+        Shares add up to 1, so that the exposure keeps its meaning: the grey level of a white diffuse surface. One
+        without a table, for then nothing depends on the wavelength.
+        """
+        if not self.index_table:
+            return (Index(self.refractive_index, self.extinction, 1.0),)
+        wavelength, n, k = np.array(self.index_table).T
+        width = np.gradient(wavelength) if len(wavelength) > 2 else np.ones(len(wavelength))
+        width[[0, -1]] = np.diff(wavelength)[[0, -1]] / 2 if len(wavelength) > 2 else 1.0
+        share = width.copy()
+        for curve in curves:
+            if curve:
+                share *= np.interp(wavelength, *np.array(curve).T)
+        share /= share.sum()
+        return tuple(Index(*map(float, row)) for row in zip(n, k, share, strict=True))
+
+    def with_dispersion(self, rows: tuple[tuple[float, float, float], ...]) -> Self:
+        """The same with another table of indices."""
+        return self.model_copy(update={"index_table": rows})
+
+
+def fresnel(cosine, n: float, k: float, ops: Ops = NUMPY):
+    """Fresnel reflectance (parallel, perpendicular) and the real part of r_parallel times conjugate r_perpendicular.
+
+    The printed rho_parallel has sin^2 cos^2 in its numerator; it must be sin^2 tan^2 (textbook Fresnel), and here
+    numerators and denominators are multiplied by cos^2 so that grazing incidence stays finite. With q = (a - ib - t) /
+    (a - ib + t), t = sin psi tan psi, the amplitudes obey r_parallel = -q r_perpendicular.
+
+    Parameters
+    ----------
+    cosine : array
+        Cosine of the angle of incidence, 0 to 1.
+    n, k : float
+        Refractive index n - ik.
+
+    Examples
+    --------
+    >>> [round(float(r), 6) for r in fresnel(np.array(1.0), 1.5, 0.0)]
+    [0.04, 0.04, -0.04]
+    """
+    sine2 = (1 - cosine) * (1 + cosine)
+    excess = (n - 1) * (n + 1) - k * k  # a^2 - b^2 - cos^2; exactly 0 at n = 1, k = 0
+    c = excess + cosine * cosine
+    root = ops.sqrt((ops.sqrt(c * c + (2 * n * k) ** 2) + abs(c)) / 2)
+    other = n * k / ops.maximum(root, ops.tiny)
+    a, b = ops.select(c >= 0, root, other), ops.select(c >= 0, other, root)
+    total = a + cosine
+    near = ops.select(total > 0, (excess + b * b) / ops.maximum(total, ops.tiny), 0 * total)  # a - cos, no cancellation
+    size = total * total + b * b
+    perpendicular = ops.select(size > 0, (near * near + b * b) / ops.maximum(size, ops.tiny), 1 + 0 * size)
+    minus, plus, side = a * cosine - sine2, a * cosine + sine2, b * b * cosine * cosine
+    lower = plus * plus + side
+    share = ops.select(lower > 0, (minus * minus + side) / ops.maximum(lower, ops.tiny), 1 + 0 * lower)
+    coherent = ops.select(lower > 0, (minus * plus + side) / ops.maximum(lower, ops.tiny), -1 + 0 * lower)
+    return perpendicular * share, perpendicular, -perpendicular * coherent
+
+
+def beckmann(cosine, sine2, m: float, ops: Ops = NUMPY):
+    """Beckmann roughness distribution D, as printed: exp(-(tan / m)^2) / (m^2 cos^4), from cosine and squared sine."""
+    lit = cosine > 1e-9 * ops.flat  # below, D is 0 for every roughness
+    safe = ops.select(lit, cosine, 1 + 0 * cosine)
+    exponent = -sine2 / (m * safe) / (m * safe) - 4 * ops.log(safe) - 2 * ops.log(m + 0 * safe)
+    return ops.select(lit, ops.exp(exponent), 0 * cosine)
+
+
+def _specular(ops, roughness, index, normal, to_light, to_sensor, polarisation, analyser):
+    """N.L K rho with K = D G / (pi N.L N.V), the factor G / (N.V) kept finite at grazing view."""
+    nl, nv = dot(normal, to_light), dot(normal, to_sensor)
+    half = unit(ops, tuple(x + y for x, y in zip(to_light, to_sensor, strict=True)))
+    nh, vh = dot(normal, half), ops.minimum(ops.maximum(dot(to_sensor, half), ops.tiny), 1.0)
+    off = cross(normal, half)
+    above = ops.maximum(nv, ops.tiny)
+    masking = ops.minimum(1 / above, 2 * nh * ops.minimum(1.0, ops.maximum(nl, 0.0) / above) / vh)
+    facets = beckmann(nh, dot(off, off), roughness, ops)
+    return facets * masking / ops.pi * _mirrored(ops, index, vh, half, to_light, to_sensor, polarisation, analyser)
+
+
+def _mirrored(ops, index, cosine, half, to_light, to_sensor, polarisation, analyser):
+    """Fraction of the light that a facet of normal ``half`` sends through the analyser, averaged over the bands."""
+    if polarisation is not None or analyser is not None:
+        s = _plane(ops, half, to_light, to_sensor)
+        p_in, p_out = cross(s, to_light), cross(to_sensor, s)
+        es, ep = (None, None) if polarisation is None else (dot(polarisation, s), dot(polarisation, p_in))
+        ts, tp = (None, None) if analyser is None else (dot(analyser, s), dot(analyser, p_out))
+    total = 0.0
+    for n, k, share in index:
+        parallel, perpendicular, coherent = fresnel(cosine, n, k, ops)
+        if polarisation is None and analyser is None:
+            passed = (parallel + perpendicular) / 2
+        elif analyser is None:
+            passed = parallel * ep * ep + perpendicular * es * es
+        elif polarisation is None:
+            passed = (parallel * tp * tp + perpendicular * ts * ts) / 2
+        else:
+            passed = parallel * (ep * tp) ** 2 + perpendicular * (es * ts) ** 2 + 2 * coherent * es * ep * ts * tp
+        total = total + share * passed
+    return total
+
+
+def _plane(ops, half, to_light, to_sensor) -> Vector:
+    """Unit normal of the plane of L and V; any direction across ``half`` where they coincide."""
+    plane = cross(to_light, to_sensor)
+    flat = dot(plane, plane) < ops.flat
+    steep = abs(half[0]) > 0.7
+    zero, one = 0.0 * half[2], 1.0 + 0.0 * half[2]
+    spare = cross(half, (ops.select(steep, zero, one), ops.select(steep, one, zero), zero))
+    return unit(ops, tuple(ops.select(flat, x, y) for x, y in zip(spare, plane, strict=True)))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from imaging import pictures
-from imaging.light.reflectance import beckmann
 from measure.features.lines import Lines
+from scenes.materials.torrance_sparrow import beckmann
 from validation.hard import Answer, Case, Reference, fit_cases, planner_cases, precise, run
 from validation.hard.case import EPSILON
 from validation.hard.scenes_for import task1

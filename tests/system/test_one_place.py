@@ -8,8 +8,8 @@ import planner
 import render
 import scenes
 from imaging import pictures, sensor
-from imaging.light import reflectance
 from scenes import Lens, Picture
+from scenes.materials import torrance_sparrow
 
 pytestmark = pytest.mark.render
 SENSOR, LIGHT = (30, 135), (15, 315)
@@ -47,7 +47,7 @@ def test_fresnel(monkeypatch):
     noise = metal.noise.model_copy(update={"bits": None})
     metal = metal.model_copy(update={"noise": noise})
     before = contrasts(metal)
-    monkeypatch.setattr(reflectance, "_mirrored", _halved(reflectance._mirrored))
+    monkeypatch.setattr(torrance_sparrow, "_mirrored", _halved(torrance_sparrow._mirrored))
     _forget()
     after = contrasts(metal)
     planned, measured = (now / then for now, then in zip(after, before, strict=True))

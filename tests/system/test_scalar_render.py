@@ -12,7 +12,6 @@ import measure
 import render
 import scenes
 from imaging.light.irradiance import bands
-from imaging.light.reflectance import reflected
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
 from render import build, mosaic, variant
@@ -40,7 +39,7 @@ def loaded(name):
 def exact(name, index):
     """Image of a bundled scene's setting without the renderer."""
     scene, setting = loaded(name), loaded(name).settings[index]
-    gloss = None if scene.material.is_diffuse else partial(reflected, scene.material, bands(scene))
+    gloss = None if scene.material.is_diffuse else partial(scene.material.reflected, bands(scene))
     return block_image(scene, tuple(setting.sensor), tuple(setting.light), gloss)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from imaging.light.irradiance import bands
-from imaging.light.reflectance import reflected
 from render import bsdf, variant
 from render.lights import lamps
 from render.parts import Part
@@ -48,7 +47,7 @@ def test_bsdf_is_the_papers_reflectance(name, material):
 
 
 def seen(material, light, sensor, polarisation=None, analyser=None):
-    return float(reflected(material, plain(material), ray(0), light, sensor, polarisation, analyser))
+    return float(material.reflected(plain(material), ray(0), light, sensor, polarisation, analyser))
 
 
 def test_polarisation_in_the_plane_of_incidence():

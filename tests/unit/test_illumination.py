@@ -7,9 +7,10 @@ import planner
 import scenes
 from imaging.light.appearance import is_separable, signal
 from imaging.light.irradiance import bands, electric_field
-from imaging.light.reflectance import Index, beckmann, fresnel, reflected
 from imaging.pictures import Pictures
 from scenes import Material
+from scenes.materials.brdf import Index
+from scenes.materials.torrance_sparrow import beckmann, fresnel
 from tests import textbook
 from tests.textbook import mp
 from tests.unit.test_reflectance import plain, textbook_fresnel, unit
@@ -61,7 +62,7 @@ def test_attenuation_to_1e_12(rng):
         light, view = (unit(s * np.cos(a), s * np.sin(a), c) for c, s, a in zip(cosines, sines, turn, strict=True))
         exact = textbook.brightness(mirror, (0, 0, 1), light, view)
         steep = 1 / (light + view)[2] ** 2 * ((light + view) ** 2).sum()  # a rounding of D's exponent counts for more
-        ours = reflected(mirror, plain(mirror), unit(0, 0, 1), light, view)
+        ours = mirror.reflected(plain(mirror), unit(0, 0, 1), light, view)
         assert agrees(ours, exact, relative=1e-12 * max(steep, 1), absolute=1e-300), (light, view)
 
 
@@ -73,18 +74,18 @@ def test_share_of_polarised_light():
     within = np.cross(across, light)
     angle = mp.acos(textbook.dot(textbook.exact(light), textbook.unit(textbook.exact(light + view))))
     parallel, perpendicular = textbook_fresnel(angle, 1.5, 0.3)
-    plain_value = reflected(mirror, plain(mirror), normal, light, view)
+    plain_value = mirror.reflected(plain(mirror), normal, light, view)
     whole = plain_value / ((parallel + perpendicular) / 2)
 
     def share(field):
-        return (reflected(mirror, plain(mirror), normal, light, view, field) / whole - parallel) / (
+        return (mirror.reflected(plain(mirror), normal, light, view, field) / whole - parallel) / (
             perpendicular - parallel
         )
 
     assert share(across) == pytest.approx(1, abs=1e-13)
     assert share(within) == pytest.approx(0, abs=1e-13)
     assert share(across + within) == pytest.approx(0.5)
-    back = [float(reflected(mirror, plain(mirror), normal, light, light, field)) for field in (across, within, None)]
+    back = [float(mirror.reflected(plain(mirror), normal, light, light, field)) for field in (across, within, None)]
     assert back == pytest.approx([back[2]] * 3)  # light = view direction: no plane of incidence
 
 
@@ -94,8 +95,8 @@ def test_polarised_level_against_the_textbook(angle):
     glass = Material(specular_fraction=1.0, refractive_index=1.5, roughness=0.1)
     at = 100 * unit(np.sin(0.9), 0, np.cos(0.9))
     light, view, normal = unit(*at), unit(-np.sin(0.9), 0, np.cos(0.9)), unit(0, 0, 1)
-    polarised = reflected(glass, plain(glass), normal, light, view, electric_field(at, angle))
-    unpolarised = reflected(glass, plain(glass), normal, light, view)
+    polarised = glass.reflected(plain(glass), normal, light, view, electric_field(at, angle))
+    unpolarised = glass.reflected(plain(glass), normal, light, view)
     parallel, perpendicular = textbook_fresnel(mp.mpf(0.9), 1.5, 0)
     share = np.sin(np.radians(angle)) ** 2  # at 0 the field lies in the vertical plane, which is the plane of incidence
     expected = (parallel * (1 - share) + perpendicular * share) / ((parallel + perpendicular) / 2)
@@ -131,7 +132,7 @@ def test_spectral_sum(metal):
     points = np.array([[6.0, 3.0, 2.5]])
     to_light, to_sensor = (at - points[0] for at in (pictures.lights_at[0], pictures.sensor_at))
     parts = [
-        reflected(metal.material, (Index(*row[1:]),), unit(0, 0, 1), unit(*to_light), unit(*to_sensor)) for row in TABLE
+        metal.material.reflected((Index(*row[1:]),), unit(0, 0, 1), unit(*to_light), unit(*to_sensor)) for row in TABLE
     ]
     near = metal.camera.exposure * 100**2 / (to_light @ to_light)
     together = signal(pictures, points, np.array([0.0, 0, 1]), 1)

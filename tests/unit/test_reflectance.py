@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from imaging.light import reflectance as module
-from imaging.light.reflectance import NUMPY, Index, Ops, across, beckmann, brightness, diffuse, fresnel, reflected
 from scenes import Material
+from scenes.materials import torrance_sparrow as module
+from scenes.materials.brdf import Index
+from scenes.materials.torrance_sparrow import beckmann, fresnel
+from scenes.materials.vectors import NUMPY, Ops, across
 from tests import textbook
 from tests.textbook import mp
 
@@ -105,10 +107,10 @@ def test_beckmann_conserves_area():
 def test_diffuse_is_cosine_and_zero_behind():
     material = Material(specular_fraction=0.1, diffuse_reflectance=0.8)
     up, light = unit(0, 0, 1), unit(1, 0, 1)
-    assert reflected(material, plain(material), up, light, unit(0, 1, 2)) == pytest.approx(0.9 * 0.8 * np.sqrt(0.5))
-    assert reflected(material, plain(material), up, -light, up) == 0
-    assert reflected(material, plain(material), up, light, -up) == 0
-    assert diffuse(material, analysed=True) == pytest.approx(0.9 * 0.4)
+    assert material.reflected(plain(material), up, light, unit(0, 1, 2)) == pytest.approx(0.9 * 0.8 * np.sqrt(0.5))
+    assert material.reflected(plain(material), up, -light, up) == 0
+    assert material.reflected(plain(material), up, light, -up) == 0
+    assert material.diffuse(True) == pytest.approx(0.9 * 0.4)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +132,7 @@ def test_specular_against_the_printed_formula(towards_light, towards_sensor, sma
     k = d * branches[smallest] / (np.pi * nl * nv)
     parallel, perpendicular = textbook_fresnel(mp.acos(float(vh)), 1.8, 2.0)
     expected = nl * (0.5 * (0.4 * k * parallel + 0.6 * 0.7) + 0.5 * (0.4 * k * perpendicular + 0.6 * 0.7))
-    assert reflected(METAL, plain(METAL), n, light, view) == pytest.approx(expected, rel=1e-12)
+    assert METAL.reflected(plain(METAL), n, light, view) == pytest.approx(expected, rel=1e-12)
 
 
 def test_attenuation_is_one_face_on_and_falls_at_grazing_view():
@@ -142,15 +144,15 @@ def test_attenuation_is_one_face_on_and_falls_at_grazing_view():
         nh, nv, vh = half[2], view[2], view @ half
         share = float(textbook.reflected_share(1.5, 0.0, textbook.exact(light), textbook.exact(view)))
         rest = float(textbook.beckmann(mp.mpf(nh), 0.4)) / (np.pi * nv) * share
-        found = float(reflected(mirror, plain(mirror), light, light, view)) / rest
+        found = float(mirror.reflected(plain(mirror), light, light, view)) / rest
         assert found == pytest.approx(1.0 if polar <= 20 else 2 * nh * nv / vh, rel=1e-9)
 
 
 def test_specular_stays_finite_at_grazing_view():
     material = Material(specular_fraction=1.0, refractive_index=1.5, roughness=0.2)
     n = unit(0, 0, 1)
-    values = reflected(
-        material, plain(material), n, unit(1, 0, 0.2),
+    values = material.reflected(
+        plain(material), n, unit(1, 0, 0.2),
         np.array([[-np.sqrt(1 - c * c), 0, c] for c in (1e-3, 1e-6, 1e-12)]),
     )  # fmt: skip
     assert np.isfinite(values).all()
@@ -165,13 +167,13 @@ def test_numpy_mpmath_and_the_textbook_agree(rng, polarised, analysed):
         material, (normal, light, view) = random_material(rng), random_rays(rng)
         field = across_ray(light, rng) if polarised else None
         analyser = across_ray(view, rng) if analysed else None
-        ours = float(reflected(material, plain(material), normal, light, view, field, analyser))
+        ours = float(material.reflected(plain(material), normal, light, view, field, analyser))
         exact_rays = [textbook.unit(textbook.exact(v)) for v in (normal, light, view)]
         axes = [
             None if axis is None else across(textbook.exact(axis), ray, MP)
             for axis, ray in ((field, exact_rays[1]), (analyser, exact_rays[2]))
         ]
-        precise = brightness(material, plain(material), *exact_rays, *axes, ops=MP)
+        precise = material.brightness(plain(material), *exact_rays, *axes, ops=MP)
         assert abs(ours / precise - 1) < 1e-12, (material, normal, light, view)
         crossed = [
             None if axis is None else textbook.cross(ray, textbook.cross(textbook.exact(axis), ray))
@@ -189,7 +191,7 @@ def test_the_comparison_tells_a_wrong_formula(monkeypatch):
 
     def off(**changes):
         axes = [tuple(changes.get("field", field)), tuple(analyser)]
-        value = reflected(METAL, plain(METAL), normal, light, view, *map(np.array, axes))
+        value = METAL.reflected(plain(METAL), normal, light, view, *map(np.array, axes))
         return abs(float(value) / exact - 1)
 
     assert off() < 1e-12
@@ -208,8 +210,8 @@ def test_numpy_takes_tuples_and_arrays_alike(rng):
     up = (np.zeros(500), np.zeros(500), np.ones(500))
     for material in (METAL, GLASS):
         with np.errstate(all="ignore"):
-            ours = brightness(material, plain(material), up, tuple(light.T), tuple(sensor.T), ops=NUMPY)
-        assert (ours == reflected(material, plain(material), np.array([0, 0, 1.0]), light, sensor)).all()
+            ours = material.brightness(plain(material), up, tuple(light.T), tuple(sensor.T), ops=NUMPY)
+        assert (ours == material.reflected(plain(material), np.array([0, 0, 1.0]), light, sensor)).all()
 
 
 def test_no_facet_is_turned_away():

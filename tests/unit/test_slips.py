@@ -24,7 +24,6 @@ from imaging.geometry.projection import direction, edge_points
 from imaging.light.appearance import edge_contrast, side_signals
 from imaging.light.emitters import emitters
 from imaging.light.exchange import exchanged
-from imaging.light.reflectance import diffuse
 from imaging.pictures import Pictures
 from measure.boards.fitting import fit_crossings
 from measure.boards.saddle import response
@@ -112,7 +111,7 @@ def test_each_face_lends_light_by_its_own_reflectance():
     def from_the_light(scene):
         found = exchanged(scene, shining, ())
         sheets, between = found.exchange.sheets, found.exchange.between
-        white = np.concatenate([np.full(len(s.patches), diffuse(scene.surfaces.of(s.face))) for s in sheets])
+        white = np.concatenate([np.full(len(s.patches), scene.surfaces.of(s.face).diffuse()) for s in sheets])
         arriving = np.array([sum(f * sent for f, sent in zip(row, found.sent, strict=True)) for row in between])
         return found.sent / white - arriving, arriving
 

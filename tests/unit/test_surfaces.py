@@ -36,7 +36,6 @@ def with_materials(scene, *materials, **default):
         ("where = { normal = [1, 1, 0] }", r"materials\[0\]\.where must hold a face of the object, got none"),
         ("where = { box = [[0, 0, 0], [0, 1, 1]] }", r"materials\[0\]\.where\.box must be of rising corners, got"),
         ("faces = ['top']\nroughness = -1", r"materials\[0\]\.roughness must be at least 1e-06, got -1"),
-        ("faces = ['top']\nkind = 'measured'", r"kind: kind must be 'torrance_sparrow', got 'measured'"),
         ("faces = ['top']\nkind = 'wood'", r"materials\[0\]\.kind must be one of 'torrance_sparrow', got 'wood'"),
         (
             "where = 'top'\n[[materials]]\nname = 'b'\nfaces = ['left', 'top']",

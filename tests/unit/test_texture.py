@@ -5,10 +5,10 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 import scenes
-from imaging.light.reflectance import Index, reflected
 from render import texture
 from render.build import textured
 from scenes import Material, Picture, Pose
+from scenes.materials.brdf import Index
 
 LOBE = frozenset({"specular_lobe"})
 SETTINGS = [((30, 135), (15, 315)), ((45, 225), (45, 105)), ((75, 20), (70, 80))]
@@ -36,7 +36,7 @@ def misses(scene, sensor, light, face, values, rng):
     away = [scene.position(role, Pose(*pose)) - points for role, pose in (("light", light), ("sensor", sensor))]
     beams = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in away]
     index = (Index(scene.material.refractive_index, scene.material.extinction),)
-    exact = reflected(scene.material, index, normal, *beams) / (normal * beams[0]).sum(1)
+    exact = scene.material.reflected(index, normal, *beams) / (normal * beams[0]).sum(1)
     size = np.array(values.shape[::-1]) - 1
     return (map_coordinates(values, (places * size).T[::-1], order=1) - exact) / exact.max()
 

@@ -32,7 +32,7 @@ def paper_in(kind: type, scene: Scene, sensors: np.ndarray, lights: np.ndarray) 
     lamp = kind(scene.lights[0].distance) * _frame(lights.astype(kind))[0]
     eye_height = kind(scene.camera.distance) * eye @ normals.T - offsets
     light_height = np.maximum(lamp @ normals.T - offsets, 0)
-    albedo = (1 - scene.material.specular_fraction) * scene.material.diffuse_reflectance
+    albedo = scene.material.lambertian
     edge_on = 8 * np.finfo(kind).eps * scene.camera.distance
     level = np.where(eye_height > edge_on, light_height, 0) * kind(scene.camera.exposure * albedo)
 

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from imaging.light.reflectance import Index, reflected
 from scenes import Material
 from validation.hard.case import Answer, Case, Reference
 
@@ -43,8 +42,8 @@ def _vector(angle: float) -> np.ndarray:
 
 
 def _ours(material: Material, to_light: np.ndarray, to_sensor: np.ndarray) -> Answer:
-    index = (Index(material.refractive_index, material.extinction),)
-    return Answer.of(float(reflected(material, index, _NORMAL, to_light, to_sensor)))
+    index = material.indices()
+    return Answer.of(float(material.reflected(index, _NORMAL, to_light, to_sensor)))
 
 
 def _reference(material: Material, to_light: np.ndarray, to_sensor: np.ndarray) -> Reference:

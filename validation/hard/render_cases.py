@@ -61,7 +61,7 @@ def _level(name: str, scene: Scene, light) -> Case:
          np.sin(np.radians(light[0])) * np.sin(np.radians(light[1])), np.cos(np.radians(light[0]))]
     ) - middle  # fmt: skip
     size = np.linalg.norm(away)
-    white = scene.camera.exposure * (1 - scene.material.specular_fraction) * scene.material.diffuse_reflectance
+    white = scene.camera.exposure * scene.material.lambertian
     exact = white * away[2] / size * (scene.lights[0].distance / size) ** 2
     x, y = np.rint(project(middle[None], np.array([0.0, 0.0]), scene.camera)[0]).astype(int)
 

@@ -9,7 +9,7 @@ import planner
 import scenes
 from measure.bounds import image_bound
 from tests.boards import SMALL, poses
-from tests.photographs import MADE, board, ellipse, rectangle, tag, turned
+from tests.photographs import MADE, ellipse, rectangle, tag, turned
 from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
 from tests.regression.stored import CLOSED, SEARCHED
 from validation.report import camera_table
@@ -124,7 +124,6 @@ def cases():
         found[f"photograph {name}"] = SEARCHED, partial(_photographed, name)
     return found | {
         "photograph tag": (SEARCHED, lambda: measure.photograph(tag("4X4_50", 7, 1), most=2)),
-        "photograph board": (SEARCHED, lambda: measure.photograph(board(), kinds=("chessboard",), most=1)),
         "sharpness": (SEARCHED, _sharpness), "lens": (SEARCHED, _lens), "noise curve": (SEARCHED, _noise),
         "photograph hole": (SEARCHED, _round_hole),
         "boards": (SEARCHED, _boards), "conics": (CLOSED, _conics), "fit": (SEARCHED, _fitted),

@@ -8,8 +8,8 @@ import render
 import scenes
 from imaging import sensor
 from imaging.geometry import lens, projection, visibility
-from imaging.light import reflectance
 from scenes.changes import changed
+from scenes.materials import torrance_sparrow
 from scenes.parts.block import Block
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Torus
 from scenes.parts.turned import Turned
@@ -70,9 +70,9 @@ def _scene(name):
 def _reflected(name):
     material, cosines = load(name).material, np.linspace(0.13, 0.97, 7)
     return {
-        "fresnel": reflectance.fresnel(cosines, 1.51, 0.0), "metal": reflectance.fresnel(cosines, 0.27, 2.9),
-        "beckmann": reflectance.beckmann(cosines, 1 - cosines**2, 0.31),
-        "diffuse": [reflectance.diffuse(material, analysed) for analysed in (False, True)],
+        "fresnel": torrance_sparrow.fresnel(cosines, 1.51, 0.0), "metal": torrance_sparrow.fresnel(cosines, 0.27, 2.9),
+        "beckmann": torrance_sparrow.beckmann(cosines, 1 - cosines**2, 0.31),
+        "diffuse": [material.diffuse(analysed) for analysed in (False, True)],
     }  # fmt: skip
 
 

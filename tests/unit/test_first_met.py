@@ -1,0 +1,76 @@
+"""What a ray meets first, named by Embree, against every triangle tried in double precision."""
+
+import numpy as np
+import pytest
+
+import scenes
+from imaging.geometry import rays
+from imaging.geometry.rays import by_embree, by_trial, first_face
+from scenes.parts.solid import block
+
+pytestmark = pytest.mark.skipif(rays.rtcore_scene is None, reason="Embree has no wheel here")
+BODIES = "bracket", "bracket_mm", "plate", "flange", "shaft", "ball", "grey_floor"
+
+
+def directed(body, rng, count):
+    """Rays from near and far at about the body, of any length."""
+    size, middle = np.ptp(body.vertices, 0).max(), body.vertices.mean(0)
+    away = rng.standard_normal((count, 3))
+    origins = middle + away * (rng.uniform(0.2, 50, count) * size / np.linalg.norm(away, axis=1))[:, None]
+    vectors = middle + 0.3 * size * rng.standard_normal((count, 3)) - origins
+    return origins, vectors * 10.0 ** rng.uniform(-3, 3, (count, 1))
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_embree_names_what_trial_finds(name):
+    """With faces left out, too, behind which rays run on within the body and meet what turns to them."""
+    body, rng = scenes.load(name).bodies, np.random.default_rng(7)
+    origins, vectors = directed(body, rng, 3000)
+    for own in ((), tuple(rng.choice(len(body.faces), 3, replace=False).tolist())):
+        asked = rays._plates(body), origins, vectors, own
+        (face, t), (expected, at) = by_embree(*asked), by_trial(*asked)
+        assert (face != expected).sum() <= 1  # margin: none is measured; a ray may pass an edge within 1e-7 of the size
+        same = (face == expected) & (face >= 0)
+        assert 0.05 < same.mean() < 0.95
+        assert t[same] == pytest.approx(at[same], rel=1e-9)
+        assert np.isinf(t[face < 0]).all()
+
+
+def test_what_a_ray_begins_on_or_within_is_not_met():
+    """From a face outward and inward, along it, from inside the body; and rays that lead nowhere."""
+    body = block((1.0, 2.0, 3.0))
+    top = body.face_names.index("top")
+    origins = np.array([[0.5, 1, 3], [0.5, 1, 3], [0.5, 1, 3], [0.5, 1, 1.5], [0.5, 1, 9], [0.5, 1, 9], [np.nan, 1, 9]])
+    vectors = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, 0, 1], [0, 0, -1], [0, 0, 0], [0, 0, -1.0]])
+    face, t = first_face(body, origins, vectors, ())
+    assert face.tolist() == [-1, -1, -1, -1, top, -1, -1]
+    assert t[4] == pytest.approx(6.0, rel=1e-12)
+    without, _ = first_face(body, origins, vectors, (top,))
+    assert without.tolist() == [-1] * 7
+
+
+def test_nothing_is_met_of_no_triangles_and_by_no_rays():
+    body = block((1.0, 2.0, 3.0))
+    face, t = first_face(body, np.array([[0.5, 1, 9.0]]), np.array([[0, 0, -1.0]]), tuple(range(6)))
+    assert (face.tolist(), t.tolist()) == ([-1], [np.inf])
+    face, t = first_face(body, np.empty((2, 0, 3)), np.empty((2, 0, 3)), ())
+    assert face.shape == t.shape == (2, 0)
+
+
+def test_a_far_and_a_small_body_are_met_as_near_and_large_ones():
+    """Single precision is that of the body: a millionth of its size, a thousand sizes off, is still told."""
+    body = block((1.0, 2.0, 3.0))
+    below, above = (np.array([1 + off, 1.0, -1.0]) for off in (-3e-6, 3e-6))  # beside the right face
+    way = np.array([0.0, 0.0, 1.0])
+    for far in (1.0, 1000.0):
+        face, t = first_face(body, np.array([below, above]) - far * way, np.tile(way, (2, 1)), ())
+        assert face.tolist() == [body.face_names.index("bottom"), -1]
+        assert t[0] == pytest.approx(1 + far, rel=1e-12)
+
+
+def test_without_embree_every_triangle_is_tried(monkeypatch):
+    body, rng = scenes.load("bracket").bodies, np.random.default_rng(1)
+    origins, vectors = directed(body, rng, 200)
+    expected = first_face(body, origins, vectors, ())
+    monkeypatch.setattr(rays, "rtcore_scene", None)
+    assert np.array_equal(first_face(body, origins, vectors, ())[0], expected[0])
