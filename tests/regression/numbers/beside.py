@@ -356,7 +356,8 @@ def _rough_sides():
         image[y - size // 2 : y + size // 2, x - size // 2 : x + size] += 30.0 * (-1) ** size
     image += rng.normal(0, 1.2, image.shape)
     return {"found": measure.find(image, ("quadrilateral",)), "refined": profiles.refined(image, _SQUARE + 0.6),
-            "sigma": profiles.edge_sigma(image, _SQUARE), "bent": adaptive.bent(image, 0.05), "diagonal": adaptive.bent(
+            "sigma": round(profiles.edge_sigma(image, _SQUARE), 3), "bent": adaptive.bent(image, 0.05),
+            "diagonal": adaptive.bent(
                 np.maximum(np.add.outer(2.0 * np.arange(9), np.arange(11.0)) - 11, 0.3 * np.arange(11.0)), 0.03),
             "flat": [adaptive.bent(image[:1], 0.05), adaptive.bent(image[:, :1], 0.05)]}  # fmt: skip
 

@@ -131,8 +131,8 @@ def _backlit():
 
 def _analysed(angle):
     scene = load("backlight_plate")
-    lights = tuple(each.model_copy(update={"polarisation_deg": angle}) for each in scene.lights)
-    changed = scene.model_copy(update={"light": lights[0]} if len(lights) == 1 else {"several_lights": lights})
+    polarised = [each.model_copy(update={"polarisation_deg": angle}) for each in scene.lights]
+    changed = scene.model_copy(update={"light": None, "several_lights": tuple(polarised)})
     pictures = Pictures.of(Picture.of(changed, *uneven(changed)))
     analyser = np.array([0.6, 0.48, 0.64])
     return [backlight.passed(pictures, i, each) for i in backlight.backlights(changed) for each in (None, analyser)]
