@@ -155,7 +155,7 @@ class Seen:
         screen = np.stack([axes.right, axes.down], -2)
         at = self.camera.focal_px * np.einsum("...ki,...i->...k", screen, away) / z
         slope = (self.camera.focal_px * screen - at[..., None] * axes.forward[..., None, :]) / z[..., None]
-        return Point(at, {k: slope @ move for k, move in point.moves.items()})
+        return Point(at, {k: np.einsum("...ij,...j->...i", slope, move) for k, move in point.moves.items()})
 
     def _corner_moves(self, corner: Corner) -> Moves:
         """A corner moves by N^-1 (d1, d2), the rows of N being the two normals, d at the corner's own place."""

@@ -32,6 +32,12 @@ EQUIVALENT: dict[str, str] = {
         "a pixel more around what is read",
     "imaging/blurred/arrangement.py: _SQUARE = np.cos(np.pi * np.arange( 10) / 8)  "
     "# places that tell a polynomial of degree 4 well": "a place more of an exact polynomial, the last but one again",
+    "planner/budgeting/plans.py: best: list[tuple[float, int, int]] = [(np.inf, -1, 0)] * 2":
+        "numbers of no pair, before one is found: without one it is refused",
+    "imaging/features/rim_outline.py: many = min(1, _AT_ONCE // (len(ends) * beside.shape[1]))":
+        "how many at a time changes no result",
+    "planner/search/refinement.py: return float(minimised(errors, objective)[0]), bool(cut_off(errors, scene)[-1])":
+        "of one setting: the first is the last",
 }  # fmt: skip
 
 # by operator and what the mutated line holds

@@ -235,11 +235,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", nargs="+", default=[""], help="What the files' names begin with, such as measure/.")
     parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
     parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
     parser.add_argument("--first", action="store_true", help="Only tests that call it: what survives is for --again.")
     asked = parser.parse_args()
-    every, began = mutants(), time.perf_counter()
+    every, began = [m for m in mutants() if m.file.startswith(tuple(asked.only))], time.perf_counter()
     asked.log.parent.mkdir(parents=True, exist_ok=True)
     asked_first = [*sorted((ROOT / UNIT).glob("test_*.py")), *(ROOT / name for name in STORED)]
     tests = reached(asked.log.with_name("reach.jsonl"), asked_first)

@@ -67,10 +67,16 @@ def _noise():
     return measure.noise_curve(np.clip(np.rint(ramp + noise), 0, 255))
 
 
-def _boards():
+@cache
+def boards():
+    """Three chessboards, measured in noise."""
     rng = np.random.default_rng(11)
     images = [SMALL.image(pose) + rng.normal(0, 1.0, (240, 320)) for pose in poses(SMALL, 3, rng, 600.0)]
-    found = [measure.chessboard(image, SMALL.board) for image in images]
+    return [measure.chessboard(image, SMALL.board) for image in images]
+
+
+def _boards():
+    found = boards()
     camera = measure.calibrate_camera(found, SMALL.square, (240, 320), "k1,k2", 0.01)
     return {"boards": found, "camera": camera, "summary": camera_table.summary(camera).splitlines(),
             "covariance": camera_table.covariance_file(camera).splitlines(),
