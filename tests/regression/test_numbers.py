@@ -9,13 +9,24 @@ from pathlib import Path
 
 import pytest
 
-from tests.regression.numbers import checking, inside, measuring, parts, planning, working
+from tests.regression.numbers import (
+    checking,
+    exploring,
+    files,
+    inside,
+    measuring,
+    parts,
+    planning,
+    reporting,
+    running,
+    working,
+)  # fmt: skip
 from tests.regression.stored import differences, read, told, write
 
 pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
-_ABOUT = planning, parts, measuring, checking, working, inside
+_ABOUT = planning, parts, measuring, checking, working, inside, files, reporting, exploring, running
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
 
