@@ -238,8 +238,9 @@ def main() -> None:
     parser.add_argument("--log", type=Path, default=Path("runs/mutants.jsonl"), help="What it knows is not done again.")
     parser.add_argument("--again", action="store_true", help="... but for what was not killed.")
     parser.add_argument("--first", action="store_true", help="Only tests that call it: what survives is for --again.")
+    parser.add_argument("--within", nargs="*", default=SOURCES, help="Packages or files that are mutated, not all.")
     asked = parser.parse_args()
-    every, began = mutants(), time.perf_counter()
+    every, began = [each for each in mutants() if each.file.startswith(tuple(asked.within))], time.perf_counter()
     asked.log.parent.mkdir(parents=True, exist_ok=True)
     asked_first = [*sorted((ROOT / UNIT).glob("test_*.py")), *(ROOT / name for name in STORED)]
     tests = reached(asked.log.with_name("reach.jsonl"), asked_first)

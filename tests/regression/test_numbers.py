@@ -17,6 +17,7 @@ from tests.regression.numbers import (
     measuring,
     parts,
     planning,
+    refusing,
     reporting,
     running,
     working,
@@ -26,7 +27,7 @@ from tests.regression.stored import differences, read, told, write
 pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
-_ABOUT = planning, parts, measuring, checking, working, inside, files, reporting, exploring, running
+_ABOUT = planning, parts, measuring, checking, working, inside, files, reporting, exploring, running, refusing
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
 
