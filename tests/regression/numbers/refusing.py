@@ -178,7 +178,8 @@ def _made(path, document):
 
 
 _CAMPAIGNS = {
-    "grid": 'scenes = ["task1", "plate"]\n[grid]\nsensor_polar = [20, 31]\nsensor_azimuth = {from = 10, to = 30, step = 7}\n'
+    "grid": 'scenes = ["task1", "plate"]\n[grid]\nsensor_polar = [20, 31]\n'
+    "sensor_azimuth = {from = 10, to = 30, step = 7}\n"
     "light_polar = [24]\n"
     "light_azimuth = {from = 200, to = 260, count = 3}",
     "sweep": 'scenes = ["task1"]\n[sweep]\nnoise.sigma = {from = 1, to = 3, count = 3}\ncamera.blur_px = [0.5, 0.7]',
