@@ -12,6 +12,8 @@ import pytest
 from tests.regression.numbers import (
     beside,
     checking,
+    exploring,
+    files,
     holes,
     inside,
     measuring,
@@ -19,14 +21,20 @@ from tests.regression.numbers import (
     photographed,
     planning,
     rare,
+    refusing,
+    reporting,
+    running,
     working,
-)
+)  # fmt: skip
 from tests.regression.stored import differences, read, told, write
 
 pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
-_ABOUT = planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside
+_ABOUT = (
+    planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside, files, reporting, exploring,
+    running, refusing,
+)  # fmt: skip
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
 

@@ -50,14 +50,15 @@ def shown(draw):
     found = []
 
     def keep(figure, *_, **__):
-        found.append([_axis(axis) for axis in figure.axes] + [[text.get_text() for text in figure.texts]])
+        found.append([axis(each) for each in figure.axes] + [[text.get_text() for text in figure.texts]])
 
     with mock.patch.object(Figure, "savefig", keep), tempfile.TemporaryDirectory() as folder:
         draw(Path(folder) / "figure.png")
     return found
 
 
-def _axis(axis):
+def axis(axis):
+    """What one has."""
     texts = (axis.title, axis.xaxis.label, axis.yaxis.label, *axis.texts)
     return {
         "lines": [line.get_xydata() for line in axis.lines],
@@ -80,13 +81,16 @@ def _views():
     return planner.plan_views(small("calibrated_rig", 2.0), 2, step_deg=45.0, refined=False)
 
 
-def _varied():
+@cache
+def lamps():
+    """A plan of poses and lamps."""
     scene = small("copper", 2.0)
     return planner.plan(scene, vary=("band",), sensor=(31.3, 137.1), light=(17.1, 311.3), refined=False)
 
 
 @cache
-def _fit():
+def fit():
+    """A fit to one photograph, and the photograph."""
     scene = small("calibrated_rig", 2.0)
     sensor, light = uneven(scene)
     clean = planner.image(scene, sensor, light)
@@ -94,15 +98,16 @@ def _fit():
     return measure.fit(scene, [image], sensor, light), image
 
 
-def _campaign():
+def campaign():
+    """Four settings of a small block."""
     scene = small("task1", 2.0)
     return Campaign.of(scene.model_copy(update={"settings": scene.settings[5:9]}))
 
 
 def _cost(name):
     """One parameter, without its seconds."""
-    campaign, variant = _campaign(), render.variant.choose()
-    cases = spread_cases(campaign, 2)
+    known, variant = campaign(), render.variant.choose()
+    cases = spread_cases(known, 2)
     if name in ("images", "estimators"):
         images = [render.image(c.scene, c.setting.sensor, c.setting.light, _QUICK, variant) for c in cases]
     watch = Watch(0.0)
@@ -111,7 +116,8 @@ def _cost(name):
         "rays": lambda: rays.rays_parameter(cases[:1], variant, watch),
         "images": lambda: sampling.images_parameter(cases[0], images[0], 3, watch),
         "estimators": lambda: locators.estimators_parameter(cases, images, 3, watch),
-        "scaling": lambda: scaling.scaling_parameter(_model()), "pareto": lambda: pareto.pareto_parameter(_model()),
+        "scaling": lambda: scaling.scaling_parameter(cost_model()),
+        "pareto": lambda: pareto.pareto_parameter(cost_model()),
     }[name]()  # fmt: skip
     told = [name in ("scaling", "pareto") or not _is_time(column) for column in made.columns]
     rows = [[value for value, is_told in zip(row, told, strict=True) if is_told] for row in made.rows]
@@ -122,7 +128,8 @@ def _is_time(column):
     return any(word in column for word in ("second", "ms", " s", "time", "us"))
 
 
-def _model():
+def cost_model():
+    """Of made up costs."""
     rendered = tuple(Rendered(Quality(edge_samples=n), 0.1 * n, 0.18 / n) for n in (4, 9, 25))
     return CostModel(7, 3, "scalar_rgb", rendered, 0.007, 0.002, 1.3, 0.21, 0.0017, 0.9, 3.1)
 
@@ -172,12 +179,12 @@ def _new():
 
 
 def _fitted():
-    fit, _ = _fit()
+    found, _ = fit()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "fitted.toml"
-        without_error(lambda: fitted_scene.write(fit, "calibrated_rig", path))
+        without_error(lambda: fitted_scene.write(found, "calibrated_rig", path))
         text = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {"text": text, "errors": fit.standard_errors}
+    return {"text": text, "errors": found.standard_errors}
 
 
 _FIGURES = {
@@ -185,18 +192,19 @@ _FIGURES = {
     "block": lambda path: scene_figure.draw(load("task1"), uneven(load("task1"))[0], path),
     "plan": lambda path: plan_figures.draw(_plan("task1"), path.parent, path),
     "views": lambda path: views_figure.draw(_views(), path.parent),
-    "residuals": lambda path: residuals.draw(_fit()[0], [_fit()[1]], path),
+    "residuals": lambda path: residuals.draw(fit()[0], [fit()[1]], path),
     "budget": lambda path: budget_figure.draw(planner.budget(load("plate"), *uneven(load("plate"))).measurands, path),
     "sharpness": lambda path: sharpness.write(path, [(0, measure.mtf(rectangle(120, 70, 13), turned(120, 70, 13), 0))]),
     "overlay": lambda path: overlay.write(path, rectangle(120, 70, 13), photograph(rectangle(120, 70, 13), most=1)),
-    "calibration": lambda path: calibration_figure.draw(_calibrated(), path),
+    "calibration": lambda path: calibration_figure.draw(calibrated(), path),
     "cost": lambda path: [cost_figures._draw(made, path) for made in (
-        scaling.scaling_parameter(_model()), pareto.pareto_parameter(_model()))],
+        scaling.scaling_parameter(cost_model()), pareto.pareto_parameter(cost_model()))],
 }  # fmt: skip
 
 
 @cache
-def _calibrated():
+def calibrated():
+    """Locators of a small scene, at three noise levels."""
     with mock.patch("measure.calibration.RATIOS", np.array([0.02, 0.05, 0.11])):
         return calibrate(small("task1", 2.0), 2, 5)
 
@@ -212,8 +220,8 @@ def cases():
         found[f"explorer {name}"] = CLOSED, partial(_explored, name)
     return found | {
         "hard pictures": (SEARCHED, _few_hard), "hard cases": (CLOSED, _precise),
-        "calibrate": (SEARCHED, _calibrated), "new": (SEARCHED, _new), "fitted": (SEARCHED, _fitted),
+        "calibrate": (SEARCHED, calibrated), "new": (SEARCHED, _new), "fitted": (SEARCHED, _fitted),
         "check of a plan": (RENDERED, lambda: _without_seconds(plan_check.check_plan(_plan("task1"), 2, _QUICK))),
         "check of views": (RENDERED, lambda: _without_seconds(views_check.check_views(_views(), 12, 3, _QUICK))),
-        "check of lamps": (RENDERED, lambda: vary_check.check_varied(_varied(), 20, _QUICK, 3)),
+        "check of lamps": (RENDERED, lambda: vary_check.check_varied(lamps(), 20, _QUICK, 3)),
     }  # fmt: skip
