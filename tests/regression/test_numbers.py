@@ -32,8 +32,8 @@ pytestmark = pytest.mark.render
 
 STORED = Path(__file__).with_name("numbers.json")
 _ABOUT = (
-    planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside, files, reporting, exploring,
-    running, refusing,
+    planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside, files, reporting,
+    exploring, running, refusing,
 )  # fmt: skip
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
