@@ -13,9 +13,8 @@ from imaging.models.bias import cluttered
 from imaging.pictures import Pictures
 from planner.prediction import minimised
 from planner.ranks import quantity_ranks
-from planner.search.aim import DEFAULT_OBJECTIVE, Objective
-from planner.search.poses import as_array, by_light
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace, as_array, by_light
+from planner.search.objective import DEFAULT_OBJECTIVE, Objective
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.errors import given
 from scenes.results import Shown, finite, poses

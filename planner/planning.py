@@ -11,19 +11,15 @@ from imaging.features.measurand import required_edges
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.pictures import Pictures
 from planner.prediction import Prediction, minimised, predict
-from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
-from planner.search.alternating import Step
-from planner.search.candidates import Candidate, candidates
-from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
+from planner.search.candidates import Candidate, candidates, trusted, untrusted
 from planner.search.constraints import Constraints
+from planner.search.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
 from planner.search.exhaustive import Found, Report, has_bound
+from planner.search.grid import as_array, as_poses
+from planner.search.lights import Alone, applies, shares_of, with_shares
+from planner.search.local import Step, refine
+from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.option import Option, Result, held, with_task
-from planner.search.poses import as_array, as_poses
-from planner.search.refinement import refine
-from planner.search.shares import shares_of, with_shares
-from planner.search.sharing import Alone, applies
-from planner.search.trusted import trusted, untrusted
-from planner.search.varied import Varied
 from planner.search.varying import vary_choice
 from scenes import InvalidInput, Picture, Pose, Scene, several
 from scenes.results import Shown, finite, poses

@@ -18,7 +18,7 @@ from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from planner.forecast import Forecast, forecasts, worst
 from planner.ranks import edge_ranks
-from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
+from planner.search.objective import DEFAULT_OBJECTIVE, Aim, Objective
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.measurands.features import place_of
 from scenes.results import Shown

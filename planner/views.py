@@ -10,22 +10,26 @@ import numpy as np
 
 from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import combine
-from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
-from planner.search.beside import descend
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Report, has_bound
-from planner.search.looked import Pool, glanced
+from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
 from planner.search.option import COARSE_STEP, Option, held
-from planner.search.subsets import (
+from planner.search.sets import (
     MOST_SETS,
     Information,
+    Pool,
+    all_ok,
+    alone,
+    descend,
     every_set,
     front,
+    glanced,
     greedy,
     least_value,
     sets_of,
+    shared,
+    worthwhile,
 )
-from planner.search.worthwhile import all_ok, alone, shared, worthwhile
 from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Scene
 

@@ -14,11 +14,10 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.poses import as_array, as_poses, by_light
-from planner.search.refinement import refine
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace, as_array, as_poses, by_light
+from planner.search.local import refine
+from planner.search.objective import Aim
 from scenes import InvalidInput, Picture, Pose, Scene, several
 
 _PAIRS = 20_000  # at a time

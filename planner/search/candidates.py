@@ -1,18 +1,21 @@
-"""The best settings that clearly differ from each other, so that a user has a choice."""
+"""The best settings that clearly differ from each other, and the best of them whose measurands can be trusted."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from imaging.geometry.projection import direction
 from imaging.models import variance_model
 from imaging.pictures import Pictures
-from planner.prediction import minimised
-from planner.search.aim import Aim
-from planner.search.poses import as_poses
-from scenes import Picture, Pose
+from planner.prediction import minimised, predict
+from planner.search.grid import as_array, as_poses
+from planner.search.objective import Aim
+from scenes import Picture, Pose, Scene
+from scenes.status import is_trusted
 
 _APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 
@@ -103,3 +106,52 @@ def _differ(row: tuple, other: tuple) -> bool:
 def _each(row: tuple) -> np.ndarray:
     """Poses of sensor and lights, (1 + F, 2)."""
     return np.concatenate([row[2], row[3]]).reshape(-1, 2)
+
+
+DEAREST = 4.0  # times the least variance that is paid for it: standard deviations are twice as large
+
+
+class Trusted(NamedTuple):
+    """The setting that is taken, how many of its measurands are not ``ok``, and the better ones that are not taken."""
+
+    sensor: np.ndarray
+    light: np.ndarray
+    untrusted: int
+    set_aside: tuple[Candidate, ...]
+
+
+def trusted(
+    scene: Scene, best: tuple[np.ndarray, np.ndarray], variance: float, choice: Sequence[Candidate], model: str
+) -> Trusted:
+    """The best setting with the fewest measurands that are not ``ok``.
+
+    Parameters
+    ----------
+    best : pair of ndarray, shape (2,) and (2 F,)
+        Sensor and lights of the least variance.
+    variance : float
+        What was minimised, there.
+    choice : sequence of Candidate
+        The others, the best first.
+    """
+    least, passed = Trusted(*best, untrusted(scene, *best, model), ()), []
+    for candidate in choice:
+        if least.untrusted == 0 or candidate.variance > DEAREST * variance:
+            break
+        if candidate.edges != scene.required:
+            continue
+        poses = np.array(list(candidate.sensor)), as_array(candidate.light)
+        if all(np.allclose(pose, own) for pose, own in zip(poses, best, strict=True)):
+            passed.append(candidate)
+            continue
+        wrong = untrusted(scene, *poses, model)
+        if wrong < least.untrusted:
+            least = Trusted(*poses, wrong, tuple(passed))
+        passed.append(candidate)
+    return least
+
+
+def untrusted(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str) -> int:
+    """How many measurands of a setting are not ``ok``."""
+    told = predict(scene, tuple(map(float, sensor)), as_poses(light), model)
+    return sum(not is_trusted(each.status) for each in told.measurands)

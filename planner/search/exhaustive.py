@@ -13,10 +13,10 @@ from imaging.models import variance_model
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
 from planner.prediction import minimised
-from planner.search.aim import Aim
+from planner.search.bound import Separable, separable
 from planner.search.constraints import Constraints
-from planner.search.poses import by_light
-from planner.search.separable import Separable, separable
+from planner.search.grid import by_light
+from planner.search.objective import Aim
 from scenes import Scene
 
 _ROWS = 256  # sensors at a time

@@ -7,15 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from planner.search.aim import Aim
-from planner.search.alternating import Partial, alternate
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import Found, Report, exhaustive, has_bound
-from planner.search.poses import as_array
-from planner.search.shares import shares_of, shares_of_two
-from planner.search.sharing import Shared, applies, search_shared
-from planner.search.turns import by_turns
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace, as_array
+from planner.search.lights import Shared, applies, by_turns, search_shared, shares_of, shares_of_two
+from planner.search.local import Partial, alternate
+from planner.search.objective import Aim
 from scenes import InvalidInput, Pose, Scene, Task, several
 
 COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated

@@ -7,7 +7,7 @@ that can be trusted a descent leads down in poses and angles together. The scene
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
@@ -16,10 +16,14 @@ import numpy as np
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import minimised, predict, variances
-from planner.search.aim import Aim
-from planner.search.choices import (
+from planner.search.candidates import DEAREST, untrusted
+from planner.search.constraints import Constraints
+from planner.search.design import (
     Choice,
+    Chosen,
     Hold,
+    Place,
+    Varied,
     angles_of,
     bands_of,
     check_vary,
@@ -27,12 +31,10 @@ from planner.search.choices import (
     own_choice,
     with_choice,
 )
-from planner.search.constraints import Constraints
-from planner.search.descent import descend
 from planner.search.exhaustive import Report, cut_off
-from planner.search.trusted import DEAREST, untrusted
-from planner.search.varied import Chosen, Place, Varied
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.local import shifted
+from planner.search.objective import Aim
 from scenes import Pose, Scene
 
 ANGLE_STEP = 30.0  # degrees, of either polariser
@@ -266,3 +268,70 @@ _GUARANTEE = (
 
 def _value(place: Place) -> float:
     return place.value
+
+
+Point = tuple[np.ndarray, np.ndarray, np.ndarray]
+_MOST = 100  # evaluations of each simplex
+
+
+def descend(
+    begin: Point,
+    free: tuple[bool, bool],
+    value: Callable[[np.ndarray, np.ndarray, np.ndarray], float],
+    trust: Callable[[np.ndarray, np.ndarray, np.ndarray], bool],
+    sizes: tuple[float, ...],
+    *,
+    one_mount: bool = False,
+) -> Point:
+    """Nelder-Mead in the tangent planes of the free poses and in further angles.
+
+    Parameters
+    ----------
+    begin : (sensor, light, angles)
+        Poses (2,) and angles (k,), degrees.
+    free : pair of bool
+        Whether the sensor and the light may move.
+    value : callable
+        What is minimised; infinite where it is not allowed.
+    trust : callable
+        Whether a point counts; asked only of points that would be the best so far, for it takes long.
+    sizes : tuple of float
+        Of the simplices, one after the other, degrees.
+    one_mount : bool
+        Whether the light stands where the sensor does.
+
+    Returns
+    -------
+    sensor, light, angles
+        Not worse than at the beginning.
+    """
+    ends = np.cumsum([2 * free[0], 2 * (free[1] and not one_mount), len(begin[2])])
+
+    def at(x: np.ndarray) -> Point:
+        moves = x[: ends[0]], x[ends[0] : ends[1]], x[ends[1] :]
+        poses = [shifted(p, move) if len(move) else p for p, move in zip(begin[:2], moves[:2], strict=True)]
+        return poses[0], poses[0] if one_mount and free[0] else poses[1], begin[2] + moves[2]
+
+    least = unit = value(*begin)
+    if not ends[-1] or not np.isfinite(unit):
+        return begin
+
+    def cost(x: np.ndarray) -> float:
+        nonlocal least
+        found = value(*at(x))
+        if found < least:
+            if not trust(*at(x)):
+                return np.finfo(float).max
+            least = found
+        return min(found / unit, np.finfo(float).max)
+
+    from scipy.optimize import minimize  # slow to load, and rarely needed
+
+    x, lowest = np.zeros(ends[-1]), 1.0
+    for size in sizes:
+        simplex = x + size * np.vstack([np.zeros(len(x)), np.eye(len(x))])
+        options = {"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-5, "maxfev": _MOST}
+        found = minimize(cost, x, method="Nelder-Mead", options=options)
+        if found.fun < lowest:
+            x, lowest = found.x, found.fun
+    return at(x)

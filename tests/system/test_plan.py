@@ -9,8 +9,8 @@ import pytest
 
 import planner
 import scenes
+from planner.robustness import altered
 from planner.search.exhaustive import evaluate_pairs
-from planner.search.robustness import altered
 from scenes import InvalidInput
 from validation.cli import main as cli
 

@@ -5,7 +5,7 @@ import pytest
 
 import planner
 import scenes
-from planner.search.trusted import DEAREST, trusted
+from planner.search.candidates import DEAREST, trusted
 from validation.report.plan_table import report
 
 

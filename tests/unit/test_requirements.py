@@ -9,10 +9,10 @@ import scenes
 from imaging.models.calibrated import calibrated
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
-from planner.search.aim import Aim
+from planner.search.bound import separable
 from planner.search.exhaustive import evaluate_pairs, exhaustive
-from planner.search.separable import separable
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.objective import Aim
 from planner.uncertainty.conformity import decide
 from scenes import InvalidInput, Tolerance
 from validation import statistics

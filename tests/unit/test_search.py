@@ -5,10 +5,10 @@ import pytest
 
 import planner
 import scenes
-from planner.search.alternating import alternate
+from planner.search.bound import separable
 from planner.search.exhaustive import _blocks, evaluate_pairs, exhaustive
-from planner.search.separable import separable
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.local import alternate
 from scenes import InvalidInput
 from tests.benchmarks.search import local_minima
 from tests.scalar import variance_evaluate

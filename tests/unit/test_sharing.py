@@ -7,11 +7,10 @@ import pytest
 
 import planner
 import scenes
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.shares import shares_of, shares_of_two, with_shares
-from planner.search.sharing import search_shared
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.lights import search_shared, shares_of, shares_of_two, with_shares
+from planner.search.objective import Aim
 from scenes import InvalidInput
 
 STEP = 30

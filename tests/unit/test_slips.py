@@ -36,11 +36,11 @@ from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
 from measure.photo import mtf as mtfs
 from measure.photo import recording
-from planner.search import exhaustive, robustness
-from planner.search.aim import Aim
-from planner.search.refinement import shifted
-from planner.search.shares import with_shares
-from planner.search.sharing import _Looks
+from planner import robustness
+from planner.search import exhaustive
+from planner.search.lights import _Looks, with_shares
+from planner.search.local import shifted
+from planner.search.objective import Aim
 from planner.uncertainty import Input, monte_carlo
 from scenes import Camera, Noise, Picture, Pose
 from scenes.cameras.data_sheet import completed

@@ -11,8 +11,8 @@ from imaging.light.appearance import analyser_axis, of_sides, polarisation_axis,
 from imaging.light.irradiance import bands
 from imaging.pictures import Pictures
 from planner.prediction import variances
-from planner.search.choices import Choice, exposure_time, own_choice, throughput, with_choice
-from planner.search.descent import descend
+from planner.search.design import Choice, exposure_time, own_choice, throughput, with_choice
+from planner.search.varying import descend
 from scenes import Filter, InvalidInput, Lamp
 from validation.vary_check import Scatter, judged
 

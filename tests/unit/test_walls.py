@@ -12,7 +12,7 @@ import trimesh
 import planner
 import scenes
 from imaging.features.circles import Rim, calibrated_circle
-from planner.search.refinement import refine, shifted
+from planner.search.local import refine, shifted
 from render.curved import stands_for
 from scenes import InvalidInput
 from scenes.load import from_document

@@ -9,8 +9,8 @@ import numpy as np
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.search.constraints import Constraints
-from planner.search.poses import by_light
-from planner.search.refinement import refine
+from planner.search.grid import by_light
+from planner.search.local import refine
 from scenes import InvalidInput, Pose, Scene
 from validation.explore.state import State
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from imaging.geometry.projection import direction
 from planner.planning import Plan
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import evaluate_pairs
-from planner.search.refinement import refine, shifted
+from planner.search.local import refine, shifted
+from planner.search.objective import Aim
 from scenes import InvalidInput, Material, Pose, Scene
 
 

@@ -1,4 +1,4 @@
-"""The viewing space: directions nearly evenly spread over the sphere (section 6 of the paper)."""
+"""Candidate poses of sensor and lights: directions nearly evenly spread over the sphere (section 6 of the paper)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,27 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
-from scenes import InvalidInput
+from scenes import InvalidInput, Pose, several
 from scenes.arrays import finite, number
 from scenes.errors import given
+
+
+def by_light(lights: np.ndarray) -> np.ndarray | tuple[np.ndarray, ...]:
+    """What `Pictures.of` takes: the poses (..., 2) of the one free light, else a tuple of such."""
+    parts = tuple(lights[..., i : i + 2] for i in range(0, lights.shape[-1], 2))
+    return parts[0] if len(parts) == 1 else parts
+
+
+def as_poses(lights: np.ndarray) -> Pose | tuple[Pose, ...]:
+    """One setting's lights (2 F,): the pose of the one free light, else a tuple of such."""
+    found = tuple(Pose(*map(float, lights[i : i + 2])) for i in range(0, lights.size, 2))
+    return found[0] if len(found) == 1 else found
+
+
+def as_array(lights: Pose | tuple[Pose, ...]) -> np.ndarray:
+    """And back, (2 F,)."""
+    return np.array([list(pose) for pose in several(lights)], float).ravel()
+
 
 _NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them on the rings above and below
 

@@ -9,7 +9,17 @@ from itertools import combinations_with_replacement, islice
 
 import numpy as np
 
-from planner.search.trusted import DEAREST
+from imaging.geometry.projection import direction
+from imaging.models import variance_model
+from imaging.pictures import Pictures
+from planner.prediction import Prediction, predict
+from planner.search.candidates import DEAREST
+from planner.search.constraints import Constraints
+from planner.search.exhaustive import Report
+from planner.search.local import refine
+from planner.search.objective import Aim
+from scenes import Scene
+from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one
 _CHUNK = 20_000
@@ -224,3 +234,187 @@ def _least_sum(told: np.ndarray, rounds: int = 300) -> tuple[float, np.ndarray]:
         weights = weights * np.sqrt(slope / (weights @ slope))
         weights /= weights.sum()
     return bound, weights
+
+
+_GROUPS = 24  # places of what is shared that are searched on
+
+
+def worthwhile(told: np.ndarray, aim: Aim) -> np.ndarray:
+    """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
+    flat = told.reshape(-1, told.shape[-1])
+    best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
+    best.append(alone(told, aim).argmin(1))
+    each = [np.arange(len(told)) * told.shape[1] + column for column in best]
+    rows = np.unique(np.concatenate([front(all_ok(flat, aim)), *each]))
+    return rows[flat[rows].any(1)]
+
+
+def alone(told: np.ndarray, aim: Aim) -> np.ndarray:
+    """What is minimised of each pair alone; infinite where not all is measured."""
+    with np.errstate(divide="ignore"):
+        parts = 1 / told
+    return parts.max(-1) if aim.over == "minimax" else parts.sum(-1)
+
+
+def shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
+    """The same where pictures share their sensor, or their light (``share``).
+
+    For each of its places the greedy set of ``count`` pictures is valued; the pairs that none dominates at the best
+    places are returned.
+    """
+    axis = 0 if share == "sensor" else 1
+    found = []
+    for place in range(told.shape[axis]):
+        table = all_ok(told.take(place, axis), aim)
+        kept = front(table)
+        if len(kept):
+            own = table.only(kept)
+            found.append((own.of_sets(np.array(greedy(own, count)[-1])).at(0), place, kept))
+    found.sort(key=lambda each: each[0])
+    rows = [np.ravel_multi_index((place, kept) if axis == 0 else (kept, place), told.shape[:2])
+            for _, place, kept in found[:_GROUPS]]  # fmt: skip
+    return np.concatenate(rows)
+
+
+def all_ok(told: np.ndarray, aim: Aim) -> Information:
+    return Information(told, np.zeros_like(told), aim.over)
+
+
+_ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is looked at
+_AT_A_TIME = 20_000  # pairs
+
+
+def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
+    """1 / (share x variance) of variances (..., M); 0 where infinite."""
+    with np.errstate(divide="ignore"):
+        return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
+
+
+def glanced(
+    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim, constraints: Constraints,
+    report: Report,
+) -> np.ndarray:  # fmt: skip
+    """What every pair of sensors (S, 2) and lights (L, 2) tells of each quantity, shape (S, L, M); 0 if not allowed."""
+    told = np.empty((len(sensors), len(lights), len(scene.quantities)))
+    evaluate, size = variance_model(model), max(1, _AT_A_TIME // len(lights))
+    for at in range(0, len(sensors), size):
+        part = sensors[at : at + size]
+        told[at : at + size] = information(
+            evaluate(Pictures.of(scene, part[:, None], lights[None])).variances_object, aim
+        )
+        if constraints.on_pairs:
+            allowed = constraints.pairs(scene, part[:, None], lights[None])
+            told[at : at + size] *= allowed[..., None]
+        report("pairs", min(at + size, len(sensors)), len(sensors))
+    return told
+
+
+class Pool:
+    """Settings to choose from, rows of ``poses``; grows when a descent finds one beside them.
+
+    Parameters
+    ----------
+    scene, model, aim
+    poses : ndarray, shape (P, 4)
+        Sensor and light, each polar angle and azimuth, degrees.
+    told : ndarray, shape (P, M)
+        What a glance tells (`information`).
+    """
+
+    def __init__(self, scene: Scene, model: str, aim: Aim, poses: np.ndarray, told: np.ndarray) -> None:
+        self.scene, self.model, self.aim = scene, model, aim
+        self.poses, self.told = poses, told
+        self.closely: dict[int, Prediction] = {}  # of the rows looked at closely
+
+    def look(self, row: int) -> None:
+        """Look closely at a row, if it has not been done."""
+        if row not in self.closely:
+            sensor, light = (tuple(map(float, self.poses[row, part])) for part in (slice(0, 2), slice(2, 4)))
+            self.closely[row] = predict(self.scene, sensor, light, self.model)
+
+    def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
+        """A further row; its number."""
+        self.poses = np.concatenate([self.poses, np.concatenate([sensor, light])[None]])
+        self.told = np.concatenate([self.told, told[None]])
+        return len(self.poses) - 1
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Rows looked at closely, in their order."""
+        return np.array(sorted(self.closely), int)
+
+    def known(self) -> Information:
+        """What the rows `seen` tell."""
+        told = [self.closely[row].measurands for row in self.seen]
+        values = information(np.array([[each.variance_object for each in row] for row in told]), self.aim)
+        fine = np.array([[is_trusted(each.status) for each in row] for row in told])
+        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.aim.over)
+
+    def expected(self) -> Information:
+        """What all rows tell: as seen closely, else as glanced at, cluttered as the nearest row that was seen is."""
+        cluttered = np.zeros(self.told.shape, bool)
+        seen = self.seen
+        if len(seen):
+            known = self.known()
+            sensors, lights = direction(self.poses[:, :2]), direction(self.poses[:, 2:])
+            cosine = np.minimum(sensors @ sensors[seen].T, lights @ lights[seen].T)
+            nearest = cosine.argmax(1)
+            beside = cosine[np.arange(len(cosine)), nearest] > np.cos(np.radians(_ALIKE))
+            cluttered = (known.clutter > 0)[nearest] & beside[:, None]
+        ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
+        if len(seen):
+            ok[seen], clutter[seen] = known.ok, known.clutter
+        return Information(ok, clutter, self.aim.over)
+
+
+_SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a descent
+
+
+def descend(
+    pool: Pool, row: int, rest: tuple[np.ndarray, np.ndarray], constraints: Constraints, step_deg: float
+) -> int:
+    """Refine a row of the pool, glancing, and look closely at what is found.
+
+    Parameters
+    ----------
+    rest : pair of ndarray, shape (M,)
+        What the other pictures of its set tell, ``ok`` and ``clutter``.
+
+    Returns
+    -------
+    int
+        Number of the new row, or of the old one if none is better.
+
+    What is clutter in the row is taken to stay so on the way. If the close look does not bear out what was glanced at,
+    a shorter descent is tried.
+    """
+    sensor, light = pool.poses[row, :2], pool.poses[row, 2:]
+    cluttered = np.array([not is_trusted(each.status) for each in pool.closely[row].measurands])
+
+    def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
+        errors = variance_model(pool.model)(Pictures.of(pool.scene, s[None], k[None]))
+        return information(errors.variances_object[0], pool.aim)
+
+    def score(values: np.ndarray) -> tuple[int, float, float]:
+        ok, clutter = np.where(cluttered, 0.0, values), np.where(cluttered, values, 0.0)
+        table = Information((rest[0] + ok)[None], (rest[1] + clutter)[None], pool.aim.over)
+        return table.of_sets(np.zeros(1, int)).at(0)
+
+    def value(s: np.ndarray, k: np.ndarray) -> float:
+        here = score(told(s, k))
+        return here[1] if here[0] <= begun[0] else np.inf
+
+    def closely(which: int) -> tuple[int, float, float]:
+        known, at = pool.known(), int(np.searchsorted(pool.seen, which))
+        return Information(rest[0] + known.ok, rest[1] + known.clutter, pool.aim.over).of_sets(np.array([at])).at(0)
+
+    begun = score(told(sensor, light))
+    for size in _SIZES:
+        how = pool.model, pool.aim, step_deg, constraints, value
+        *poses, least = refine(pool.scene, sensor, light, *how, sizes=(size,))
+        if least < begun[1]:
+            found = pool.add(*poses, told(*poses))
+            pool.look(found)
+            if better(closely(found), closely(row)):
+                return found
+    return row
