@@ -15,9 +15,10 @@ from imaging.pose_scatter import pose_scatter
 from planner.combining import Combination, combine
 from planner.forecast import Forecast
 from planner.maps import Map, pose_map, variance_map
-from planner.planning import Candidate, Plan, plan
+from planner.planning import Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.robustness import Robust, Tolerances, robust
+from planner.search.candidates import Candidate
 from planner.search.constraints import Constraints
 from planner.search.design import Choice, Chosen, Varied, with_choice
 from planner.search.exhaustive import exhaustive

@@ -11,10 +11,9 @@ import numpy as np
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.models.bias import cluttered
 from imaging.pictures import Pictures
-from planner.prediction import minimised
 from planner.ranks import quantity_ranks
 from planner.search.grid import ViewingSpace, as_array, by_light
-from planner.search.objective import DEFAULT_OBJECTIVE, Objective
+from planner.search.objective import DEFAULT_OBJECTIVE, Objective, minimised
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.errors import given
 from scenes.results import Shown, finite, poses

@@ -18,7 +18,7 @@ from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from planner.forecast import Forecast, forecasts, worst
 from planner.ranks import edge_ranks
-from planner.search.objective import DEFAULT_OBJECTIVE, Aim, Objective
+from planner.search.objective import DEFAULT_OBJECTIVE, Objective, minimised
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.measurands.features import place_of
 from scenes.results import Shown
@@ -297,12 +297,6 @@ def _of_locator(pictures: Pictures, model: str) -> tuple[tuple[np.ndarray, np.nd
         return (none, none), np.zeros((edges, 2)), np.zeros(edges, bool)
     found = bias(pictures)
     return (found.values, found.values_object), found.lines, cluttered(pictures)
-
-
-def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
-    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several."""
-    aim = Aim.of(errors.measurands.quantities, objective)
-    return aim(errors.variances if aim.unit == "image" else errors.variances_object)
 
 
 def feature_covariances(pictures: Pictures, evaluated: Errors, number: int = 0) -> np.ndarray:

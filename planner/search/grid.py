@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
-from scenes import InvalidInput, Pose, several
+from planner.search.constraints import Constraints
+from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given
 
@@ -35,57 +38,18 @@ _NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them 
 
 
 @dataclass(frozen=True, eq=False)
-class ViewingSpace:
-    """The paper's tessellation: polar angle every ``step_deg``, azimuth every ``step_deg`` / sin(polar).
+class Directions(ABC):
+    """Poses on a sphere, with their neighbours at a step of ``step_deg``."""
 
-    Parameters
-    ----------
-    step_deg : float
-        1 in the paper, which gives 41 347 directions: the printed set, not the printed sum (41 167) or total (41 348).
-    polar_deg : pair of float
-        Least and greatest polar angle; (0, 90) is the upper hemisphere.
+    step_deg: float
 
-    Raises
-    ------
-    InvalidInput
-        If the step is not between 0.1 and 90, or the range is empty.
-
-    Examples
-    --------
-    >>> len(ViewingSpace()), len(ViewingSpace(polar_deg=(0, 90)))
-    (41347, 20854)
-    """
-
-    step_deg: float = 1.0
-    polar_deg: tuple[float, float] = (0.0, 180.0)
-
-    def __post_init__(self) -> None:
-        if not 0.1 <= number(self.step_deg, "step_deg") <= 90:
-            raise InvalidInput(f"step must be between 0.1 and 90 degrees, got {self.step_deg}")
-        if finite(self.polar_deg, "polar range").shape != (2,):
-            raise InvalidInput(f"polar range must be two angles, got {given(self.polar_deg)}")
-        if not 0 <= self.polar_deg[0] <= self.polar_deg[1] <= 180:
-            raise InvalidInput(f"polar range must be two rising angles between 0 and 180, got {self.polar_deg}")
+    @property
+    @abstractmethod
+    def poses(self) -> np.ndarray:
+        """All directions as (polar, azimuth), degrees, shape (N, 2)."""
 
     def __len__(self) -> int:
         return len(self.poses)
-
-    @cached_property
-    def poses(self) -> np.ndarray:
-        """All directions as (polar, azimuth), degrees, shape (N, 2), ring by ring from the north pole."""
-        rings = np.arange(round(180 / self.step_deg) + 1) * self.step_deg
-        low, high = self.polar_deg
-        rings = rings[(rings >= low - 1e-9) & (rings <= min(high, 180.0) + 1e-9)]
-        if not rings.size:  # a range between two of the grid's rings
-            rings = np.array([(low + min(high, 180.0)) / 2])
-        return np.concatenate([self._ring(polar) for polar in rings])
-
-    def _ring(self, polar: float) -> np.ndarray:
-        sine = np.sin(np.radians(polar))
-        if polar < 1e-9 or polar > 180 - 1e-9:
-            return np.array([[polar, 0.0]])
-        azimuths = np.arange(np.floor(360 * sine / self.step_deg + 1e-9) + 1) * self.step_deg / sine
-        return np.column_stack([np.full_like(azimuths, polar), azimuths])
 
     @cached_property
     def directions(self) -> np.ndarray:
@@ -117,3 +81,127 @@ class ViewingSpace:
     def nearest_direction(self, vectors: np.ndarray) -> np.ndarray:
         """Indices of the directions nearest to unit vectors (..., 3)."""
         return self._tree.query(vectors)[1]
+
+
+@dataclass(frozen=True, eq=False)
+class ViewingSpace(Directions):
+    """The paper's tessellation: polar angle every ``step_deg``, azimuth every ``step_deg`` / sin(polar).
+
+    Parameters
+    ----------
+    step_deg : float
+        1 in the paper, which gives 41 347 directions: the printed set, not the printed sum (41 167) or total (41 348).
+    polar_deg : pair of float
+        Least and greatest polar angle; (0, 90) is the upper hemisphere.
+
+    Raises
+    ------
+    InvalidInput
+        If the step is not between 0.1 and 90, or the range is empty.
+
+    Examples
+    --------
+    >>> len(ViewingSpace()), len(ViewingSpace(polar_deg=(0, 90)))
+    (41347, 20854)
+    """
+
+    step_deg: float = 1.0
+    polar_deg: tuple[float, float] = (0.0, 180.0)
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= number(self.step_deg, "step_deg") <= 90:
+            raise InvalidInput(f"step must be between 0.1 and 90 degrees, got {self.step_deg}")
+        if finite(self.polar_deg, "polar range").shape != (2,):
+            raise InvalidInput(f"polar range must be two angles, got {given(self.polar_deg)}")
+        if not 0 <= self.polar_deg[0] <= self.polar_deg[1] <= 180:
+            raise InvalidInput(f"polar range must be two rising angles between 0 and 180, got {self.polar_deg}")
+
+    @cached_property
+    def poses(self) -> np.ndarray:
+        """All directions as (polar, azimuth), degrees, shape (N, 2), ring by ring from the north pole."""
+        rings = np.arange(round(180 / self.step_deg) + 1) * self.step_deg
+        low, high = self.polar_deg
+        rings = rings[(rings >= low - 1e-9) & (rings <= min(high, 180.0) + 1e-9)]
+        if not rings.size:  # a range between two of the grid's rings
+            rings = np.array([(low + min(high, 180.0)) / 2])
+        return np.concatenate([self._ring(polar) for polar in rings])
+
+    def _ring(self, polar: float) -> np.ndarray:
+        sine = np.sin(np.radians(polar))
+        if polar < 1e-9 or polar > 180 - 1e-9:
+            return np.array([[polar, 0.0]])
+        azimuths = np.arange(np.floor(360 * sine / self.step_deg + 1e-9) + 1) * self.step_deg / sine
+        return np.column_stack([np.full_like(azimuths, polar), azimuths])
+
+
+@dataclass(frozen=True, eq=False)
+class Feasible(Directions):
+    """Those poses (N, 2) of a viewing space that constraints allow."""
+
+    allowed: np.ndarray
+
+    @property
+    def poses(self) -> np.ndarray:
+        return self.allowed
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Candidate poses, each feasible by itself.
+
+    Attributes
+    ----------
+    step_deg : float
+    sensors, lights : ndarray, shape (S, 2), (L, 2) or (1, 2 F)
+        Degrees; one row of what is held, (1, 0) without a free light.
+    held : pair of bool
+        Whether the sensor's and the lights' poses are given.
+    """
+
+    step_deg: float
+    sensors: np.ndarray
+    lights: np.ndarray
+    held: tuple[bool, bool]
+
+    @property
+    def free(self) -> bool:
+        """Whether neither is held."""
+        return not any(self.held)
+
+    @classmethod
+    def of(cls, scene: Scene, constraints: Constraints, step_deg: float, sensor: Any = None, light: Any = None) -> Grid:
+        """All feasible poses of a viewing space, or the one at which ``sensor`` or ``light`` is held.
+
+        Raises
+        ------
+        InvalidInput
+            If what is held does not keep the constraints, or nothing is left.
+        """
+        if constraints.same_mount:  # the one says the other
+            sensor, light = (light if sensor is None else sensor), (sensor if light is None else light)
+        held = sensor is not None, light is not None
+        sensors = ViewingSpace(step_deg, constraints.sensor_polar_deg).poses
+        lights = ViewingSpace(step_deg, constraints.light_polar_deg).poses if scene.free else np.zeros((1, 0))
+        if held[0]:
+            sensors = np.array([list(scene.check_pose("sensor", sensor))])
+        if held[1]:
+            lights = as_array(scene.check_lights(several(light)))[None]
+        if all(held) and not constraints.pairs(scene, sensors[0], lights[0]):
+            told = " ".join(map(str, (Pose(*sensors[0].tolist()), "and", *several(as_poses(lights[0])))))
+            raise InvalidInput(
+                f"sensor and light must keep the constraints on both (mount, separation, bodies, view), got {told}"
+            )
+        sensors = _kept("sensor", sensors, constraints.sensors(scene, sensors), held[0])
+        if scene.free:
+            allowed = constraints.lights(lights.reshape(-1, 2)).reshape(len(lights), -1).all(-1)
+            lights = _kept("light", lights, allowed, held[1])
+        if not len(sensors) or not len(lights):
+            raise InvalidInput("constraints must leave a pose for sensor and light, got none")
+        return cls(step_deg, sensors, lights, held)
+
+
+def _kept(role: str, poses: np.ndarray, allowed: np.ndarray, held: bool) -> np.ndarray:
+    """The allowed ones; all of what is held must be."""
+    if held and not allowed.all():
+        raise InvalidInput(f"{role} must keep the constraints, got {Pose(*map(float, poses[0][:2]))}")
+    return poses[allowed]

@@ -10,7 +10,7 @@ below the best value known are looked at.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,12 +25,13 @@ from imaging.models.calibrated import ROUGH, line_slope, line_weight, long_edge,
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import Found, Report, evaluate_pairs
-from planner.search.grid import by_light
-from planner.search.objective import Aim
+from planner.search.exhaustive import BestPair
+from planner.search.grid import Grid, by_light
+from planner.search.objective import Report, SearchProblem
 from scenes import Scene
 
 _STEP = 0.1  # between shares
+Shares = tuple[tuple[float, ...], ...]
 
 
 def with_shares(scene: Scene, shares: tuple[float, ...]) -> Scene:
@@ -61,11 +62,11 @@ _ENDS = 0.85  # of a line's first-order variance, at most, is what its ends are 
 _UNEVEN = 2.0  # ... a short one: they are taken to take so many times as much as at even contrast
 
 
-class Alone(NamedTuple):
-    """The best setting with one light that has all: what is minimised, shares, sensor (2,) and lights (2 F,)."""
+class Mixture(NamedTuple):
+    """A setting of several lights: what is minimised, shares, sensor (2,) and lights (2 F,)."""
 
     value: float
-    shares: tuple[float, float]
+    shares: tuple[float, ...]
     sensor: np.ndarray
     lights: np.ndarray
 
@@ -80,16 +81,16 @@ class Shared:
         Its lights with the best shares as their intensities.
     lights : ndarray, shape (S, 2 F)
         Poses of the free lights that are best for each sensor with these shares.
-    found : Found
+    found : BestPair
         The best sensor; its lights are those of the same number.
-    alone : Alone or None
+    alone : Mixture or None
         The best where one light has all; None where that was not asked.
     """
 
     scene: Scene
     lights: np.ndarray
-    found: Found
-    alone: Alone | None
+    found: BestPair
+    alone: Mixture | None
 
 
 def applies(scene: Scene, model: str) -> bool:
@@ -97,15 +98,25 @@ def applies(scene: Scene, model: str) -> bool:
     return model == "calibrated" and not circles(scene) and len(scene.lights) == 2
 
 
+def best_lights(problem: SearchProblem, grid: Grid, shares: str, report: Report) -> Shared:
+    """Several lights at once, or one after the other where their contrasts do not tell of mixtures.
+
+    The ``best`` shares of two lights in tenths, else those that the scene gives.
+    """
+    scene = problem.scene
+    mixed = shares_of_two(scene) if shares == "best" and len(scene.lights) == 2 else (shares_of(scene),)
+    search = search_shared if applies(scene, problem.model) else by_turns
+    return search(problem, grid.sensors, grid.lights, mixed, report)
+
+
 def search_shared(
-    scene: Scene, sensors: np.ndarray, places: np.ndarray, model: str, aim: Aim,
-    constraints: Constraints, report: Report, shares: tuple[tuple[float, float], ...],
-) -> Shared:  # fmt: skip
+    problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares, report: Report
+) -> Shared:
     """Search all sensors (S, 2), all places (L, 2) of each free light, and shares of two lights.
 
     Places that a light may not have beside a sensor are left out one by one (`Constraints.pairs`).
     """
-    looks = _Looks(scene, places, aim, constraints)
+    looks = _Looks(problem, places)
     bounds = np.array([looks.bound(sensor) for sensor in sensors])
     order = np.argsort(bounds)
     best, chosen, alone = np.inf, shares[0], None
@@ -117,39 +128,40 @@ def search_shared(
         for share in shares:
             value, lights = looks.best(known, share)
             if max(share) == 1 and np.isfinite(value) and (alone is None or value < alone.value):
-                alone = Alone(value, share, sensors[s], lights)
+                alone = Mixture(value, share, sensors[s], lights)
             if value < best * BETTER:
                 best, chosen = value, share
-    return _table(scene, sensors, order, bounds, looks, model, aim, chosen, (best, alone), report)
-
-
-def _table(scene, sensors, order, bounds, looks, model, aim, chosen, known, report) -> Shared:
-    """For each sensor the best lights with the chosen shares; the best of all is evaluated exactly."""
-    free = len(scene.free)
-    lights, least = np.zeros((len(sensors), 2 * free)), np.full(len(sensors), np.inf)
+    lights, least = np.zeros((len(sensors), 2 * len(problem.scene.free))), np.full(len(sensors), np.inf)
     for done, s in enumerate(order.tolist()):
         report("lights", len(sensors) + done + 1, 2 * len(sensors))
         if not np.isfinite(bounds[s]):
             break
-        if bounds[s] <= 16 * known[0]:  # beyond there is no candidate
+        if bounds[s] <= 16 * best:  # beyond there is no candidate
             least[s], lights[s] = looks.best(looks.look(sensors[s]), chosen)
-    other = with_shares(scene, chosen)
     first = np.argsort(least)[:_EXACT]
     first = first[np.isfinite(least[first])]
+    mixed = replace(problem, scene=with_shares(problem.scene, chosen))
     if len(first):
-        least[first] = evaluate_pairs(other, sensors[first], lights[first], model, aim)
-    best = int(np.argmin(least))
-    pairs = len(sensors) * looks.combinations
-    which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
-    found = Found(best, best, float(least[best]), pairs, len(first), which, least, guaranteed=True)
-    return Shared(other, lights, found, known[1])
+        least[first] = mixed.values(sensors[first], lights[first])
+    return _shared(mixed.scene, lights, least, (len(sensors) * looks.combinations, len(first), True), alone)
+
+
+def _shared(
+    scene: Scene, lights: np.ndarray, least: np.ndarray, known: tuple[int, int, bool], alone: Mixture | None
+) -> Shared:
+    """The result, from pairs, how many of them were evaluated, and whether none is better."""
+    best, (pairs, evaluated, guaranteed) = int(least.argmin()), known
+    which = np.where(np.isfinite(least), np.arange(len(least)), -1)
+    found = BestPair(best, best, float(least[best]), pairs, evaluated, which, least, guaranteed)
+    return Shared(scene, lights, found, alone)
 
 
 class _Looks:
     """Contrasts of a scene's edges under each light alone, from each of its places."""
 
-    def __init__(self, scene: Scene, places: np.ndarray, aim: Aim, constraints: Constraints) -> None:
-        self.scene, self.aim, self.constraints = scene, aim, constraints
+    def __init__(self, problem: SearchProblem, places: np.ndarray) -> None:
+        self.problem, self.scene, self.aim = problem, problem.scene, problem.aim
+        scene = problem.scene
         total = sum(light.intensity for light in scene.lights)
         whole = [light.model_copy(update={"intensity": total}) for light in scene.lights]
         self.lone = [scene.lit_by(light) for light in whole]
@@ -185,7 +197,8 @@ class _Looks:
         pictures = Pictures.of(scene, np.broadcast_to(sensor, (len(places), 2)), by_light(places))
         found = side_signals(pictures, names, np.broadcast_to(points, (len(places), *points.shape)))
         if places.shape[1]:
-            found = np.where(self.constraints.pairs(scene, sensor, places)[:, None, None, None], found, np.nan)
+            allowed = (self.problem.constraints or Constraints()).pairs(scene, sensor, places)
+            found = np.where(allowed[:, None, None, None], found, np.nan)
         return found
 
     def bound(self, sensor: np.ndarray) -> float:
@@ -263,72 +276,71 @@ def _finite(value: np.ndarray) -> float:
     return float(value) if np.isfinite(value) else np.inf
 
 
-def by_turns(
-    scene: Scene, sensors: np.ndarray, places: np.ndarray, model: str, aim: Aim,
-    constraints: Constraints, report: Report, shares: tuple[tuple[float, ...], ...],
-) -> Shared:  # fmt: skip
-    """The sensor, each free light and the shares moved in turn to the best of all, until none of them has a better one.
+def by_turns(problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares, report: Report) -> Shared:
+    """Coordinate search: the sensor, each free light and the shares in turn take the best of all their candidates.
 
-    Begins from the best of a coarse sample with all lights at one place: with the first and the last of the shares, and
-    those in the middle.
+    No guarantee, for whatever a mixture of contrasts does not tell of. Begins from the best of a coarse sample with all
+    lights at one place: with the first and the last of the shares, and those in the middle.
     """
     starts = dict.fromkeys((shares[0], shares[len(shares) // 2], shares[-1]))
-    turns = _Turns(scene, sensors, places, model, aim, constraints, shares)
+    turns = _Turns(problem, sensors, places if problem.scene.free else np.zeros((1, 0)), shares)
     ends = []
     for done, share in enumerate(starts):
         report("turns", done, len(starts))
         ends.append(turns.run(share))
     report("turns", len(starts), len(starts))
-    _, share, _, lights = min(ends, key=lambda end: end[0])
-    alone = [end for end in turns.alone if np.isfinite(end[0])]
-    table = np.tile(lights, (len(sensors), 1))
-    other = with_shares(scene, share)
-    least = _values(other, sensors, table, model, aim, constraints)
-    at = int(least.argmin())
-    which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
-    found = Found(at, at, float(least[at]), turns.evaluated, turns.evaluated, which, least, guaranteed=False)
-    return Shared(other, table, found, Alone(*min(alone, key=lambda end: end[0])) if alone else None)
+    best = min(ends, key=_value)
+    alone = [end for end in turns.alone if np.isfinite(end.value)]
+    lights, mixed = np.tile(best.lights, (len(sensors), 1)), turns.mixed(best.shares)
+    least, count = mixed.feasible_values(sensors, lights), turns.evaluated
+    return _shared(mixed.scene, lights, least, (count, count, False), min(alone, key=_value) if alone else None)
+
+
+def _value(setting: Mixture) -> float:
+    return setting.value
 
 
 class _Turns:
     """Moves one thing at a time; remembers where one light had all."""
 
-    def __init__(self, scene, sensors, places, model, aim, constraints, shares) -> None:
-        self.scene, self.how, self.shares = scene, (model, aim, constraints), shares
-        self.free = len(scene.free)
-        self.sensors, self.places = sensors, places if self.free else np.zeros((1, 0))
+    def __init__(self, problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares) -> None:
+        self.problem, self.sensors, self.places, self.shares = problem, sensors, places, shares
         self.evaluated, self.alone = 0, []
 
-    def _tried(self, share, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+    def mixed(self, share: tuple[float, ...]) -> SearchProblem:
+        return replace(self.problem, scene=with_shares(self.problem.scene, share))
+
+    def _best(self, share: tuple[float, ...], sensors: np.ndarray, lights: np.ndarray) -> Mixture:
+        """The best of pairs (n, 2), (n, 2 F)."""
         self.evaluated += len(sensors)
-        return _values(with_shares(self.scene, share), sensors, lights, *self.how)
+        values = self.mixed(share).feasible_values(sensors, lights)
+        at = int(values.argmin())
+        return Mixture(float(values[at]), share, sensors[at], lights[at])
 
-    def run(self, share: tuple[float, ...]) -> tuple:
-        """Value, shares, sensor and lights where it stops."""
+    def run(self, share: tuple[float, ...]) -> Mixture:
+        """Where it stops."""
         some = [poses[:: max(1, len(poses) // 40)] for poses in (self.sensors, self.places)]
-        pairs = [(s, np.tile(k, self.free)) for s in some[0] for k in some[1]]
-        values = self._tried(share, *(np.array(part) for part in zip(*pairs, strict=True)))
-        best, (sensor, lights) = float(values.min()), pairs[int(values.argmin())]
-        better = np.isfinite(best)
-        while better:
-            better = False
-            for role in range(self.free + 1):
-                tried = self.sensors if role == 0 else self.places
-                s, k = np.tile(sensor, (len(tried), 1)), np.tile(lights, (len(tried), 1))
-                (s if role == 0 else k[:, 2 * role - 2 : 2 * role])[:] = tried
-                values = self._tried(share, s, k)
-                if values.min() < best * BETTER:
-                    at, better = int(values.argmin()), True
-                    best, sensor, lights = float(values[at]), s[at], k[at]
+        sensors = np.repeat(some[0], len(some[1]), 0)
+        lights = np.tile(some[1], (len(some[0]), max(1, len(self.problem.scene.free))))
+        here, before = self._best(share, sensors, lights), np.inf
+        while here.value < before:
+            before = here.value
+            for role in range(len(self.problem.scene.free) + 1):
+                here = _better(here, self._moved(here, role))
             for other in self.shares:
-                (value,) = self._tried(other, sensor[None], lights[None])
-                if value < best * BETTER:
-                    best, share, better = float(value), other, True
-            if max(share) == 1 and len(share) > 1:
-                self.alone.append((best, share, sensor, lights))
-        return best, share, sensor, lights
+                here = _better(here, self._best(other, here.sensor[None], here.lights[None]))
+            if max(here.shares) == 1 and len(here.shares) > 1:
+                self.alone.append(here)
+        return here
+
+    def _moved(self, here: Mixture, role: int) -> Mixture:
+        """With the sensor (0) or a free light (1, ...) at the best of its candidates."""
+        tried = self.sensors if role == 0 else self.places
+        sensors, lights = np.tile(here.sensor, (len(tried), 1)), np.tile(here.lights, (len(tried), 1))
+        (sensors if role == 0 else lights[:, 2 * role - 2 : 2 * role])[:] = tried
+        return self._best(here.shares, sensors, lights)
 
 
-def _values(scene, sensors, lights, model, aim, constraints: Constraints) -> np.ndarray:
-    values = evaluate_pairs(scene, sensors, lights, model, aim)
-    return np.where(constraints.pairs(scene, sensors, lights), values, np.inf) if constraints.on_pairs else values
+def _better(one: Mixture, other: Mixture) -> Mixture:
+    """The other where it is clearly better."""
+    return other if other.value < one.value * BETTER else one

@@ -1,21 +1,35 @@
-"""What a plan minimises: one variance, or those of several quantities over their tolerances."""
+"""What a plan minimises, and over which settings: an objective, its constraints, its evaluation.
+
+Fast evaluation takes microseconds a picture; the ray-traced one (`planner.predict`) also knows the light between faces,
+places along circles, and bias.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from typing import Literal, get_args
 
 import numpy as np
 
-from scenes import InvalidInput, Quantity
+from imaging.models import variance_model
+from imaging.models.errors import Errors
+from imaging.pictures import Pictures
+from planner.search.constraints import Constraints
+from planner.search.grid import by_light
+from scenes import InvalidInput, Quantity, Scene
 from scenes.errors import given
 
 Objective = Literal["object", "image"]
 Over = Literal["minimax", "sum"]
 DEFAULT_OBJECTIVE: Objective = "object"
 DEFAULT_OVER: Over = "minimax"
+_PAIRS = 8192  # evaluated at a time, and ...
+_TABLE = 20_000  # ... of a table of all sensors and lights
+_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
+
+Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +64,8 @@ class Aim:
         """
         if isinstance(objective, Aim):
             return objective
-        _check("objective", objective, get_args(Objective))
-        _check("over", over, get_args(Over))
+        check_choice("objective", objective, get_args(Objective))
+        check_choice("over", over, get_args(Over))
         if len(quantities) == 1:
             return cls(objective, over, np.ones(1))
         if objective == "image":
@@ -75,6 +89,109 @@ class Aim:
         return parts.max(-1) if self.over == "minimax" else parts.sum(-1)
 
 
-def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
+@dataclass(frozen=True, eq=False)
+class SearchProblem:
+    """An objective over the poses of a scene's sensor and free lights.
+
+    Attributes
+    ----------
+    scene : Scene
+    model : {"calibrated", "paper", "bound"}
+    aim : Aim
+        What is minimised.
+    constraints : Constraints or None
+        Which settings are feasible; all where None.
+    """
+
+    scene: Scene
+    model: str
+    aim: Aim
+    constraints: Constraints | None = None
+
+    @classmethod
+    def of(
+        cls, scene: Scene, model: str, objective: str | Aim, constraints: Constraints | None = None
+    ) -> SearchProblem:
+        """With the objective that the scene's quantities make of a word."""
+        return cls(scene, model, Aim.of(scene.quantities, objective), constraints)
+
+    def errors(self, sensors: np.ndarray, lights: np.ndarray) -> Errors:
+        """Fast evaluation of sensors (..., 2) and free lights (..., 2 F), broadcast; ray-traced of a single pair."""
+        return variance_model(self.model)(Pictures.of(self.scene, sensors, by_light(lights)))
+
+    def values(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """What is minimised of pairs (n, 2) and (n, 2 F), feasible or not, shape (n,)."""
+        found = np.empty(len(sensors))
+        for at in range(0, len(sensors), _PAIRS):
+            part = slice(at, at + _PAIRS)
+            found[part] = minimised(self.errors(sensors[part], lights[part]), self.aim)
+        return found
+
+    def feasible(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """Which pairs, broadcast, keep the constraints on sensor and lights together; bool."""
+        if self.constraints is None or not self.constraints.on_pairs:
+            return np.array(True)
+        return self.constraints.pairs(self.scene, sensors, lights)
+
+    def feasible_values(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """`values`, infinite where not `feasible`."""
+        return np.where(self.feasible(sensors, lights), self.values(sensors, lights), np.inf)
+
+    def table(
+        self, sensors: np.ndarray, lights: np.ndarray, report: Report
+    ) -> Iterator[tuple[slice, Errors, np.ndarray]]:
+        """Fast evaluation of all pairs of sensors (S, 2) and lights (L, 2 F), some sensors at a time.
+
+        Yields which sensors, errors of shape (s, L, ...), and whether a pair is feasible.
+        """
+        size = max(1, _TABLE // max(len(lights), 1))
+        for at in range(0, len(sensors), size):
+            part = slice(at, at + size)
+            both = sensors[part, None], lights[None]
+            yield part, self.errors(*both), self.feasible(*both)
+            report("pairs", min(at + size, len(sensors)), len(sensors))
+
+    def value_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], float]:
+        """What a local search from a setting minimises: infinite where not feasible, or where levels are cut off.
+
+        The latter only if they are not cut off where it begins.
+        """
+
+        def told(s: np.ndarray, k: np.ndarray) -> tuple[float, bool]:
+            errors = self.errors(s[None], k[None])
+            return float(minimised(errors, self.aim)[0]), bool(cut_off(errors, self.scene)[0])
+
+        anyway = told(sensor, light)[1]
+
+        def value(s: np.ndarray, k: np.ndarray) -> float:
+            found, cut = told(s, k)
+            return np.inf if cut and not anyway else found
+
+        return self.where_feasible(value)
+
+    def where_feasible(
+        self, value: Callable[[np.ndarray, np.ndarray], float]
+    ) -> Callable[[np.ndarray, np.ndarray], float]:
+        """A function of sensor (2,) and free lights (2 F,), infinite where these do not keep the constraints."""
+        limits = self.constraints or Constraints()
+        return lambda s, k: value(s, k) if limits.allows(self.scene, s, k) else np.inf
+
+
+def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
+    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several."""
+    aim = Aim.of(errors.measurands.quantities, objective)
+    return aim(errors.variances if aim.unit == "image" else errors.variances_object)
+
+
+def cut_off(errors: Errors, scene: Scene) -> np.ndarray:
+    """In which pictures (...) the end of the scale has cut off levels of an edge.
+
+    What is cut off scatters less, so that a plain minimum is led to where every measurement is biased.
+    """
+    return (errors.noise_variance < _UNCUT * scene.noise.variance).any(-1)
+
+
+def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """See that an option is one of its choices."""
     if not isinstance(value, str) or value not in choices:
         raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {given(value)}")

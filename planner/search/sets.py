@@ -1,4 +1,8 @@
-"""Which pictures together: sets, with repeats, chosen from a table of what each picture tells of each quantity."""
+"""Several pictures of one object: sets, with repeats, chosen from a table of what each picture tells of each quantity.
+
+``told`` (S, L, M) is the information (1 / variance) that each sensor x light pair has about each of M measurands, by
+fast evaluation.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +14,19 @@ from itertools import combinations_with_replacement, islice
 import numpy as np
 
 from imaging.geometry.projection import direction
-from imaging.models import variance_model
-from imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
 from planner.search.candidates import DEAREST
-from planner.search.constraints import Constraints
-from planner.search.exhaustive import Report
 from planner.search.local import refine
-from planner.search.objective import Aim
-from scenes import Scene
+from planner.search.objective import Aim, Report, SearchProblem
 from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one
 _CHUNK = 20_000
 _BLOCK = 4096  # pictures compared at a time with those that are kept
 _SEEDS, _SMALL = 64, 4  # pictures, of them all and of a set, that are few enough to begin it with each of them
+_GROUPS = 24  # places of what is shared that are searched on
+_ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is traced
+_SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a local search
 _LESS = 1 - 1e-9  # times what is minimised: what differs less is the same
 
 
@@ -53,6 +55,10 @@ class Information:
         """Some of the pictures."""
         return Information(self.ok[rows], self.clutter[rows], self.over)
 
+    def together(self, rows: list[int]) -> Information:
+        """What some of the pictures tell together, one row."""
+        return Information(self.ok[rows].sum(0)[None], self.clutter[rows].sum(0)[None], self.over)
+
     def of_sets(self, members: np.ndarray) -> Score:
         """Of sets of pictures, indices (..., K)."""
         return self._score(self.ok[members].sum(-2), self.clutter[members].sum(-2))
@@ -61,6 +67,10 @@ class Information:
         """Of a set of K pictures and each of the P as one more."""
         kept = list(members)
         return self._score(self.ok[kept].sum(0) + self.ok, self.clutter[kept].sum(0) + self.clutter)
+
+    def plus(self, ok: np.ndarray, clutter: np.ndarray) -> tuple[int, float, float]:
+        """Of a set whose one row this is, and one more picture (M,)."""
+        return self._score(self.ok[0] + ok, self.clutter[0] + clutter).at(0)
 
     def _score(self, ok: np.ndarray, clutter: np.ndarray) -> Score:
         told = np.where(ok > 0, ok, clutter / DEAREST)
@@ -236,10 +246,21 @@ def _least_sum(told: np.ndarray, rounds: int = 300) -> tuple[float, np.ndarray]:
     return bound, weights
 
 
-_GROUPS = 24  # places of what is shared that are searched on
+def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
+    """1 / (share x variance) of variances (..., M); 0 where infinite."""
+    with np.errstate(divide="ignore"):
+        return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
 
 
-def worthwhile(told: np.ndarray, aim: Aim) -> np.ndarray:
+def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> np.ndarray:
+    """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible."""
+    told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
+    for part, errors, allowed in problem.table(sensors, lights, report):
+        told[part] = information(errors.variances_object, problem.aim) * allowed[..., None]
+    return told
+
+
+def undominated(told: np.ndarray, aim: Aim) -> np.ndarray:
     """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
     flat = told.reshape(-1, told.shape[-1])
     best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
@@ -256,7 +277,7 @@ def alone(told: np.ndarray, aim: Aim) -> np.ndarray:
     return parts.max(-1) if aim.over == "minimax" else parts.sum(-1)
 
 
-def shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
+def undominated_shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
     """The same where pictures share their sensor, or their light (``share``).
 
     For each of its places the greedy set of ``count`` pictures is valued; the pairs that none dominates at the best
@@ -280,57 +301,29 @@ def all_ok(told: np.ndarray, aim: Aim) -> Information:
     return Information(told, np.zeros_like(told), aim.over)
 
 
-_ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is looked at
-_AT_A_TIME = 20_000  # pairs
-
-
-def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
-    """1 / (share x variance) of variances (..., M); 0 where infinite."""
-    with np.errstate(divide="ignore"):
-        return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
-
-
-def glanced(
-    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim, constraints: Constraints,
-    report: Report,
-) -> np.ndarray:  # fmt: skip
-    """What every pair of sensors (S, 2) and lights (L, 2) tells of each quantity, shape (S, L, M); 0 if not allowed."""
-    told = np.empty((len(sensors), len(lights), len(scene.quantities)))
-    evaluate, size = variance_model(model), max(1, _AT_A_TIME // len(lights))
-    for at in range(0, len(sensors), size):
-        part = sensors[at : at + size]
-        told[at : at + size] = information(
-            evaluate(Pictures.of(scene, part[:, None], lights[None])).variances_object, aim
-        )
-        if constraints.on_pairs:
-            allowed = constraints.pairs(scene, part[:, None], lights[None])
-            told[at : at + size] *= allowed[..., None]
-        report("pairs", min(at + size, len(sensors)), len(sensors))
-    return told
-
-
 class Pool:
-    """Settings to choose from, rows of ``poses``; grows when a descent finds one beside them.
+    """Candidates, rows of ``poses``; grows when a local search finds one beside them.
 
-    Parameters
+    Attributes
     ----------
-    scene, model, aim
+    problem : SearchProblem
     poses : ndarray, shape (P, 4)
         Sensor and light, each polar angle and azimuth, degrees.
     told : ndarray, shape (P, M)
-        What a glance tells (`information`).
+        Their information by fast evaluation (`information`).
+    traced : dict
+        Predictions of the rows that were ray-traced.
     """
 
-    def __init__(self, scene: Scene, model: str, aim: Aim, poses: np.ndarray, told: np.ndarray) -> None:
-        self.scene, self.model, self.aim = scene, model, aim
-        self.poses, self.told = poses, told
-        self.closely: dict[int, Prediction] = {}  # of the rows looked at closely
+    def __init__(self, problem: SearchProblem, poses: np.ndarray, told: np.ndarray) -> None:
+        self.problem, self.poses, self.told = problem, poses, told
+        self.traced: dict[int, Prediction] = {}
 
-    def look(self, row: int) -> None:
-        """Look closely at a row, if it has not been done."""
-        if row not in self.closely:
-            sensor, light = (tuple(map(float, self.poses[row, part])) for part in (slice(0, 2), slice(2, 4)))
-            self.closely[row] = predict(self.scene, sensor, light, self.model)
+    def trace(self, row: int) -> None:
+        """Ray-traced evaluation of a row, once."""
+        if row not in self.traced:
+            sensor, light = (tuple(map(float, part)) for part in np.split(self.poses[row], 2))
+            self.traced[row] = predict(self.problem.scene, sensor, light, self.problem.model)
 
     def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
         """A further row; its number."""
@@ -340,18 +333,18 @@ class Pool:
 
     @property
     def seen(self) -> np.ndarray:
-        """Rows looked at closely, in their order."""
-        return np.array(sorted(self.closely), int)
+        """Ray-traced rows, in their order."""
+        return np.array(sorted(self.traced), int)
 
     def known(self) -> Information:
         """What the rows `seen` tell."""
-        told = [self.closely[row].measurands for row in self.seen]
-        values = information(np.array([[each.variance_object for each in row] for row in told]), self.aim)
+        told = [self.traced[row].measurands for row in self.seen]
+        values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.aim)
         fine = np.array([[is_trusted(each.status) for each in row] for row in told])
-        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.aim.over)
+        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.aim.over)
 
     def expected(self) -> Information:
-        """What all rows tell: as seen closely, else as glanced at, cluttered as the nearest row that was seen is."""
+        """What all rows tell: ray-traced, else by fast evaluation, cluttered as the nearest ray-traced row is."""
         cluttered = np.zeros(self.told.shape, bool)
         seen = self.seen
         if len(seen):
@@ -364,57 +357,43 @@ class Pool:
         ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
         if len(seen):
             ok[seen], clutter[seen] = known.ok, known.clutter
-        return Information(ok, clutter, self.aim.over)
+        return Information(ok, clutter, self.problem.aim.over)
 
+    def refine(self, row: int, rest: Information, step_deg: float) -> int:
+        """The row after a local search of its poses, or itself where that finds nothing better; the row's number.
 
-_SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a descent
+        Parameters
+        ----------
+        rest : Information
+            One row: what the other pictures of its set tell.
 
+        What is clutter in the row is taken to stay so on the way. If ray-traced evaluation does not bear out what the
+        fast one told, a shorter search is tried.
+        """
+        sensor, light = np.split(self.poses[row], 2)
+        cluttered = np.array([not is_trusted(each.status) for each in self.traced[row].measurands])
 
-def descend(
-    pool: Pool, row: int, rest: tuple[np.ndarray, np.ndarray], constraints: Constraints, step_deg: float
-) -> int:
-    """Refine a row of the pool, glancing, and look closely at what is found.
+        def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
+            return information(self.problem.errors(s[None], k[None]).variances_object[0], self.problem.aim)
 
-    Parameters
-    ----------
-    rest : pair of ndarray, shape (M,)
-        What the other pictures of its set tell, ``ok`` and ``clutter``.
+        def score(s: np.ndarray, k: np.ndarray) -> tuple[int, float, float]:
+            values = told(s, k)
+            return rest.plus(np.where(cluttered, 0.0, values), np.where(cluttered, values, 0.0))
 
-    Returns
-    -------
-    int
-        Number of the new row, or of the old one if none is better.
+        def value(s: np.ndarray, k: np.ndarray) -> float:
+            here = score(s, k)
+            return here[1] if here[0] <= begun[0] else np.inf
 
-    What is clutter in the row is taken to stay so on the way. If the close look does not bear out what was glanced at,
-    a shorter descent is tried.
-    """
-    sensor, light = pool.poses[row, :2], pool.poses[row, 2:]
-    cluttered = np.array([not is_trusted(each.status) for each in pool.closely[row].measurands])
+        def ray_traced(which: int) -> tuple[int, float, float]:
+            known, at = self.known(), int(np.searchsorted(self.seen, which))
+            return rest.plus(known.ok[at], known.clutter[at])
 
-    def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
-        errors = variance_model(pool.model)(Pictures.of(pool.scene, s[None], k[None]))
-        return information(errors.variances_object[0], pool.aim)
-
-    def score(values: np.ndarray) -> tuple[int, float, float]:
-        ok, clutter = np.where(cluttered, 0.0, values), np.where(cluttered, values, 0.0)
-        table = Information((rest[0] + ok)[None], (rest[1] + clutter)[None], pool.aim.over)
-        return table.of_sets(np.zeros(1, int)).at(0)
-
-    def value(s: np.ndarray, k: np.ndarray) -> float:
-        here = score(told(s, k))
-        return here[1] if here[0] <= begun[0] else np.inf
-
-    def closely(which: int) -> tuple[int, float, float]:
-        known, at = pool.known(), int(np.searchsorted(pool.seen, which))
-        return Information(rest[0] + known.ok, rest[1] + known.clutter, pool.aim.over).of_sets(np.array([at])).at(0)
-
-    begun = score(told(sensor, light))
-    for size in _SIZES:
-        how = pool.model, pool.aim, step_deg, constraints, value
-        *poses, least = refine(pool.scene, sensor, light, *how, sizes=(size,))
-        if least < begun[1]:
-            found = pool.add(*poses, told(*poses))
-            pool.look(found)
-            if better(closely(found), closely(row)):
-                return found
-    return row
+        begun = score(sensor, light)
+        for size in _SIZES:
+            end = refine(self.problem, (sensor, light), step_deg, value=value, sizes=(size,))
+            if end.value < begun[1]:
+                found = self.add(end.sensor, end.lights, told(end.sensor, end.lights))
+                self.trace(found)
+                if better(ray_traced(found), ray_traced(row)):
+                    return found
+        return row

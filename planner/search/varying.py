@@ -7,16 +7,13 @@ that can be trusted a descent leads down in poses and angles together. The scene
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
 import numpy as np
 
-from imaging.models import variance_model
-from imaging.pictures import Pictures
-from planner.prediction import minimised, predict, variances
-from planner.search.candidates import DEAREST, untrusted
+from planner.search.candidates import DEAREST, RayTraced
 from planner.search.constraints import Constraints
 from planner.search.design import (
     Choice,
@@ -26,15 +23,13 @@ from planner.search.design import (
     Varied,
     angles_of,
     bands_of,
-    check_vary,
     exposure_time,
     own_choice,
     with_choice,
 )
-from planner.search.exhaustive import Report, cut_off
 from planner.search.grid import ViewingSpace
-from planner.search.local import shifted
-from planner.search.objective import Aim
+from planner.search.local import Start, descend
+from planner.search.objective import Report, SearchProblem, cut_off, minimised
 from scenes import Pose, Scene
 
 ANGLE_STEP = 30.0  # degrees, of either polariser
@@ -46,60 +41,38 @@ _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and o
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
 _AT_ONCE = 8192  # pairs
-
-
-def vary_choice(
-    scene: Scene,
-    poses: tuple[Pose, Pose],
-    others: tuple[tuple[Pose, Pose], ...],
-    vary: tuple[str, ...],
-    *,
-    hold: Hold,
-    model: str,
-    aim: Aim,
-    constraints: Constraints,
-    held: tuple[bool, bool] = (False, False),
-    report: Report | None = None,
-) -> Varied:
-    """The best polarisers, lamp and filter, with poses of their own.
-
-    Parameters
-    ----------
-    scene : Scene
-    poses : pair of Pose
-        The best of the scene's own choice.
-    others : tuple of pairs of Pose
-        More pairs to begin at.
-    vary : tuple of {"analyser", "polarisation", "band"}
-    hold : {"time", "white"}
-    model, aim, constraints
-        As for the plan.
-    held : pair of bool
-        Whether the sensor's and the light's pose stay.
-
-    Raises
-    ------
-    InvalidInput
-        If the scene lacks what is to be varied.
-    """
-    check_vary(scene, vary, hold)
-    search = _Search(scene, vary, hold, model, aim, constraints, held)
-    return search.run(poses, others, report or (lambda *_: None))
+_NO_ANGLES = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
-    """The question, and the steps of its answer."""
+class Variation:
+    """The search for the best polarisers, lamp and filter, with poses of their own.
 
-    scene: Scene
+    Attributes
+    ----------
+    problem : SearchProblem
+        Of the scene's own choice.
+    vary : tuple of {"analyser", "polarisation", "band"}
+    hold : {"time", "white"}
+    held : pair of bool
+        Whether the sensor's and the light's pose stay.
+    """
+
+    problem: SearchProblem
     vary: tuple[str, ...]
     hold: Hold
-    model: str
-    aim: Aim
-    limits: Constraints
-    held: tuple[bool, bool]
+    held: tuple[bool, bool] = (False, False)
+
+    @property
+    def _limits(self) -> Constraints:
+        return self.problem.constraints or Constraints()
+
+    @property
+    def scene(self) -> Scene:
+        return self.problem.scene
 
     def run(self, poses: tuple[Pose, Pose], others: tuple[tuple[Pose, Pose], ...], report: Report) -> Varied:
+        """What is gained over the scene's own choice at its best ``poses``; ``others`` are more pairs to begin at."""
         sensor, light = (np.array(list(pose)) for pose in poses)
         pairs, angles = self._pairs((sensor, light), others), angles_of(self.scene, self.vary, ANGLE_STEP)
         count = 0
@@ -156,14 +129,14 @@ class _Search:
         """Allowed pairs of a coarse grid, and those that are given, shape (n, 2) each."""
         grids = []
         for held, pose, polar in zip(
-            self.held, poses, (self.limits.sensor_polar_deg, self.limits.light_polar_deg), strict=True
+            self.held, poses, (self._limits.sensor_polar_deg, self._limits.light_polar_deg), strict=True
         ):
             grids.append(pose[None] if held else ViewingSpace(POSE_STEP, polar).poses)
         sensors, lights = grids
-        sensors = sensors[self.limits.sensors(self.scene, sensors)]
-        lights = lights[self.limits.lights(lights)]
+        sensors = sensors[self._limits.sensors(self.scene, sensors)]
+        lights = lights[self._limits.lights(lights)]
         grid = np.array(list(product(sensors.tolist(), lights.tolist())), float).reshape(-1, 2, 2)
-        grid = grid[self.limits.pairs(self.scene, grid[:, 0], grid[:, 1])]
+        grid = grid[self._limits.pairs(self.scene, grid[:, 0], grid[:, 1])]
         given = np.array([poses, *([list(pose) for pose in pair] for pair in others)], float)
         kept = [
             all(not h or np.allclose(a, b) for h, a, b in zip(self.held, pair, poses, strict=True)) for pair in given
@@ -177,19 +150,22 @@ class _Search:
         What is cut off scatters less, so that a plain minimum is led to where every measurement is biased; descents
         do not go there, either.
         """
-        world = with_choice(self.scene, choice, self.hold)
         parts = [slice(at, at + _AT_ONCE) for at in range(0, len(sensors), _AT_ONCE)]
-        found = [self._values(world, sensors[part], lights[part]) for part in parts]
+        found = [self._values(choice, sensors[part], lights[part]) for part in parts]
         least, cut = (np.concatenate(each) for each in zip(*found, strict=True))
         whole = np.where(cut, np.inf, least)
         least = whole if np.isfinite(whole).any() else least
         order = [i for i in np.argsort(least, kind="stable")[:_KEPT] if np.isfinite(least[i])]
         return [Place(choice, sensors[i], lights[i], float(least[i])) for i in order]
 
-    def _values(self, world: Scene, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _with(self, choice: Choice) -> SearchProblem:
+        return replace(self.problem, scene=with_choice(self.scene, choice, self.hold))
+
+    def _values(self, choice: Choice, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
-        found = variance_model(self.model)(Pictures.of(world, sensors, lights))
-        return minimised(found, self.aim), cut_off(found, world)
+        world = self._with(choice)
+        found = world.errors(sensors, lights)
+        return minimised(found, world.aim), cut_off(found, world.scene)
 
     def _clear(self, found: list[Place]) -> Iterator[Place]:
         """Clearly different ones, the best first."""
@@ -216,48 +192,51 @@ class _Search:
         return place
 
     def _descended(
-        self, start: Place, most: int, sizes: tuple[float, ...] = _SIZES, *, poses: bool = True, angles: bool = True
+        self, begin: Place, most: int, sizes: tuple[float, ...] = _SIZES, *, poses: bool = True, angles: bool = True
     ) -> Place:
         """Downhill in the poses that are free and the angles that are varied, as long as it can be trusted."""
-        choice = start.choice
-        turning = [
-            name for vary, name in (("analyser", "analyser_deg"), ("polarisation", "polarisation_deg"))
-            if angles and vary in self.vary and getattr(choice, name) is not None
-        ]  # fmt: skip
-        free = tuple(poses and not held for held in self.held)
+        turning = self._turning(begin.choice) if angles else []
+        held = tuple(held or not poses for held in self.held)
 
-        def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> float:
-            if any(free) and not self.limits.allows(self.scene, sensor, light):
+        def choice(turns: np.ndarray) -> Choice:
+            return replace(begin.choice, **{n: float(turn) % 180 for n, turn in zip(turning, turns, strict=True)})
+
+        def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray = _NO_ANGLES) -> float:
+            if not all(held) and not self._limits.allows(self.scene, sensor, light):
                 return np.inf
-            world = with_choice(self.scene, self._turned(choice, turning, turns), self.hold)
-            (found,), (cut,) = self._values(world, sensor[None], light[None])
+            (found,), (cut,) = self._values(choice(turns), sensor[None], light[None])
             return np.inf if cut else float(found)
 
-        def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> bool:
-            return self._untrusted(Place(self._turned(choice, turning, turns), sensor, light, np.nan)) <= most
+        def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray = _NO_ANGLES) -> bool:
+            return self._untrusted(Place(choice(turns), sensor, light, np.nan)) <= most
 
-        begin = start.sensor, start.light, np.array([getattr(choice, name) for name in turning], float)
-        sensor, light, turns = descend(begin, free, value, trust, sizes, one_mount=self.limits.same_mount)
-        end = self._place(self._turned(choice, turning, turns), sensor, light)
-        return min(self._place(choice, start.sensor, start.light), end, key=_value)
+        own = np.array([getattr(begin.choice, name) for name in turning], float)
+        if not np.isfinite(value(begin.sensor, begin.light, own)):
+            return self._place(begin.choice, begin.sensor, begin.light)
+        start = Start(begin.sensor, begin.light, own, held, self._limits.same_mount)
+        sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=True)
+        ends = (choice(turns), sensor, light), (begin.choice, begin.sensor, begin.light)
+        return min((self._place(*end) for end in ends), key=_value)
 
-    def _turned(self, choice: Choice, names: list[str], turns: np.ndarray) -> Choice:
-        return replace(choice, **{name: float(turn) % 180 for name, turn in zip(names, turns, strict=True)})
+    def _turning(self, choice: Choice) -> list[str]:
+        """Names of a choice's angles that are varied."""
+        names = ("analyser", "analyser_deg"), ("polarisation", "polarisation_deg")
+        return [name for vary, name in names if vary in self.vary and getattr(choice, name) is not None]
 
     def _untrusted(self, place: Place) -> int:
-        return untrusted(with_choice(self.scene, place.choice, self.hold), place.sensor, place.light, self.model)
+        return RayTraced.of(self._with(place.choice), place.sensor, place.light).untrusted
 
     def _place(self, choice: Choice, sensor: np.ndarray, light: np.ndarray) -> Place:
-        """With what a close look says."""
-        world = with_choice(self.scene, choice, self.hold)
-        return Place(choice, sensor, light, float(variances(world, sensor, light, self.model, self.aim)))
+        """With its ray-traced value."""
+        world = self._with(choice)
+        return Place(choice, sensor, light, float(minimised(world.errors(sensor, light), world.aim)))
 
     def _told(self, place: Place) -> Chosen:
-        world = with_choice(self.scene, place.choice, self.hold)
+        world = self._with(place.choice)
+        status = RayTraced.of(world, place.sensor, place.light).prediction.status
         poses = Pose(*map(float, place.sensor)), Pose(*map(float, place.light))
-        status = predict(world, *poses, self.model).status
         time = exposure_time(self.scene, place.choice, self.hold)
-        return Chosen(place.choice, world, *poses, place.value, status, time)
+        return Chosen(place.choice, world.scene, *poses, place.value, status, time)
 
 
 _GUARANTEE = (
@@ -268,70 +247,3 @@ _GUARANTEE = (
 
 def _value(place: Place) -> float:
     return place.value
-
-
-Point = tuple[np.ndarray, np.ndarray, np.ndarray]
-_MOST = 100  # evaluations of each simplex
-
-
-def descend(
-    begin: Point,
-    free: tuple[bool, bool],
-    value: Callable[[np.ndarray, np.ndarray, np.ndarray], float],
-    trust: Callable[[np.ndarray, np.ndarray, np.ndarray], bool],
-    sizes: tuple[float, ...],
-    *,
-    one_mount: bool = False,
-) -> Point:
-    """Nelder-Mead in the tangent planes of the free poses and in further angles.
-
-    Parameters
-    ----------
-    begin : (sensor, light, angles)
-        Poses (2,) and angles (k,), degrees.
-    free : pair of bool
-        Whether the sensor and the light may move.
-    value : callable
-        What is minimised; infinite where it is not allowed.
-    trust : callable
-        Whether a point counts; asked only of points that would be the best so far, for it takes long.
-    sizes : tuple of float
-        Of the simplices, one after the other, degrees.
-    one_mount : bool
-        Whether the light stands where the sensor does.
-
-    Returns
-    -------
-    sensor, light, angles
-        Not worse than at the beginning.
-    """
-    ends = np.cumsum([2 * free[0], 2 * (free[1] and not one_mount), len(begin[2])])
-
-    def at(x: np.ndarray) -> Point:
-        moves = x[: ends[0]], x[ends[0] : ends[1]], x[ends[1] :]
-        poses = [shifted(p, move) if len(move) else p for p, move in zip(begin[:2], moves[:2], strict=True)]
-        return poses[0], poses[0] if one_mount and free[0] else poses[1], begin[2] + moves[2]
-
-    least = unit = value(*begin)
-    if not ends[-1] or not np.isfinite(unit):
-        return begin
-
-    def cost(x: np.ndarray) -> float:
-        nonlocal least
-        found = value(*at(x))
-        if found < least:
-            if not trust(*at(x)):
-                return np.finfo(float).max
-            least = found
-        return min(found / unit, np.finfo(float).max)
-
-    from scipy.optimize import minimize  # slow to load, and rarely needed
-
-    x, lowest = np.zeros(ends[-1]), 1.0
-    for size in sizes:
-        simplex = x + size * np.vstack([np.zeros(len(x)), np.eye(len(x))])
-        options = {"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-5, "maxfev": _MOST}
-        found = minimize(cost, x, method="Nelder-Mead", options=options)
-        if found.fun < lowest:
-            x, lowest = found.x, found.fun
-    return at(x)

@@ -10,8 +10,8 @@ import pytest
 import planner
 import scenes
 from planner.robustness import altered
-from planner.search.exhaustive import evaluate_pairs
 from scenes import InvalidInput
+from tests.pairs import evaluate_pairs
 from validation.cli import main as cli
 
 

@@ -10,11 +10,12 @@ from imaging.models.calibrated import calibrated
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
 from planner.search.bound import separable
-from planner.search.exhaustive import evaluate_pairs, exhaustive
+from planner.search.exhaustive import exhaustive
 from planner.search.grid import ViewingSpace
 from planner.search.objective import Aim
 from planner.uncertainty.conformity import decide
 from scenes import InvalidInput, Tolerance
+from tests.pairs import evaluate_pairs
 from validation import statistics
 
 V3, V6 = {"vertex": "v3", "edges": ["e4", "e9"]}, {"vertex": "v6", "edges": ["e7", "e11"]}
