@@ -61,9 +61,9 @@ def plan_views(
     what `plan` minimises, of these variances. N pictures take N times as long as one: compare them with one picture
     taken N times, whose variances are an Nth. Several sensors at a time are several pictures.
 
-    All pairs of a grid are glanced at; of those that no other can stand in for, sets are chosen greedily with
-    exchange. What is chosen is looked at closely (clutter, light between surfaces), and chosen again, until all that
-    is chosen has been looked at; then the poses of each picture descend, those of the others held.
+    All pairs of a grid are evaluated fast; of those that no other can stand in for, sets are chosen greedily with
+    exchange. What is chosen is ray-traced (clutter, light between surfaces), and chosen again, until all that is chosen
+    has been; then the poses of each picture descend, those of the others held.
 
     Parameters
     ----------

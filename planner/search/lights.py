@@ -24,7 +24,6 @@ from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
 from imaging.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
-from planner.search.constraints import Constraints
 from planner.search.exhaustive import BestPair
 from planner.search.grid import Grid, by_light
 from planner.search.objective import Report, SearchProblem
@@ -116,17 +115,17 @@ def search_shared(
 
     Places that a light may not have beside a sensor are left out one by one (`Constraints.pairs`).
     """
-    looks = _Looks(problem, places)
-    bounds = np.array([looks.bound(sensor) for sensor in sensors])
+    seen = _Contrasts(problem, places)
+    bounds = np.array([seen.bound(sensor) for sensor in sensors])
     order = np.argsort(bounds)
     best, chosen, alone = np.inf, shares[0], None
     for done, s in enumerate(order.tolist()):
         report("lights", done + 1, 2 * len(sensors))
         if not bounds[s] <= best:
             break
-        known = looks.look(sensors[s])
+        known = seen.look(sensors[s])
         for share in shares:
-            value, lights = looks.best(known, share)
+            value, lights = seen.best(known, share)
             if max(share) == 1 and np.isfinite(value) and (alone is None or value < alone.value):
                 alone = Mixture(value, share, sensors[s], lights)
             if value < best * BETTER:
@@ -137,13 +136,13 @@ def search_shared(
         if not np.isfinite(bounds[s]):
             break
         if bounds[s] <= 16 * best:  # beyond there is no candidate
-            least[s], lights[s] = looks.best(looks.look(sensors[s]), chosen)
+            least[s], lights[s] = seen.best(seen.look(sensors[s]), chosen)
     first = np.argsort(least)[:_EXACT]
     first = first[np.isfinite(least[first])]
     mixed = replace(problem, scene=with_shares(problem.scene, chosen))
     if len(first):
         least[first] = mixed.values(sensors[first], lights[first])
-    return _shared(mixed.scene, lights, least, (len(sensors) * looks.combinations, len(first), True), alone)
+    return _shared(mixed.scene, lights, least, (len(sensors) * seen.combinations, len(first), True), alone)
 
 
 def _shared(
@@ -156,7 +155,7 @@ def _shared(
     return Shared(scene, lights, found, alone)
 
 
-class _Looks:
+class _Contrasts:
     """Contrasts of a scene's edges under each light alone, from each of its places."""
 
     def __init__(self, problem: SearchProblem, places: np.ndarray) -> None:
@@ -197,7 +196,7 @@ class _Looks:
         pictures = Pictures.of(scene, np.broadcast_to(sensor, (len(places), 2)), by_light(places))
         found = side_signals(pictures, names, np.broadcast_to(points, (len(places), *points.shape)))
         if places.shape[1]:
-            allowed = (self.problem.constraints or Constraints()).pairs(scene, sensor, places)
+            allowed = self.problem.constraints.pairs(scene, sensor, places)
             found = np.where(allowed[:, None, None, None], found, np.nan)
         return found
 

@@ -15,6 +15,7 @@ from planner.search.objective import SearchProblem
 from scenes import InvalidInput, Pose, Scene
 
 _MOST_TURNS = 100
+Value = Callable[[np.ndarray, np.ndarray], float]
 _MOST = np.finfo(float).max  # instead of infinity, of which a simplex makes NaN
 
 
@@ -77,26 +78,25 @@ class Refined(NamedTuple):
 
 
 def refine(
-    problem: SearchProblem, pair: Sequence[np.ndarray], step_deg: float, *, value: Callable[..., float] | None = None,
+    problem: SearchProblem, pair: Sequence[np.ndarray], step_deg: float, *, value: Value | None = None,
     sizes: Sequence[float] = (0.7, 0.1), known: float = np.inf,
 ) -> Refined:  # fmt: skip
     """Below a grid of ``step_deg``: `descend` from a sensor (2,) and free lights (2 F,), within the constraints.
 
     ``value`` of sensor and lights is minimised, what the problem minimises where it is not given.
     """
-    limits = problem.constraints or Constraints()
-    start = Start(*pair, same_mount=limits.same_mount, unit_deg=step_deg)
+    start = Start(*pair, same_mount=problem.constraints.same_mount, unit_deg=step_deg)
     wanted = problem.value_from(*pair) if value is None else problem.where_feasible(value)
-    return descend(start, wanted, sizes=sizes, known=known)
+    return descend(start, lambda sensor, lights, _: wanted(sensor, lights), sizes=sizes, known=known)
 
 
 def descend(
     start: Start,
-    value: Callable[..., float],
+    value: Callable[[np.ndarray, np.ndarray, np.ndarray], float],
     *,
     sizes: Sequence[float],
     known: float = np.inf,
-    trusted: Callable[..., bool] | None = None,
+    trusted: Callable[[np.ndarray, np.ndarray, np.ndarray], bool] | None = None,
     fast: bool = False,
 ) -> Refined:
     """Nelder-Mead (`scipy.optimize`) from a start.
@@ -105,7 +105,7 @@ def descend(
     ----------
     start : Start
     value : callable
-        (sensor, lights), and the angles where there are any, to what is minimised; infinite where not feasible.
+        Sensor, lights and angles to what is minimised; infinite where not feasible.
     sizes : sequence of float
         Of the simplices, one after the other: a fresh one, for the one before may have collapsed at a border.
     known : float
@@ -123,8 +123,7 @@ def descend(
         If the beginning is not feasible, or nothing can be measured there.
     """
     begin = np.zeros(start.count)
-    given = (lambda x: start.at(x)) if start.angles.size else (lambda x: start.at(x)[:2])
-    unit = value(*given(begin))
+    unit = value(*start.at(begin))
     unit = unit if np.isfinite(unit) else known
     if not np.isfinite(unit):
         place = f"{start.sensor}, {start.lights}"
@@ -133,9 +132,9 @@ def descend(
 
     def cost(x: np.ndarray) -> float:
         nonlocal least
-        found = value(*given(x)) / unit if x.any() else 1.0
+        found = value(*start.at(x)) / unit if x.any() else 1.0
         if trusted is not None and found < least:
-            if not trusted(*given(x)):
+            if not trusted(*start.at(x)):
                 return _MOST
             least = found
         return min(found, _MOST)

@@ -16,7 +16,7 @@ import numpy as np
 from imaging.models import variance_model
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
-from planner.search.constraints import Constraints
+from planner.search.constraints import UNCONSTRAINED, Constraints
 from planner.search.grid import by_light
 from scenes import InvalidInput, Quantity, Scene
 from scenes.errors import given
@@ -99,21 +99,19 @@ class SearchProblem:
     model : {"calibrated", "paper", "bound"}
     aim : Aim
         What is minimised.
-    constraints : Constraints or None
-        Which settings are feasible; all where None.
+    constraints : Constraints
+        Which settings are feasible.
     """
 
     scene: Scene
     model: str
     aim: Aim
-    constraints: Constraints | None = None
+    constraints: Constraints = UNCONSTRAINED
 
     @classmethod
-    def of(
-        cls, scene: Scene, model: str, objective: str | Aim, constraints: Constraints | None = None
-    ) -> SearchProblem:
-        """With the objective that the scene's quantities make of a word."""
-        return cls(scene, model, Aim.of(scene.quantities, objective), constraints)
+    def of(cls, scene: Scene, model: str, objective: str | Aim, limits: Constraints | None = None) -> SearchProblem:
+        """With the objective that the scene's quantities make of a word; without limits every pose is feasible."""
+        return cls(scene, model, Aim.of(scene.quantities, objective), limits or UNCONSTRAINED)
 
     def errors(self, sensors: np.ndarray, lights: np.ndarray) -> Errors:
         """Fast evaluation of sensors (..., 2) and free lights (..., 2 F), broadcast; ray-traced of a single pair."""
@@ -129,9 +127,7 @@ class SearchProblem:
 
     def feasible(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
         """Which pairs, broadcast, keep the constraints on sensor and lights together; bool."""
-        if self.constraints is None or not self.constraints.on_pairs:
-            return np.array(True)
-        return self.constraints.pairs(self.scene, sensors, lights)
+        return self.constraints.pairs(self.scene, sensors, lights) if self.constraints.on_pairs else np.array(True)
 
     def feasible_values(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
         """`values`, infinite where not `feasible`."""
@@ -173,8 +169,7 @@ class SearchProblem:
         self, value: Callable[[np.ndarray, np.ndarray], float]
     ) -> Callable[[np.ndarray, np.ndarray], float]:
         """A function of sensor (2,) and free lights (2 F,), infinite where these do not keep the constraints."""
-        limits = self.constraints or Constraints()
-        return lambda s, k: value(s, k) if limits.allows(self.scene, s, k) else np.inf
+        return lambda s, k: value(s, k) if self.constraints.allows(self.scene, s, k) else np.inf
 
 
 def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:

@@ -14,7 +14,6 @@ from itertools import islice, product
 import numpy as np
 
 from planner.search.candidates import DEAREST, RayTraced
-from planner.search.constraints import Constraints
 from planner.search.design import (
     Choice,
     Chosen,
@@ -35,13 +34,12 @@ from scenes import Pose, Scene
 ANGLE_STEP = 30.0  # degrees, of either polariser
 POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
-_LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are looked at closely, and descents
+_LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are ray-traced, and descents
 _BANDS_WITH = 3  # angles with which all bands are tried
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
 _AT_ONCE = 8192  # pairs
-_NO_ANGLES = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +60,6 @@ class Variation:
     vary: tuple[str, ...]
     hold: Hold
     held: tuple[bool, bool] = (False, False)
-
-    @property
-    def _limits(self) -> Constraints:
-        return self.problem.constraints or Constraints()
 
     @property
     def scene(self) -> Scene:
@@ -127,16 +121,15 @@ class Variation:
 
     def _pairs(self, poses, others) -> tuple[np.ndarray, np.ndarray]:
         """Allowed pairs of a coarse grid, and those that are given, shape (n, 2) each."""
-        grids = []
-        for held, pose, polar in zip(
-            self.held, poses, (self._limits.sensor_polar_deg, self._limits.light_polar_deg), strict=True
-        ):
-            grids.append(pose[None] if held else ViewingSpace(POSE_STEP, polar).poses)
-        sensors, lights = grids
-        sensors = sensors[self._limits.sensors(self.scene, sensors)]
-        lights = lights[self._limits.lights(lights)]
+        limits, scene = self.problem.constraints, self.scene
+        polars = limits.sensor_polar_deg, limits.light_polar_deg
+        sensors, lights = (
+            pose[None] if held else ViewingSpace(POSE_STEP, polar).poses
+            for held, pose, polar in zip(self.held, poses, polars, strict=True)
+        )
+        sensors, lights = sensors[limits.sensors(scene, sensors)], lights[limits.lights(lights)]
         grid = np.array(list(product(sensors.tolist(), lights.tolist())), float).reshape(-1, 2, 2)
-        grid = grid[self._limits.pairs(self.scene, grid[:, 0], grid[:, 1])]
+        grid = grid[limits.pairs(scene, grid[:, 0], grid[:, 1])]
         given = np.array([poses, *([list(pose) for pose in pair] for pair in others)], float)
         kept = [
             all(not h or np.allclose(a, b) for h, a, b in zip(self.held, pair, poses, strict=True)) for pair in given
@@ -201,19 +194,19 @@ class Variation:
         def choice(turns: np.ndarray) -> Choice:
             return replace(begin.choice, **{n: float(turn) % 180 for n, turn in zip(turning, turns, strict=True)})
 
-        def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray = _NO_ANGLES) -> float:
-            if not all(held) and not self._limits.allows(self.scene, sensor, light):
+        def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> float:
+            if not all(held) and not self.problem.constraints.allows(self.scene, sensor, light):
                 return np.inf
             (found,), (cut,) = self._values(choice(turns), sensor[None], light[None])
             return np.inf if cut else float(found)
 
-        def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray = _NO_ANGLES) -> bool:
+        def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> bool:
             return self._untrusted(Place(choice(turns), sensor, light, np.nan)) <= most
 
         own = np.array([getattr(begin.choice, name) for name in turning], float)
         if not np.isfinite(value(begin.sensor, begin.light, own)):
             return self._place(begin.choice, begin.sensor, begin.light)
-        start = Start(begin.sensor, begin.light, own, held, self._limits.same_mount)
+        start = Start(begin.sensor, begin.light, own, held, self.problem.constraints.same_mount)
         sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=True)
         ends = (choice(turns), sensor, light), (begin.choice, begin.sensor, begin.light)
         return min((self._place(*end) for end in ends), key=_value)

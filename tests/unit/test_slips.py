@@ -37,7 +37,7 @@ from measure.fitting.photograph import Pixels, Shots
 from measure.photo import mtf as mtfs
 from measure.photo import recording
 from planner import robustness
-from planner.search.lights import _Looks, with_shares
+from planner.search.lights import _Contrasts, with_shares
 from planner.search.local import Refined, shifted
 from planner.search.objective import Aim, SearchProblem, cut_off
 from planner.uncertainty import Input, monte_carlo
@@ -152,7 +152,7 @@ def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
     scene = scenes.load("two_lights")
     scene, aim = changed(scene, camera={"focal_px": larger * scene.camera.focal_px}), Aim.of(scene.quantities, "object")
     place, ratios, lengths = np.array([[40.0, 300.0]]), [], []
-    looks = _Looks(SearchProblem(scene, "calibrated", aim, planner.Constraints()), place)
+    looks = _Contrasts(SearchProblem(scene, "calibrated", aim, planner.Constraints()), place)
     for sensor in np.array([[p, a] for p in (30.0, 60.0) for a in range(195, 360, 15)], float):
         known = looks.look(sensor)
         for share in ((0.0, 1.0), (0.3, 0.7)) if known else ():

@@ -33,7 +33,7 @@ def best_from(scene: Scene, state: State) -> State:
 
     limits = Constraints()
 
-    def variance(sensor: np.ndarray, lights: np.ndarray) -> float:
+    def variance(sensor: np.ndarray, lights: np.ndarray, _: np.ndarray | None = None) -> float:
         if not limits.allows(scene, sensor, lights):
             return np.inf
         given = by_light(lights[None])
