@@ -152,7 +152,7 @@ def _map(
         both = (np.array(list(held[0])), moved) if held[0] else (moved, by_light(as_array(held[1])))
         pictures = Pictures.of(scene, *both)
         found = evaluate(pictures)
-        values[at : at + _CHUNK] = minimised(found, problem.aim)
+        values[at : at + _CHUNK] = minimised(found, problem.objective)
         if clutter:
             ranks[at : at + _CHUNK] = quantity_ranks(found, clutter(pictures)).min(-1)
     return Map(space, values, np.array(WORST_FIRST)[ranks], scene, *held)

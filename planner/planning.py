@@ -207,18 +207,19 @@ def plan(
     tasks = required_edges(scene) if edges == "best" else ()
     searches = []
     for world in [scene.model_copy(update={"task": task}) for task in tasks] or [scene]:
-        step = default_step(world, model) if step_deg is None else step_deg
-        grid = Grid.of(world, limits, step, sensor, light)
+        grid = Grid.of(world, limits, default_step(world, model) if step_deg is None else step_deg, sensor, light)
         searches.append(Searched.of(SearchProblem(world, model, aim, limits), grid, search, start, shares, report))
     best = min(searches, key=lambda each: each.variance)
     if not np.isfinite(best.variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
     made = _finished(best, searches, refined)
-    if not vary:
-        return made
-    others = tuple((c.sensor, c.light) for c in made.candidates)
-    variation = Variation(SearchProblem(made.scene, model, aim, limits), vary, hold, best.grid.held)
-    return replace(made, varied=variation.run(made.poses, others, report))
+    return replace(made, varied=_varied(made, best, vary, hold, report)) if vary else made
+
+
+def _varied(made: Plan, best: Searched, vary: tuple[Vary, ...], hold: Hold, report: Report) -> Varied:
+    """What polarisers, lamps and filters gain over a plan."""
+    variation = Variation(replace(best.problem, scene=made.scene), vary, hold, best.grid.held)
+    return variation.run(made.poses, tuple((each.sensor, each.light) for each in made.candidates), report)
 
 
 def default_step(scene: Scene, model: str) -> float:
@@ -242,8 +243,8 @@ def _finished(best: Searched, searches: list[Searched], refined: bool) -> Plan:
         light=as_poses(taken.light),
         shares=shares_of(scene) if len(scene.lights) > 1 else (),
         alone=alone,
-        objective=problem.aim.unit,
-        over=problem.aim.over,
+        objective=problem.objective.unit,
+        over=problem.objective.over,
         model=problem.model,
         variance=taken.value,
         limiting=prediction.limiting or prediction.measurands[0].name,

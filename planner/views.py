@@ -139,7 +139,7 @@ def _pool(
     problem: SearchProblem, grid: Grid, told: np.ndarray, share: str | None, count: int
 ) -> tuple[Pool, np.ndarray | None]:
     """The candidates, and which of them share a place."""
-    aim = problem.aim
+    aim = problem.objective
     rows = undominated(told, aim) if share is None else undominated_shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
     pool = Pool(problem, np.concatenate([grid.sensors[s], grid.lights[k]], 1), told.reshape(-1, told.shape[-1])[rows])

@@ -159,7 +159,7 @@ def _searched(problem: SearchProblem, grid: Grid, moved: np.ndarray, report: Rep
     for part, errors, allowed in problem.table(grid.sensors, grid.lights, later):
         noise, beside = errors.variances_object, moved[part, None]
         for k, variances in enumerate((noise + np.where(np.isfinite(beside), beside, np.inf), noise)):
-            values = np.where(allowed, problem.aim(variances), np.inf)
+            values = np.where(allowed, problem.objective(variances), np.inf)
             i, j = np.unravel_index(int(values.argmin()), values.shape)
             if values[i, j] < best[k][0]:
                 best[k] = float(values[i, j]), part.start + int(i), int(j)
@@ -172,7 +172,7 @@ def _value(problem: SearchProblem, given: tuple[Source, ...]) -> Callable[[np.nd
     def value(sensor: np.ndarray, light: np.ndarray) -> float:
         picture = Picture.of(problem.scene, tuple(map(float, sensor)), as_poses(light))
         noise = variance_model(problem.model)(Pictures.of(picture)).variances_object
-        found = float(problem.aim(noise + systematic(problem.scene, sensor, given)))
+        found = float(problem.objective(noise + systematic(problem.scene, sensor, given)))
         return found if np.isfinite(found) else np.inf
 
     return value

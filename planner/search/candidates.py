@@ -18,14 +18,13 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
 from planner.search.exhaustive import BestPair, best_pair
-from planner.search.grid import Feasible, Grid, as_array, as_poses
+from planner.search.grid import APART, Feasible, Grid, as_array, as_poses, distinct
 from planner.search.lights import Mixture, best_lights
 from planner.search.local import Partial, alternating
 from planner.search.objective import Report, SearchProblem, minimised
 from scenes import Picture, Pose
 from scenes.status import is_trusted
 
-_APART = 15.0  # degrees between two sensors, or two lights, that are clearly different
 DEAREST = 4.0  # times the least variance that is paid for trust: standard deviations are twice as large
 
 
@@ -124,24 +123,22 @@ class Candidate:
 
 def candidates(searches: Sequence[Searched], count: int = 10) -> tuple[Candidate, ...]:
     """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges."""
-    chosen: list[tuple] = []
-    for row in sorted((row for each in searches for row in each.rows(count)), key=lambda row: row[0]):
-        if all(_differ(row, other) for other in chosen):
-            chosen.append(row)
-    made = [_candidate(searched.problem, sensor, light) for _, searched, sensor, light in chosen[: 2 * count]]
+    rows = sorted((row for each in searches for row in each.rows(count)), key=lambda row: row[0])
+    chosen = distinct(rows, _differ, 2 * count)
+    made = [_candidate(searched.problem, sensor, light) for _, searched, sensor, light in chosen]
     return tuple(sorted(made, key=lambda c: c.variance)[:count])
 
 
 def _candidate(problem: SearchProblem, sensor: np.ndarray, light: np.ndarray) -> Candidate:
     poses = Pose(*map(float, sensor)), as_poses(light)
     found = variance_model(problem.model)(Pictures.of(Picture.of(problem.scene, *poses)))
-    worst = int(np.argmax(found.variances_object * problem.aim.shares))
+    worst = int(np.argmax(found.variances_object * problem.objective.shares))
     return Candidate(
         *poses,
         problem.scene.required,
         float(found.variances_object[worst]),
         float(found.variances[worst]),
-        float(minimised(found, problem.aim)),
+        float(minimised(found, problem.objective)),
         problem.scene.quantities[worst].name,
     )
 
@@ -152,13 +149,13 @@ def _spread(directions: np.ndarray, count: int) -> list[int]:
     open_ = np.ones(len(directions), bool)
     while open_.any() and len(picked) < count:
         picked.append(int(np.argmax(open_)))
-        open_ &= directions @ directions[picked[-1]] < np.cos(np.radians(_APART))
+        open_ &= directions @ directions[picked[-1]] < np.cos(np.radians(APART))
     return picked
 
 
 def _differ(row: tuple, other: tuple) -> bool:
     """Whether sensors or lights are clearly apart."""
-    near = np.cos(np.radians(_APART))
+    near = np.cos(np.radians(APART))
     pairs = zip(_each(row), _each(other), strict=True)
     return any(direction(one) @ direction(two) < near for one, two in pairs)
 
@@ -184,9 +181,9 @@ class RayTraced(NamedTuple):
     def of(cls, problem: SearchProblem, sensor: np.ndarray, light: np.ndarray) -> RayTraced:
         """Of a sensor (2,) and the free lights (2 F,), degrees."""
         told = predict(problem.scene, tuple(map(float, sensor)), as_poses(light), problem.model)
-        variances = [getattr(each, f"variance_{problem.aim.unit}") for each in told.measurands]
+        variances = [getattr(each, f"variance_{problem.objective.unit}") for each in told.measurands]
         untrusted = sum(not is_trusted(each.status) for each in told.measurands)
-        return cls(sensor, light, told, float(problem.aim(np.array(variances))), untrusted)
+        return cls(sensor, light, told, float(problem.objective(np.array(variances))), untrusted)
 
 
 def trusted(

@@ -8,13 +8,11 @@ passes what the lamp's spectrum, the lens and the sensor leave of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from typing import Literal, get_args
 
 import numpy as np
 
-from imaging.geometry.projection import direction
 from imaging.light.reflectance import diffuse
 from scenes import Filter, InvalidInput, Lamp, Material, Pose, Scene
 
@@ -217,9 +215,6 @@ def _rows(*columns: np.ndarray) -> tuple:
     return tuple(map(tuple, np.column_stack(columns).tolist()))
 
 
-_APART = 15.0  # degrees: sensors, lights or polarisers of clearly different settings
-
-
 @dataclass(frozen=True)
 class Chosen:
     """A setting with its choice.
@@ -285,34 +280,3 @@ class Varied:
     def gain_same_poses(self) -> float:
         """The same at the poses of the fixed choice."""
         return self.fixed.variance / self.same_poses.variance
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A choice and poses (polar, azimuth) in degrees, with what is minimised there."""
-
-    choice: Choice
-    sensor: np.ndarray
-    light: np.ndarray
-    value: float
-
-    @cached_property
-    def _directions(self) -> np.ndarray:
-        return direction(np.array([self.sensor, self.light]))
-
-    def differs(self, other: Place) -> bool:
-        """Whether anything of it is clearly apart from another's."""
-        one, two = self.choice, other.choice
-        return bool(
-            (one.lamp, one.filter) != (two.lamp, two.filter)
-            or _apart(one.analyser_deg, two.analyser_deg) >= _APART
-            or _apart(one.polarisation_deg, two.polarisation_deg) >= _APART
-            or (np.einsum("ij,ij->i", self._directions, other._directions) < np.cos(np.radians(_APART))).any()
-        )
-
-
-def _apart(a: float | None, b: float | None) -> float:
-    """Angle between two polarisers, which are the same after half a turn; infinite if only one is there."""
-    if a is None or b is None:
-        return 0.0 if a is b else np.inf
-    return abs((a - b + 90) % 180 - 90)

@@ -79,7 +79,7 @@ def best_pair(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
 
 
 def _by_bound(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> BestPair:
-    table = separable(problem.scene, sensors, lights, problem.model, problem.aim)
+    table = separable(problem.scene, sensors, lights, problem.model, problem.objective)
     least, column = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
     done, whole = 0, 2 * len(table.sensors)
     for rows, which, bound in _blocks(table, problem, sensors, lights):
@@ -126,7 +126,7 @@ def _blocks(
 def _one_by_one(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> BestPair:
     least, column = (np.full((2, len(sensors)), value) for value in (np.inf, -1))  # of all pairs, and of those within
     for part, errors, allowed in problem.table(sensors, lights, report):
-        values = np.where(allowed, minimised(errors, problem.aim), np.inf)
+        values = np.where(allowed, minimised(errors, problem.objective), np.inf)
         for k, some in enumerate((values, np.where(cut_off(errors, problem.scene), np.inf, values))):
             column[k, part] = some.argmin(1)
             least[k, part] = some.min(1)

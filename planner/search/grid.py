@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -15,6 +16,17 @@ from planner.search.constraints import Constraints
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given
+
+
+def distinct(items: Iterable[T], differ: Callable[[T, T], bool], most: int) -> Iterator[T]:
+    """Those items that differ from all before, at most ``most``."""
+    kept: list[T] = []
+    for item in items:
+        if len(kept) == most:
+            return
+        if all(differ(item, other) for other in kept):
+            kept.append(item)
+            yield item
 
 
 def by_light(lights: np.ndarray) -> np.ndarray | tuple[np.ndarray, ...]:
@@ -34,6 +46,8 @@ def as_array(lights: Pose | tuple[Pose, ...]) -> np.ndarray:
     return np.array([list(pose) for pose in several(lights)], float).ravel()
 
 
+T = TypeVar("T")
+APART = 15.0  # degrees between two sensors, or two lights, of clearly different settings
 _NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them on the rings above and below
 
 

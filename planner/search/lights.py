@@ -2,9 +2,9 @@
 
 Light adds up: with c_l the contrast along an edge under light l alone with all of the total, it is sum_l share_l c_l
 under all of them, and the variance of a line is the sum of a sensor's weights over squared contrasts
-(`models.calibrated`, long edges). So one look at each light's place tells of all their combinations. What no mixture
-can exceed is the greatest contrast of any single place, which bounds a sensor from below: only sensors whose bound is
-below the best value known are looked at.
+(`models.calibrated`, long edges). So one evaluation of each light's place tells of all their combinations. What no
+mixture can exceed is the greatest contrast of any single place, which bounds a sensor from below: only sensors whose
+bound is below the best value known are evaluated.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def search_shared(
         report("lights", done + 1, 2 * len(sensors))
         if not bounds[s] <= best:
             break
-        known = seen.look(sensors[s])
+        known = seen.of_sensor(sensors[s])
         for share in shares:
             value, lights = seen.best(known, share)
             if max(share) == 1 and np.isfinite(value) and (alone is None or value < alone.value):
@@ -136,7 +136,7 @@ def search_shared(
         if not np.isfinite(bounds[s]):
             break
         if bounds[s] <= 16 * best:  # beyond there is no candidate
-            least[s], lights[s] = seen.best(seen.look(sensors[s]), chosen)
+            least[s], lights[s] = seen.best(seen.of_sensor(sensors[s]), chosen)
     first = np.argsort(least)[:_EXACT]
     first = first[np.isfinite(least[first])]
     mixed = replace(problem, scene=with_shares(problem.scene, chosen))
@@ -159,7 +159,7 @@ class _Contrasts:
     """Contrasts of a scene's edges under each light alone, from each of its places."""
 
     def __init__(self, problem: SearchProblem, places: np.ndarray) -> None:
-        self.problem, self.scene, self.aim = problem, problem.scene, problem.aim
+        self.problem, self.scene, self.aim = problem, problem.scene, problem.objective
         scene = problem.scene
         total = sum(light.intensity for light in scene.lights)
         whole = [light.model_copy(update={"intensity": total}) for light in scene.lights]
@@ -167,7 +167,7 @@ class _Contrasts:
         self.places = [places if light.mount == "free" else np.zeros((1, 0)) for light in scene.lights]
         self.combinations = int(np.prod([len(each) for each in self.places]))
 
-    def look(self, sensor: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]] | None:
+    def of_sensor(self, sensor: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]] | None:
         """Weights (2, M, E, n) of 1 / C^2, and signals (L, E, 2, n) under each light; None where nothing is seen."""
         alone = Pictures(self.scene, sensor, tuple(np.zeros(2) for _ in self.scene.lights))
         known = measurands(alone)
@@ -202,7 +202,7 @@ class _Contrasts:
 
     def bound(self, sensor: np.ndarray) -> float:
         """What no mixture of the lights can be below."""
-        known = self.look(sensor)
+        known = self.of_sensor(sensor)
         if known is None:
             return np.inf
         weights, signals = known
@@ -216,7 +216,7 @@ class _Contrasts:
     def best(self, known: tuple | None, share: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The least of what is minimised under mixtures with these shares, and the free lights' poses (2 F,).
 
-        ``known`` is what `look` gives of the sensor.
+        ``known`` is what `of_sensor` gives of the sensor.
         """
         if known is None:
             return np.inf, np.zeros(2 * len(self.scene.free))

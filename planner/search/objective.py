@@ -97,7 +97,7 @@ class SearchProblem:
     ----------
     scene : Scene
     model : {"calibrated", "paper", "bound"}
-    aim : Aim
+    objective : Aim
         What is minimised.
     constraints : Constraints
         Which settings are feasible.
@@ -105,7 +105,7 @@ class SearchProblem:
 
     scene: Scene
     model: str
-    aim: Aim
+    objective: Aim
     constraints: Constraints = UNCONSTRAINED
 
     @classmethod
@@ -122,7 +122,7 @@ class SearchProblem:
         found = np.empty(len(sensors))
         for at in range(0, len(sensors), _PAIRS):
             part = slice(at, at + _PAIRS)
-            found[part] = minimised(self.errors(sensors[part], lights[part]), self.aim)
+            found[part] = minimised(self.errors(sensors[part], lights[part]), self.objective)
         return found
 
     def feasible(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
@@ -155,7 +155,7 @@ class SearchProblem:
 
         def told(s: np.ndarray, k: np.ndarray) -> tuple[float, bool]:
             errors = self.errors(s[None], k[None])
-            return float(minimised(errors, self.aim)[0]), bool(cut_off(errors, self.scene)[0])
+            return float(minimised(errors, self.objective)[0]), bool(cut_off(errors, self.scene)[0])
 
         anyway = told(sensor, light)[1]
 

@@ -256,7 +256,7 @@ def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, 
     """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible."""
     told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
     for part, errors, allowed in problem.table(sensors, lights, report):
-        told[part] = information(errors.variances_object, problem.aim) * allowed[..., None]
+        told[part] = information(errors.variances_object, problem.objective) * allowed[..., None]
     return told
 
 
@@ -339,9 +339,9 @@ class Pool:
     def known(self) -> Information:
         """What the rows `seen` tell."""
         told = [self.traced[row].measurands for row in self.seen]
-        values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.aim)
+        values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.objective)
         fine = np.array([[is_trusted(each.status) for each in row] for row in told])
-        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.aim.over)
+        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
 
     def expected(self) -> Information:
         """What all rows tell: ray-traced, else by fast evaluation, cluttered as the nearest ray-traced row is."""
@@ -357,7 +357,7 @@ class Pool:
         ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
         if len(seen):
             ok[seen], clutter[seen] = known.ok, known.clutter
-        return Information(ok, clutter, self.problem.aim.over)
+        return Information(ok, clutter, self.problem.objective.over)
 
     def refine(self, row: int, rest: Information, step_deg: float) -> int:
         """The row after a local search of its poses, or itself where that finds nothing better; the row's number.
@@ -374,7 +374,7 @@ class Pool:
         cluttered = np.array([not is_trusted(each.status) for each in self.traced[row].measurands])
 
         def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
-            return information(self.problem.errors(s[None], k[None]).variances_object[0], self.problem.aim)
+            return information(self.problem.errors(s[None], k[None]).variances_object[0], self.problem.objective)
 
         def score(s: np.ndarray, k: np.ndarray) -> tuple[int, float, float]:
             values = told(s, k)

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice, product
 
 import numpy as np
 
+from imaging.geometry.projection import direction
 from planner.search.candidates import DEAREST, RayTraced
 from planner.search.design import (
     Choice,
     Chosen,
     Hold,
-    Place,
     Varied,
     angles_of,
     bands_of,
@@ -26,7 +27,7 @@ from planner.search.design import (
     own_choice,
     with_choice,
 )
-from planner.search.grid import ViewingSpace
+from planner.search.grid import APART, ViewingSpace, distinct
 from planner.search.local import Start, descend
 from planner.search.objective import Report, SearchProblem, cut_off, minimised
 from scenes import Pose, Scene
@@ -34,12 +35,43 @@ from scenes import Pose, Scene
 ANGLE_STEP = 30.0  # degrees, of either polariser
 POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
-_LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are ray-traced, and descents
+_TRACED, _STARTS = 150, 6  # clearly different settings that are ray-traced, and descents
 _BANDS_WITH = 3  # angles with which all bands are tried
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
 _AT_ONCE = 8192  # pairs
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A choice and poses (polar, azimuth) in degrees, with what is minimised there."""
+
+    choice: Choice
+    sensor: np.ndarray
+    light: np.ndarray
+    value: float
+
+    @cached_property
+    def _directions(self) -> np.ndarray:
+        return direction(np.array([self.sensor, self.light]))
+
+    def differs(self, other: Place) -> bool:
+        """Whether anything of it is clearly apart from another's."""
+        one, two = self.choice, other.choice
+        return bool(
+            (one.lamp, one.filter) != (two.lamp, two.filter)
+            or _apart(one.analyser_deg, two.analyser_deg) >= APART
+            or _apart(one.polarisation_deg, two.polarisation_deg) >= APART
+            or (np.einsum("ij,ij->i", self._directions, other._directions) < np.cos(np.radians(APART))).any()
+        )
+
+
+def _apart(a: float | None, b: float | None) -> float:
+    """Angle between two polarisers, which are the same after half a turn; infinite if only one is there."""
+    if a is None or b is None:
+        return 0.0 if a is b else np.inf
+    return abs((a - b + 90) % 180 - 90)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +133,7 @@ class Variation:
         """
         least, most = plan, self._untrusted(plan)
         own = [place for place in found if place.choice == plan.choice and place.value <= DEAREST * plan.value]
-        for place in self._clear(own):
+        for place in _clear(own):
             if most == 0:
                 break
             wrong = self._untrusted(place)
@@ -158,21 +190,11 @@ class Variation:
         """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
         world = self._with(choice)
         found = world.errors(sensors, lights)
-        return minimised(found, world.aim), cut_off(found, world.scene)
-
-    def _clear(self, found: list[Place]) -> Iterator[Place]:
-        """Clearly different ones, the best first."""
-        clear: list[Place] = []
-        for place in sorted(found, key=_value):
-            if len(clear) == _LOOKED_AT:
-                return
-            if all(place.differs(other) for other in clear):
-                clear.append(place)
-                yield place
+        return minimised(found, world.objective), cut_off(found, world.scene)
 
     def _lowest(self, found: list[Place], known: Place, most: int, starts: int, **free: bool) -> Place:
         """The lowest place to which a descent leads from the best ones that can be trusted; ``known`` at worst."""
-        trusted = (place for place in self._clear(found) if self._untrusted(place) <= most)
+        trusted = (place for place in _clear(found) if self._untrusted(place) <= most)
         ends = [known, *(self._descended(place, most, **free) for place in islice(trusted, starts))]
         return min((self._polished(end, most, **free) for end in sorted(ends, key=_value)[:_POLISHED]), key=_value)
 
@@ -222,7 +244,7 @@ class Variation:
     def _place(self, choice: Choice, sensor: np.ndarray, light: np.ndarray) -> Place:
         """With its ray-traced value."""
         world = self._with(choice)
-        return Place(choice, sensor, light, float(minimised(world.errors(sensor, light), world.aim)))
+        return Place(choice, sensor, light, float(minimised(world.errors(sensor, light), world.objective)))
 
     def _told(self, place: Place) -> Chosen:
         world = self._with(place.choice)
@@ -240,3 +262,8 @@ _GUARANTEE = (
 
 def _value(place: Place) -> float:
     return place.value
+
+
+def _clear(found: list[Place]) -> Iterator[Place]:
+    """Clearly different ones, the best first."""
+    return distinct(sorted(found, key=_value), Place.differs, _TRACED)

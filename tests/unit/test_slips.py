@@ -154,7 +154,7 @@ def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
     place, ratios, lengths = np.array([[40.0, 300.0]]), [], []
     looks = _Contrasts(SearchProblem(scene, "calibrated", aim, planner.Constraints()), place)
     for sensor in np.array([[p, a] for p in (30.0, 60.0) for a in range(195, 360, 15)], float):
-        known = looks.look(sensor)
+        known = looks.of_sensor(sensor)
         for share in ((0.0, 1.0), (0.3, 0.7)) if known else ():
             exact = planner.variances(with_shares(scene, share), sensor, (place[0], place[0]))
             ratios.append(looks.bound(sensor) / min(looks.best(known, share)[0], float(exact)))

@@ -17,7 +17,7 @@ from measure.find import four_sides, rounds
 from measure.photo import rounding
 from planner.budgeting.plans import systematic
 from planner.budgeting.sources import sources
-from planner.search import design, lights
+from planner.search import design, lights, varying
 from render import adaptive, optics
 from scenes.parts.surfaces import roots
 from tests.regression.numbers.poses import load, uneven, without_error
@@ -69,7 +69,7 @@ def _polarisers():
     angles = (None, 0.0, 31.0, 89.0, 90.0, 133.0, 179.0)
     scene = load("copper")
     return {
-        "apart": [[design._apart(a, b) for a in angles] for b in angles],
+        "apart": [[varying._apart(a, b) for a in angles] for b in angles],
         "bands": design.bands_of(scene), "angles": design.angles_of(load("polarised"), ("analyser",), 45.0),
         "through": [design.throughput(load("polarised"), planner.Choice(a, b)) for a in angles for b in angles],
     }  # fmt: skip
