@@ -99,10 +99,8 @@ def plan_capability(
     InvalidInput
         If no allowed setting can measure, or a tolerance is missing.
     """
-    problem, report = (
-        SearchProblem.of(scene, "calibrated", "object", constraints or Constraints()),
-        report or (lambda *_: None),
-    )
+    problem = SearchProblem.of(scene, "calibrated", "object", constraints or Constraints())
+    report = report or (lambda *_: None)
     if len(scene.free) > 1 and light is None:
         raise InvalidInput(f"light must be given for a scene of {len(scene.free)} free lights, got nothing")
     grid, given = Grid.of(scene, problem.constraints, step_deg, sensor, light), sources(scene)
