@@ -15,16 +15,16 @@ from imaging.pose_scatter import pose_scatter
 from planner.combining import Combination, combine
 from planner.forecast import Forecast
 from planner.maps import Map, pose_map, variance_map
-from planner.planning import Candidate, Plan, plan
+from planner.planning import Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
-from planner.search.aim import Aim
-from planner.search.alternating import alternate
-from planner.search.choices import Choice, with_choice
+from planner.robustness import Robust, Tolerances, robust
+from planner.search.candidates import Candidate
 from planner.search.constraints import Constraints
+from planner.search.design import Choice, Chosen, Varied, with_choice
 from planner.search.exhaustive import exhaustive
-from planner.search.robustness import Robust, Tolerances, robust
-from planner.search.varied import Chosen, Varied
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.local import alternate
+from planner.search.objective import Aim
 from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
 

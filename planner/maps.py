@@ -11,11 +11,9 @@ import numpy as np
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.models.bias import cluttered
 from imaging.pictures import Pictures
-from planner.prediction import minimised
 from planner.ranks import quantity_ranks
-from planner.search.aim import DEFAULT_OBJECTIVE, Objective
-from planner.search.poses import as_array, by_light
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace, as_array, by_light
+from planner.search.objective import DEFAULT_OBJECTIVE, Objective, SearchProblem, minimised
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.errors import given
 from scenes.results import Shown, finite, poses
@@ -102,7 +100,7 @@ def variance_map(
     >>> values.shape, int(np.isfinite(values).sum()) > 100
     ((425,), True)
     """
-    return _map(scene, sensor, light, space, model, objective, None).variance
+    return _map(SearchProblem.of(scene, model, objective), sensor, light, space, None).variance
 
 
 def pose_map(
@@ -127,37 +125,34 @@ def pose_map(
     >>> sorted(set(found.status.tolist()))
     ['clutter', 'not_visible', 'ok', 'short']
     """
-    looked = cluttered if biased else _not_asked
-    return _map(scene, sensor, light, space, model, objective, looked)
+    looked = cluttered if biased and model != "bound" else _not_asked
+    return _map(SearchProblem.of(scene, model, objective), sensor, light, space, looked)
 
 
 def _not_asked(_: Pictures) -> np.ndarray:
     return np.array(False)
 
 
-def _map(scene, sensor, light, space, model, objective, clutter: Callable[[Pictures], np.ndarray] | None) -> Map:
+def _map(
+    problem: SearchProblem, sensor: Any, light: Any, space: ViewingSpace | None,
+    clutter: Callable[[Pictures], np.ndarray] | None,
+) -> Map:  # fmt: skip
+    scene, space = problem.scene, ViewingSpace() if space is None else space
     if (sensor is None) == (light is None):
         raise InvalidInput(f"sensor or light must be given, not both, got sensor={sensor}, light={light}")
-    space = ViewingSpace() if space is None else space
     if not isinstance(space, ViewingSpace):
         raise InvalidInput(f"space must be a ViewingSpace, got {given(space)}")
-    if light is None:
-        if len(scene.free) != 1:
-            raise InvalidInput(f"light must be given where not exactly one light is free, got {len(scene.free)} free")
-        held = scene.check_pose("sensor", sensor), None
-        fixed = np.array(list(held[0]))
-    else:
-        held = None, scene.check_lights(several(light))
-        fixed = by_light(as_array(held[1]))
-    evaluate = variance_model(model)
+    if light is None and len(scene.free) != 1:
+        raise InvalidInput(f"light must be given where not exactly one light is free, got {len(scene.free)} free")
+    held = (scene.check_pose("sensor", sensor), None) if light is None else (None, scene.check_lights(several(light)))
+    evaluate = variance_model(problem.model)
     values, ranks = np.empty(len(space)), np.full(len(space), WORST_FIRST.index("ok"))
     for at in range(0, len(space), _CHUNK):
-        part = slice(at, at + _CHUNK)
-        both = (fixed, space.poses[part]) if light is None else (space.poses[part], fixed)
+        moved = space.poses[at : at + _CHUNK]
+        both = (np.array(list(held[0])), moved) if held[0] else (moved, by_light(as_array(held[1])))
         pictures = Pictures.of(scene, *both)
         found = evaluate(pictures)
-        values[part] = minimised(found, objective)
+        values[at : at + _CHUNK] = minimised(found, problem.objective)
         if clutter:
-            known = clutter(pictures) if model != "bound" else np.array(False)
-            ranks[part] = quantity_ranks(found, known).min(-1)
+            ranks[at : at + _CHUNK] = quantity_ranks(found, clutter(pictures)).min(-1)
     return Map(space, values, np.array(WORST_FIRST)[ranks], scene, *held)

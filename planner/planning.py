@@ -9,27 +9,32 @@ import numpy as np
 
 from imaging.features.measurand import required_edges
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
-from imaging.pictures import Pictures
-from planner.prediction import Prediction, minimised, predict
-from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
-from planner.search.alternating import Step
-from planner.search.candidates import Candidate, candidates
-from planner.search.choices import DEFAULT_HOLD, Hold, Vary, check_vary
+from planner.prediction import Prediction
+from planner.search.candidates import Candidate, RayTraced, Searched, candidates, trusted
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import Found, Report, has_bound
-from planner.search.option import Option, Result, held, with_task
-from planner.search.poses import as_array, as_poses
-from planner.search.refinement import refine
-from planner.search.shares import shares_of, with_shares
-from planner.search.sharing import Alone, applies
-from planner.search.trusted import trusted, untrusted
-from planner.search.varied import Varied
-from planner.search.varying import vary_choice
-from scenes import InvalidInput, Picture, Pose, Scene, several
+from planner.search.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
+from planner.search.exhaustive import has_bound
+from planner.search.grid import Grid, as_array, as_poses
+from planner.search.lights import Mixture, applies, shares_of, with_shares
+from planner.search.local import Step, refine
+from planner.search.objective import (
+    DEFAULT_OBJECTIVE,
+    DEFAULT_OVER,
+    Aim,
+    Objective,
+    Over,
+    Report,
+    SearchProblem,
+    check_choice,
+)
+from planner.search.varying import Variation
+from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
 
 Search = Literal["exhaustive", "alternating"]
+Edges = Literal["given", "best"]
 Shares = Literal["best", "given"]
+COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
 
 
 def _rounded(pose: Pose) -> str:
@@ -133,7 +138,7 @@ def plan(
     over: Over = DEFAULT_OVER,
     model: ModelName = DEFAULT_MODEL,
     search: Search = "exhaustive",
-    edges: Literal["given", "best"] = "given",
+    edges: Edges = "given",
     step_deg: float | None = None,
     constraints: Constraints | None = None,
     sensor: Any = None,
@@ -194,122 +199,119 @@ def plan(
     """
     aim = Aim.of(scene.quantities, objective, over)
     variance_model(model)
-    _check("search", search, get_args(Search))
-    _check("edges", edges, ("given", "best"))
-    _check("shares", shares, get_args(Shares))
+    for name, value, choices in (("search", search, Search), ("edges", edges, Edges), ("shares", shares, Shares)):
+        check_choice(name, value, get_args(choices))
     if vary:
         check_vary(scene, vary, hold)
-    constraints = constraints or Constraints()
-    sensor, light = held(scene, constraints, sensor, light)
+    report, limits = report or (lambda *_: None), constraints or Constraints()
     tasks = required_edges(scene) if edges == "best" else ()
-    worlds = [with_task(scene, task) for task in tasks] or [scene]
-    options = [Option.of(world, model, step_deg, constraints, sensor, light) for world in worlds]
-    found = [option.search(aim, search, start, report, shares == "best") for option in options]
-    options = [option.with_lights(result.shared) for option, result in zip(options, found, strict=True)]
-    best = min(range(len(found)), key=lambda k: found[k].variance)
-    if not np.isfinite(found[best].variance):
+    searches = []
+    for world in [scene.model_copy(update={"task": task}) for task in tasks] or [scene]:
+        grid = Grid.of(world, limits, default_step(world, model) if step_deg is None else step_deg, sensor, light)
+        searches.append(Searched.of(SearchProblem(world, model, aim, limits), grid, search, start, shares, report))
+    best = min(searches, key=lambda each: each.variance)
+    if not np.isfinite(best.variance):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    made = _finish(options, found, best, aim, refined)
-    if not vary:
-        return made
-    others = tuple((c.sensor, c.light) for c in made.candidates)
-    varied = vary_choice(
-        made.scene, made.poses, others, vary, hold=hold, model=model, aim=aim, constraints=constraints,
-        held=(sensor is not None, light is not None), report=report,
-    )  # fmt: skip
-    return replace(made, varied=varied)
+    made = _finished(best, searches, refined)
+    return replace(made, varied=_varied(made, best, vary, hold, report)) if vary else made
 
 
-def _check(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {value!r}")
+def _varied(made: Plan, best: Searched, vary: tuple[Vary, ...], hold: Hold, report: Report) -> Varied:
+    """What polarisers, lamps and filters gain over a plan."""
+    variation = Variation(replace(best.problem, scene=made.scene), vary, hold, best.grid.held)
+    return variation.run(made.poses, tuple((each.sensor, each.light) for each in made.candidates), report)
 
 
-def _finish(options: list[Option], results: list[Result], best: int, aim: Aim, refined: bool) -> Plan:
-    option, result = options[best], results[best]
-    scene, found, partial = option.scene, result.found, result.partial
-    sensor, light, variance = result.sensor, result.light, result.variance
-    choice, how = candidates(options, results, aim), (option.model, aim)
-    on_grid = variance if scene.solid.is_convex else _closely(scene, sensor, light, *how)
-    chosen = trusted(scene, (sensor, light), on_grid, choice, option.model)
-    if chosen.set_aside:
-        sensor, light = chosen.sensor, chosen.light
-    if refined and option.free:
-        starts = [(sensor, light, _closely(scene, sensor, light, *how) if chosen.set_aside else result.variance)]
-        if not chosen.set_aside and (found is None or not has_bound(scene, option.model)):
-            others = [c for c in choice[1:3] if c.edges == scene.required and np.isfinite(c.variance)]
-            starts += [(np.array(list(c.sensor)), as_array(c.light), c.variance) for c in others]
-        limits = option.step_deg, option.constraints
-        descents = [refine(scene, *at, *how, *limits, sizes=(0.7,), known=known) for *at, known in starts]
-        sensor, light, known = min(descents, key=lambda descent: descent[2])
-        sensor, light, variance = refine(scene, sensor, light, *how, *limits, sizes=(0.1,), known=known)
-        if untrusted(scene, sensor, light, option.model) > chosen.untrusted:
-            sensor, light, variance = chosen.sensor, chosen.light, on_grid
-    if not scene.solid.is_convex or chosen.set_aside:  # the search glances; what is told is from a close look
-        variance = _closely(scene, sensor, light, *how)
-    alone = _alone(option, result, aim, refined)
-    if alone is not None and alone.value < variance:
-        scene, sensor, light, variance = with_shares(scene, alone.shares), alone.sensor, alone.lights, alone.value
-    elif alone is not None and max(shares_of(scene)) == 1:
-        alone = alone._replace(value=variance)  # the plan is one light alone
-    prediction = predict(scene, tuple(map(float, sensor)), as_poses(light), option.model)
+def default_step(scene: Scene, model: str) -> float:
+    """Of the grid, degrees: 1 where a bound excludes nearly all pairs, else every pair has to be evaluated."""
+    return 1.0 if has_bound(scene, model) else COARSE_STEP
+
+
+def _finished(best: Searched, searches: list[Searched], refined: bool) -> Plan:
+    """The plan from the best search: its candidates, what can be trusted, what lies below the grid."""
+    choice = candidates(searches)
+    on_grid = RayTraced.of(best.problem, best.sensor, best.light)
+    taken, set_aside = trusted(best.problem, on_grid, choice, on_grid.value)
+    if refined and best.grid.free:
+        proven = best.found is not None and has_bound(best.problem.scene, best.problem.model)
+        taken = _refined(best, taken, () if set_aside or proven else choice[1:3])
+    problem, taken, alone = _or_one_light(best, taken, refined)
+    scene, prediction = problem.scene, taken.prediction
     return Plan(
         scene=scene,
-        sensor=Pose(*map(float, sensor)),
-        light=as_poses(light),
+        sensor=Pose(*map(float, taken.sensor)),
+        light=as_poses(taken.light),
         shares=shares_of(scene) if len(scene.lights) > 1 else (),
-        alone=alone and alone.value,
-        objective=aim.unit,
-        over=aim.over,
-        model=option.model,
-        variance=float(variance),
+        alone=alone,
+        objective=problem.objective.unit,
+        over=problem.objective.over,
+        model=problem.model,
+        variance=taken.value,
         limiting=prediction.limiting or prediction.measurands[0].name,
-        grid_sensor=Pose(*map(float, result.sensor)),
-        grid_light=as_poses(result.light),
-        grid_variance=float(on_grid),
+        grid_variance=on_grid.value,
         prediction=prediction,
-        trace=partial.trace if partial else (),
-        partial_variance=float(partial.variance) if partial else float("nan"),
-        gap=partial.variance / result.variance - 1 if partial and found and not found.within_scale else None,
-        guarantee=_guarantee(option, found),
-        pairs=sum(r.found.pairs for r in results if r.found),
-        evaluated=sum(r.found.evaluated for r in results if r.found),
         candidates=choice,
-        set_aside=chosen.set_aside,
-    )  # fmt: skip
+        set_aside=set_aside,
+        **_found(best, searches),
+    )
 
 
-def _alone(option: Option, result: Result, aim: Aim, refined: bool) -> Alone | None:
-    """The best setting where one of several lights has all; None where that is not known."""
-    best = result.shared and result.shared.alone
-    if best is None or not refined:
-        return best
-    scene = with_shares(option.scene, best.shares)
-    how = option.model, aim, option.step_deg, option.constraints
-    sensor, lights, value = refine(scene, best.sensor, best.lights, *how, sizes=(0.7, 0.1))
-    return Alone(value, best.shares, sensor, lights)
+def _found(best: Searched, searches: list[Searched]) -> dict[str, Any]:
+    """What a plan tells of its searches."""
+    found, partial = best.found, best.partial
+    return {
+        "grid_sensor": Pose(*map(float, best.sensor)),
+        "grid_light": as_poses(best.light),
+        "trace": partial.trace if partial else (),
+        "partial_variance": partial.variance if partial else float("nan"),
+        "gap": partial.variance / best.variance - 1 if partial and found and not found.within_scale else None,
+        "guarantee": _guarantee(best),
+        "pairs": sum(each.found.pairs for each in searches if each.found),
+        "evaluated": sum(each.found.evaluated for each in searches if each.found),
+    }
 
 
-def _closely(scene: Scene, sensor: np.ndarray, light: np.ndarray, model: str, aim: Aim) -> float:
-    """What is minimised, of one picture looked at closely."""
-    picture = Picture.of(scene, tuple(map(float, sensor)), as_poses(light))
-    return float(minimised(variance_model(model)(Pictures.of(picture)), aim))
+def _refined(best: Searched, begin: RayTraced, others: tuple[Candidate, ...]) -> RayTraced:
+    """The lowest end of local searches from the setting and others, unless less can be trusted there."""
+    required, step = best.problem.scene.required, best.grid.step_deg
+    starts = [(begin.sensor, begin.light, begin.value)]
+    starts += [
+        (np.array(list(c.sensor)), as_array(c.light), c.variance)
+        for c in others
+        if c.edges == required and np.isfinite(c.variance)
+    ]
+    ends = [refine(best.problem, pair, step, sizes=(0.7,), known=known) for *pair, known in starts]
+    end = min(ends, key=lambda each: each.value)
+    end = refine(best.problem, (end.sensor, end.lights), step, sizes=(0.1,), known=end.value)
+    found = RayTraced.of(best.problem, end.sensor, end.lights)
+    return begin if found.untrusted > begin.untrusted else found
 
 
-def _guarantee(option: Option, found: Found | None) -> str:
-    if option.lights.shape[1] > 2 or len(option.scene.lights) > 1:
-        return _of_lights(option, found)
+def _or_one_light(best: Searched, taken: RayTraced, refined: bool) -> tuple[SearchProblem, RayTraced, float | None]:
+    """The setting, or the best one where a single light of several has all; and what is minimised there, if known."""
+    problem, alone = best.problem, best.alone
+    if alone is None:
+        return problem, taken, None
+    single = replace(problem, scene=with_shares(problem.scene, alone.shares))
+    if refined:
+        end = refine(single, (alone.sensor, alone.lights), best.grid.step_deg)
+        alone = Mixture(end.value, alone.shares, end.sensor, end.lights)
+    if alone.value < taken.value:
+        taken = RayTraced.of(single, alone.sensor, alone.lights)
+        return single, taken, taken.value
+    return problem, taken, taken.value if max(shares_of(problem.scene)) == 1 else alone.value
+
+
+def _guarantee(best: Searched) -> str:
+    scene, found, step = best.problem.scene, best.found, best.grid.step_deg
+    if best.grid.lights.shape[1] > 2 or len(scene.lights) > 1:
+        if found is None or not applies(scene, best.problem.model):
+            return "none: a partial optimum, no other place of the sensor or of one of the lights is better"
+        return (
+            f"no sensor and lights of the {step:g} degree grid are better, shares in tenths, by the formula of"
+            " long edges; between them better ones may lie"
+        )
     if found is None:
         return "none: a partial optimum, no neighbour of the sensor and none of the light is better"
-    grid = f"{option.step_deg:g} degree grid" + " whose levels are within the sensor's scale" * found.within_scale
+    grid = f"{step:g} degree grid" + " whose levels are within the sensor's scale" * found.within_scale
     return f"no pair of the {grid} is better; between its directions a better one may lie"
-
-
-def _of_lights(option: Option, found: Found | None) -> str:
-    """What is known where there are several lights."""
-    if not applies(option.scene, option.model) or found is None:
-        return "none: a partial optimum, no other place of the sensor or of one of the lights is better"
-    return (
-        f"no sensor and lights of the {option.step_deg:g} degree grid are better, shares in tenths, by the formula of"
-        " long edges; between them better ones may lie"
-    )

@@ -18,7 +18,7 @@ from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from planner.forecast import Forecast, forecasts, worst
 from planner.ranks import edge_ranks
-from planner.search.aim import DEFAULT_OBJECTIVE, Aim, Objective
+from planner.search.objective import DEFAULT_OBJECTIVE, Objective, minimised
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.measurands.features import place_of
 from scenes.results import Shown
@@ -240,46 +240,34 @@ def predict(
     scene, pictures = picture.scene, Pictures.of(picture) if closely else glanced(picture)
     evaluated, known = variance_model(model)(pictures), measurand(pictures)
     biased, off, clutter = _of_locator(pictures, model)
-    edges = tuple(
-        EdgePrediction(
-            name,
-            float(length),
-            float(step),
-            WORST_FIRST[rank],
-            tuple(line.tolist()),
-        )
-        for name, length, step, rank, line in zip(
-            known.view.names, known.view.lengths, evaluated.contrast, edge_ranks(evaluated, clutter), off, strict=True
-        )
-    )
     textures = texture_errors(pictures)
     if textures is not None and model != "bound":
         biased = tuple(each + shift for each, shift in zip(biased, textures.shifts, strict=True))
-    told = forecasts(
-        scene,
-        evaluated,
-        clutter,
-        biased,
-        None if textures is None else textures.variances,
-    )
+    told = forecasts(scene, evaluated, clutter, biased, textures and textures.variances)
     gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
     covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
+    first = ("kind", "value_image", "value_object", "variance_image", "variance_object", "bias_image")
     return Prediction(
         model=model,
-        kind=told[0].kind,
-        value_image=told[0].value_image,
-        value_object=told[0].value_object,
-        variance_image=told[0].variance_image,
-        variance_object=told[0].variance_object,
-        bias_image=told[0].bias_image,
+        **{name: getattr(told[0], name) for name in first},
         corners=known.points,
         covariances=feature_covariances(pictures, evaluated),
-        edges=edges,
+        edges=_edges(evaluated, clutter, off),
         status=worst(told),
         measurands=told,
         covariance=covariance,
         covariance_object=covariance_object,
         picture=picture,
+    )
+
+
+def _edges(evaluated: Errors, clutter: np.ndarray, off: np.ndarray) -> tuple[EdgePrediction, ...]:
+    """The straight edges of one picture, which of them are cluttered (E,), and biases of their lines (E, 2)."""
+    view, ranks = evaluated.measurands.view, edge_ranks(evaluated, clutter)
+    rows = zip(view.names, view.lengths, evaluated.contrast, ranks, off, strict=True)
+    return tuple(
+        EdgePrediction(name, float(length), float(step), WORST_FIRST[rank], tuple(line.tolist()))
+        for name, length, step, rank, line in rows
     )
 
 
@@ -297,12 +285,6 @@ def _of_locator(pictures: Pictures, model: str) -> tuple[tuple[np.ndarray, np.nd
         return (none, none), np.zeros((edges, 2)), np.zeros(edges, bool)
     found = bias(pictures)
     return (found.values, found.values_object), found.lines, cluttered(pictures)
-
-
-def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
-    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several."""
-    aim = Aim.of(errors.measurands.quantities, objective)
-    return aim(errors.variances if aim.unit == "image" else errors.variances_object)
 
 
 def feature_covariances(pictures: Pictures, evaluated: Errors, number: int = 0) -> np.ndarray:

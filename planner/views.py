@@ -10,22 +10,26 @@ import numpy as np
 
 from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import combine
-from planner.search.aim import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over
-from planner.search.beside import descend
+from planner.planning import COARSE_STEP
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import Report, has_bound
-from planner.search.looked import Pool, glanced
-from planner.search.option import COARSE_STEP, Option, held
-from planner.search.subsets import (
+from planner.search.exhaustive import has_bound
+from planner.search.grid import Grid
+from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over, Report, SearchProblem
+from planner.search.sets import (
     MOST_SETS,
     Information,
+    Pool,
+    all_ok,
+    alone,
     every_set,
+    fast_table,
     front,
     greedy,
     least_value,
     sets_of,
+    undominated,
+    undominated_shared,
 )
-from planner.search.worthwhile import all_ok, alone, shared, worthwhile
 from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Scene
 
@@ -33,7 +37,7 @@ Share = Literal["sensor", "light"]
 MOST_VIEWS = 12
 _FINE_STEP = 5.0  # degrees, where a pair takes microseconds
 _MOST_NUMBERS = 30_000_000  # pairs x quantities that a grid may have
-_LOOKS = 20  # a number of pictures: how many settings are looked at closely for each
+_TRACED = 20  # settings for each picture of a set that are ray-traced at most
 
 
 def plan_views(
@@ -57,9 +61,9 @@ def plan_views(
     what `plan` minimises, of these variances. N pictures take N times as long as one: compare them with one picture
     taken N times, whose variances are an Nth. Several sensors at a time are several pictures.
 
-    All pairs of a grid are glanced at; of those that no other can stand in for, sets are chosen greedily with
-    exchange. What is chosen is looked at closely (clutter, light between surfaces), and chosen again, until all that
-    is chosen has been looked at; then the poses of each picture descend, those of the others held.
+    All pairs of a grid are evaluated fast; of those that no other can stand in for, sets are chosen greedily with
+    exchange. What is chosen is ray-traced (clutter, light between surfaces), and chosen again, until all that is chosen
+    has been; then the poses of each picture descend, those of the others held.
 
     Parameters
     ----------
@@ -91,27 +95,30 @@ def plan_views(
     aim = _aim(scene, count, objective, over, model, share)
     if len(scene.lights) != 1 or not scene.free:
         raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
-    constraints, report = constraints or Constraints(), report or (lambda *_: None)
-    sensor, light = held(scene, constraints, sensor, light)
+    report, problem = report or (lambda *_: None), SearchProblem(scene, model, aim, constraints or Constraints())
     fast = has_bound(scene, model) and share is None
     step = (_FINE_STEP if fast else COARSE_STEP) if step_deg is None else step_deg
-    option = Option.of(scene, model, step, constraints, sensor, light)
-    pairs = len(option.sensors) * len(option.lights)
-    if pairs * len(scene.quantities) > _MOST_NUMBERS:
-        most = f"{_MOST_NUMBERS:.0e} pairs times measurands"
-        raise InvalidInput(f"step must leave at most {most} for several pictures, got {step:g} ({pairs:.2g} pairs)")
-    told = glanced(scene, option.sensors, option.lights, model, aim, constraints, report)
+    grid = Grid.of(scene, problem.constraints, step, sensor, light)
+    pairs = _checked_size(grid, len(scene.quantities))
+    told = fast_table(problem, grid.sensors, grid.lights, report)
     if not told.any():
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    pool, groups = _pool(option, aim, told, share, count)
-    _look(pool, groups, count, _LOOKS * count, report)
-    if refined and option.free and share is None:
-        _refine(pool, count, option.constraints, step, report)
+    pool, groups = _pool(problem, grid, told, share, count)
+    _trace(pool, groups, count, report)
+    if refined and grid.free and share is None:
+        _refine(pool, count, step, report)
     bounds, most = _bounds(aim, told, count) if share is None else ([None] * count, None)
-    return Views(
-        scene, aim.over, model, share, _sets(pool, groups, count, bounds), pairs, len(pool.closely),
-        _guarantee(step, share), most,
-    )  # fmt: skip
+    sets = _sets(pool, groups, count, bounds)
+    return Views(scene, aim.over, model, share, sets, pairs, len(pool.traced), _guarantee(step, share), most)
+
+
+def _checked_size(grid: Grid, quantities: int) -> int:
+    """How many pairs a grid has, if they are not too many to keep."""
+    pairs = len(grid.sensors) * len(grid.lights)
+    if pairs * quantities > _MOST_NUMBERS:
+        most, got = f"{_MOST_NUMBERS:.0e} pairs times measurands", f"{grid.step_deg:g} ({pairs:.2g} pairs)"
+        raise InvalidInput(f"step must leave at most {most} for several pictures, got {got}")
+    return pairs
 
 
 def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share: str | None) -> Aim:
@@ -128,12 +135,14 @@ def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share:
     return aim
 
 
-def _pool(option: Option, aim: Aim, told: np.ndarray, share: str | None, count: int) -> tuple[Pool, np.ndarray | None]:
-    """The settings to choose from, and which of them share a place."""
-    rows = worthwhile(told, aim) if share is None else shared(told, aim, share, count)
+def _pool(
+    problem: SearchProblem, grid: Grid, told: np.ndarray, share: str | None, count: int
+) -> tuple[Pool, np.ndarray | None]:
+    """The candidates, and which of them share a place."""
+    aim = problem.objective
+    rows = undominated(told, aim) if share is None else undominated_shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
-    poses = np.concatenate([option.sensors[s], option.lights[k]], 1)
-    pool = Pool(option.scene, option.model, aim, poses, told.reshape(-1, told.shape[-1])[rows])
+    pool = Pool(problem, np.concatenate([grid.sensors[s], grid.lights[k]], 1), told.reshape(-1, told.shape[-1])[rows])
     return pool, None if share is None else s if share == "sensor" else k
 
 
@@ -159,32 +168,30 @@ def _grouped(rows: np.ndarray, groups: np.ndarray | None) -> Iterator[tuple[int,
         yield int(group), rows[groups[rows] == group]
 
 
-def _look(pool: Pool, groups: np.ndarray | None, count: int, most: int, report: Report) -> None:
-    """Choose, look closely at what is chosen and choose again, until nothing new is chosen or ``most`` were seen."""
-    everything = np.arange(len(pool.poses))
-    while len(pool.closely) < most:
+def _trace(pool: Pool, groups: np.ndarray | None, count: int, report: Report) -> None:
+    """Choose, ray-trace what is chosen and choose again, until nothing new is chosen or 20 a picture were traced."""
+    everything, most = np.arange(len(pool.poses)), _TRACED * count
+    while len(pool.traced) < most:
         chosen = _chosen(pool.expected(), everything, groups, count)
-        fresh = [row for row in dict.fromkeys(row for members in chosen for row in members) if row not in pool.closely]
+        fresh = [row for row in dict.fromkeys(row for members in chosen for row in members) if row not in pool.traced]
         if not fresh:
             return
-        for row in fresh[: most - len(pool.closely)]:
-            pool.look(row)
-            report("close looks", len(pool.closely), most)
+        for row in fresh[: most - len(pool.traced)]:
+            pool.trace(row)
+            report("close looks", len(pool.traced), most)
 
 
-def _refine(pool: Pool, count: int, constraints: Constraints, step: float, report: Report) -> None:
-    """Let the poses of each chosen picture descend, once, the others of its set held; what is found joins the pool."""
+def _refine(pool: Pool, count: int, step: float, report: Report) -> None:
+    """Refine the poses of each chosen picture, once, the others of its set held; what is found joins the pool."""
     done: set[int] = set()
     for size in range(1, count + 1):
         seen, known = pool.seen, pool.known()
         members = _chosen(known, np.arange(len(seen)), None, size)[-1]
         for position, member in enumerate(members):
             row = int(seen[member])
-            if row in done:
-                continue
-            others = list(members[:position] + members[position + 1 :])
-            rest = known.ok[others].sum(0), known.clutter[others].sum(0)
-            done |= {row, descend(pool, row, rest, constraints, step)}
+            if row not in done:
+                others = list(members[:position] + members[position + 1 :])
+                done |= {row, pool.refine(row, known.together(others), step)}
         report("descents", size, count)
 
 
@@ -205,7 +212,7 @@ def _sets(pool: Pool, groups: np.ndarray | None, count: int, bounds: list[float 
     rows = np.arange(len(seen))
     chosen = _chosen(table, rows, own, count)
     first = table.of_sets(np.array(chosen[0])).at(0)
-    made = []
+    made, quantities = [], pool.problem.scene.quantities
     for members, bound in zip(chosen, bounds, strict=True):
         lost, value, _ = table.of_sets(np.array(members)).at(0)
         views = tuple(_view(pool, int(seen[member])) for member in members)
@@ -216,8 +223,7 @@ def _sets(pool: Pool, groups: np.ndarray | None, count: int, bounds: list[float 
                 views=views,
                 combination=combination,
                 minimised=value,
-                lost=tuple(q.name for q, used in zip(pool.scene.quantities, combination.used.any(0), strict=True)
-                           if not used),
+                lost=tuple(q.name for q, used in zip(quantities, combination.used.any(0), strict=True) if not used),
                 over_one=over_one,
                 over_repeats=None if over_one is None else over_one / len(members),
                 exhaustive=_exhaustive(table, rows, own, len(members)),
@@ -238,7 +244,7 @@ def _exhaustive(table: Information, rows: np.ndarray, groups: np.ndarray | None,
 
 def _view(pool: Pool, row: int) -> View:
     sensor, light = (Pose(*map(float, pool.poses[row, part])) for part in (slice(0, 2), slice(2, 4)))
-    return View(sensor, light, pool.closely[row])
+    return View(sensor, light, pool.traced[row])
 
 
 def _guarantee(step: float, share: str | None) -> str:

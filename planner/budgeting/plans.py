@@ -14,17 +14,13 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.poses import as_array, as_poses, by_light
-from planner.search.refinement import refine
-from planner.search.viewing import ViewingSpace
-from scenes import InvalidInput, Picture, Pose, Scene, several
+from planner.search.grid import Grid, as_poses
+from planner.search.local import refine
+from planner.search.objective import Report, SearchProblem
+from scenes import InvalidInput, Picture, Pose, Scene
 
-_PAIRS = 20_000  # at a time
 STEP_DEG = 10.0
-
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,24 +99,24 @@ def plan_capability(
     InvalidInput
         If no allowed setting can measure, or a tolerance is missing.
     """
-    aim, limits = Aim.of(scene.quantities, "object"), constraints or Constraints()
-    sensors, lights = _grid(scene, limits, step_deg, sensor, light)
-    given, report = sources(scene), report or (lambda *_: None)
-    moved = np.zeros((len(sensors), len(scene.quantities)))
-    for k, pose in enumerate(sensors):
+    problem = SearchProblem.of(scene, "calibrated", "object", constraints or Constraints())
+    report = report or (lambda *_: None)
+    if len(scene.free) > 1 and light is None:
+        raise InvalidInput(f"light must be given for a scene of {len(scene.free)} free lights, got nothing")
+    grid, given = Grid.of(scene, problem.constraints, step_deg, sensor, light), sources(scene)
+    moved = np.zeros((len(grid.sensors), len(scene.quantities)))
+    for k, pose in enumerate(grid.sensors):
         moved[k] = systematic(scene, pose, given)
-        report("sensitivities", k + 1, 2 * len(sensors))
-    whole, quiet = _searched(scene, sensors, lights, moved, aim, limits, report)
-    free = refined and sensor is None and light is None
+        report("sensitivities", k + 1, 2 * len(grid.sensors))
+    whole, quiet = _searched(problem, grid, moved, report)
     found = []
     for (i, j), beside in ((whole, given), (quiet, ())):
-        at = sensors[i], lights[j]
-        if free:
-            how = "calibrated", aim, step_deg, limits
-            at = refine(scene, *at, *how, value=_value(scene, aim, beside))[:2]
-        poses = tuple(map(float, at[0])), as_poses(at[1])
+        pair = grid.sensors[i], grid.lights[j]
+        if refined and grid.free:
+            pair = refine(problem, pair, step_deg, value=_value(problem, beside))[:2]
+        poses = tuple(map(float, pair[0])), as_poses(pair[1])
         found.append(Placed(Pose(*poses[0]), poses[1], budget(scene, *poses, p=p)))
-    return CapabilityPlan(*found, pairs=len(sensors) * len(lights))
+    return CapabilityPlan(*found, pairs=len(grid.sensors) * len(grid.lights))
 
 
 def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...]) -> np.ndarray:
@@ -150,47 +146,31 @@ def _anywhere(scene: Scene) -> Any:
     return tuple(np.array([20.0, 0.0]) for _ in scene.free) if len(scene.free) != 1 else np.array([20.0, 0.0])
 
 
-def _grid(scene: Scene, limits: Constraints, step: float, sensor: Any, light: Any) -> tuple[np.ndarray, np.ndarray]:
-    sensors = ViewingSpace(step, limits.sensor_polar_deg).poses
-    sensors = sensors[limits.sensors(scene, sensors)]
-    if sensor is not None:
-        sensors = np.array([list(scene.check_pose("sensor", sensor))])
-    if len(scene.free) > 1 and light is None:
-        raise InvalidInput(f"light must be given for a scene of {len(scene.free)} free lights, got nothing")
-    lights = ViewingSpace(step, limits.light_polar_deg).poses if scene.free else np.zeros((1, 0))
-    lights = lights[limits.lights(lights)] if scene.free else lights
-    if light is not None:
-        lights = as_array(scene.check_lights(several(light)))[None]
-    if not len(sensors) or not len(lights):
-        raise InvalidInput("constraints must leave a pose for sensor and light, got none")
-    return sensors, lights
-
-
-def _searched(scene, sensors, lights, moved, aim, limits, report) -> tuple[tuple[int, int], tuple[int, int]]:
+def _searched(problem: SearchProblem, grid: Grid, moved: np.ndarray, report: Report) -> tuple[tuple, tuple]:
     """Indices of the best pair with everything, and by noise alone."""
-    evaluate, size = variance_model("calibrated"), max(1, _PAIRS // len(lights))
     best: list[tuple[float, int, int]] = [(np.inf, 0, 0)] * 2
-    for at in range(0, len(sensors), size):
-        part = sensors[at : at + size]
-        noise = evaluate(Pictures.of(scene, part[:, None], by_light(lights[None]))).variances_object
-        allowed = limits.pairs(scene, part[:, None], lights[None]) if limits.on_pairs else True
-        beside = moved[at : at + size, None]
+    count = len(grid.sensors)
+
+    def later(name: str, done: int, _: int) -> None:
+        report(name, count + done, 2 * count)
+
+    for part, errors, allowed in problem.table(grid.sensors, grid.lights, later):
+        noise, beside = errors.variances_object, moved[part, None]
         for k, variances in enumerate((noise + np.where(np.isfinite(beside), beside, np.inf), noise)):
-            values = np.where(allowed, aim(variances), np.inf)
+            values = np.where(allowed, problem.objective(variances), np.inf)
             i, j = np.unravel_index(int(values.argmin()), values.shape)
             if values[i, j] < best[k][0]:
-                best[k] = float(values[i, j]), at + int(i), int(j)
-        report("pairs", len(sensors) + min(at + size, len(sensors)), 2 * len(sensors))
+                best[k] = float(values[i, j]), part.start + int(i), int(j)
     if not np.isfinite(best[0][0]):
         raise InvalidInput("constraints must leave a setting that can measure, got none")
     return best[0][1:], best[1][1:]
 
 
-def _value(scene: Scene, aim: Aim, given: tuple[Source, ...]) -> Callable[[np.ndarray, np.ndarray], float]:
+def _value(problem: SearchProblem, given: tuple[Source, ...]) -> Callable[[np.ndarray, np.ndarray], float]:
     def value(sensor: np.ndarray, light: np.ndarray) -> float:
-        picture = Picture.of(scene, tuple(map(float, sensor)), as_poses(light))
-        noise = variance_model("calibrated")(Pictures.of(picture)).variances_object
-        found = float(aim(noise + systematic(scene, sensor, given)))
+        picture = Picture.of(problem.scene, tuple(map(float, sensor)), as_poses(light))
+        noise = variance_model(problem.model)(Pictures.of(picture)).variances_object
+        found = float(problem.objective(noise + systematic(problem.scene, sensor, given)))
         return found if np.isfinite(found) else np.inf
 
     return value

@@ -145,6 +145,9 @@ class Constraints:
         )
 
 
+UNCONSTRAINED = Constraints((0.0, 180.0), (0.0, 180.0), camera_body=0.0, light_body=0.0)
+
+
 def _cosines(sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
     """Cosines of the angles between directions (..., 3), broadcast."""
     if sensors.ndim == lights.ndim == 3 and sensors.shape[1] == lights.shape[0] == 1:

@@ -9,36 +9,33 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice, product
 
 import numpy as np
 
-from imaging.models import variance_model
-from imaging.pictures import Pictures
-from planner.prediction import minimised, predict, variances
-from planner.search.aim import Aim
-from planner.search.choices import (
+from imaging.geometry.projection import direction
+from planner.search.candidates import DEAREST, RayTraced
+from planner.search.design import (
     Choice,
+    Chosen,
     Hold,
+    Varied,
     angles_of,
     bands_of,
-    check_vary,
     exposure_time,
     own_choice,
     with_choice,
 )
-from planner.search.constraints import Constraints
-from planner.search.descent import descend
-from planner.search.exhaustive import Report, cut_off
-from planner.search.trusted import DEAREST, untrusted
-from planner.search.varied import Chosen, Place, Varied
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import APART, ViewingSpace, distinct
+from planner.search.local import Start, descend
+from planner.search.objective import Report, SearchProblem, cut_off, minimised
 from scenes import Pose, Scene
 
 ANGLE_STEP = 30.0  # degrees, of either polariser
 POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
-_LOOKED_AT, _STARTS = 150, 6  # clearly different settings that are looked at closely, and descents
+_TRACED, _STARTS = 150, 6  # clearly different settings that are ray-traced, and descents
 _BANDS_WITH = 3  # angles with which all bands are tried
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
@@ -46,58 +43,62 @@ _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain 
 _AT_ONCE = 8192  # pairs
 
 
-def vary_choice(
-    scene: Scene,
-    poses: tuple[Pose, Pose],
-    others: tuple[tuple[Pose, Pose], ...],
-    vary: tuple[str, ...],
-    *,
-    hold: Hold,
-    model: str,
-    aim: Aim,
-    constraints: Constraints,
-    held: tuple[bool, bool] = (False, False),
-    report: Report | None = None,
-) -> Varied:
-    """The best polarisers, lamp and filter, with poses of their own.
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A choice and poses (polar, azimuth) in degrees, with what is minimised there."""
 
-    Parameters
-    ----------
-    scene : Scene
-    poses : pair of Pose
-        The best of the scene's own choice.
-    others : tuple of pairs of Pose
-        More pairs to begin at.
-    vary : tuple of {"analyser", "polarisation", "band"}
-    hold : {"time", "white"}
-    model, aim, constraints
-        As for the plan.
-    held : pair of bool
-        Whether the sensor's and the light's pose stay.
+    choice: Choice
+    sensor: np.ndarray
+    light: np.ndarray
+    value: float
 
-    Raises
-    ------
-    InvalidInput
-        If the scene lacks what is to be varied.
-    """
-    check_vary(scene, vary, hold)
-    search = _Search(scene, vary, hold, model, aim, constraints, held)
-    return search.run(poses, others, report or (lambda *_: None))
+    @cached_property
+    def _directions(self) -> np.ndarray:
+        return direction(np.array([self.sensor, self.light]))
+
+    def differs(self, other: Place) -> bool:
+        """Whether anything of it is clearly apart from another's."""
+        one, two = self.choice, other.choice
+        return bool(
+            (one.lamp, one.filter) != (two.lamp, two.filter)
+            or _apart(one.analyser_deg, two.analyser_deg) >= APART
+            or _apart(one.polarisation_deg, two.polarisation_deg) >= APART
+            or (np.einsum("ij,ij->i", self._directions, other._directions) < np.cos(np.radians(APART))).any()
+        )
+
+
+def _apart(a: float | None, b: float | None) -> float:
+    """Angle between two polarisers, which are the same after half a turn; infinite if only one is there."""
+    if a is None or b is None:
+        return 0.0 if a is b else np.inf
+    return abs((a - b + 90) % 180 - 90)
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
-    """The question, and the steps of its answer."""
+class Variation:
+    """The search for the best polarisers, lamp and filter, with poses of their own.
 
-    scene: Scene
+    Attributes
+    ----------
+    problem : SearchProblem
+        Of the scene's own choice.
+    vary : tuple of {"analyser", "polarisation", "band"}
+    hold : {"time", "white"}
+    held : pair of bool
+        Whether the sensor's and the light's pose stay.
+    """
+
+    problem: SearchProblem
     vary: tuple[str, ...]
     hold: Hold
-    model: str
-    aim: Aim
-    limits: Constraints
-    held: tuple[bool, bool]
+    held: tuple[bool, bool] = (False, False)
+
+    @property
+    def scene(self) -> Scene:
+        return self.problem.scene
 
     def run(self, poses: tuple[Pose, Pose], others: tuple[tuple[Pose, Pose], ...], report: Report) -> Varied:
+        """What is gained over the scene's own choice at its best ``poses``; ``others`` are more pairs to begin at."""
         sensor, light = (np.array(list(pose)) for pose in poses)
         pairs, angles = self._pairs((sensor, light), others), angles_of(self.scene, self.vary, ANGLE_STEP)
         count = 0
@@ -132,7 +133,7 @@ class _Search:
         """
         least, most = plan, self._untrusted(plan)
         own = [place for place in found if place.choice == plan.choice and place.value <= DEAREST * plan.value]
-        for place in self._clear(own):
+        for place in _clear(own):
             if most == 0:
                 break
             wrong = self._untrusted(place)
@@ -152,16 +153,15 @@ class _Search:
 
     def _pairs(self, poses, others) -> tuple[np.ndarray, np.ndarray]:
         """Allowed pairs of a coarse grid, and those that are given, shape (n, 2) each."""
-        grids = []
-        for held, pose, polar in zip(
-            self.held, poses, (self.limits.sensor_polar_deg, self.limits.light_polar_deg), strict=True
-        ):
-            grids.append(pose[None] if held else ViewingSpace(POSE_STEP, polar).poses)
-        sensors, lights = grids
-        sensors = sensors[self.limits.sensors(self.scene, sensors)]
-        lights = lights[self.limits.lights(lights)]
+        limits, scene = self.problem.constraints, self.scene
+        polars = limits.sensor_polar_deg, limits.light_polar_deg
+        sensors, lights = (
+            pose[None] if held else ViewingSpace(POSE_STEP, polar).poses
+            for held, pose, polar in zip(self.held, poses, polars, strict=True)
+        )
+        sensors, lights = sensors[limits.sensors(scene, sensors)], lights[limits.lights(lights)]
         grid = np.array(list(product(sensors.tolist(), lights.tolist())), float).reshape(-1, 2, 2)
-        grid = grid[self.limits.pairs(self.scene, grid[:, 0], grid[:, 1])]
+        grid = grid[limits.pairs(scene, grid[:, 0], grid[:, 1])]
         given = np.array([poses, *([list(pose) for pose in pair] for pair in others)], float)
         kept = [
             all(not h or np.allclose(a, b) for h, a, b in zip(self.held, pair, poses, strict=True)) for pair in given
@@ -175,33 +175,26 @@ class _Search:
         What is cut off scatters less, so that a plain minimum is led to where every measurement is biased; descents
         do not go there, either.
         """
-        world = with_choice(self.scene, choice, self.hold)
         parts = [slice(at, at + _AT_ONCE) for at in range(0, len(sensors), _AT_ONCE)]
-        found = [self._values(world, sensors[part], lights[part]) for part in parts]
+        found = [self._values(choice, sensors[part], lights[part]) for part in parts]
         least, cut = (np.concatenate(each) for each in zip(*found, strict=True))
         whole = np.where(cut, np.inf, least)
         least = whole if np.isfinite(whole).any() else least
         order = [i for i in np.argsort(least, kind="stable")[:_KEPT] if np.isfinite(least[i])]
         return [Place(choice, sensors[i], lights[i], float(least[i])) for i in order]
 
-    def _values(self, world: Scene, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
-        found = variance_model(self.model)(Pictures.of(world, sensors, lights))
-        return minimised(found, self.aim), cut_off(found, world)
+    def _with(self, choice: Choice) -> SearchProblem:
+        return replace(self.problem, scene=with_choice(self.scene, choice, self.hold))
 
-    def _clear(self, found: list[Place]) -> Iterator[Place]:
-        """Clearly different ones, the best first."""
-        clear: list[Place] = []
-        for place in sorted(found, key=_value):
-            if len(clear) == _LOOKED_AT:
-                return
-            if all(place.differs(other) for other in clear):
-                clear.append(place)
-                yield place
+    def _values(self, choice: Choice, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
+        world = self._with(choice)
+        found = world.errors(sensors, lights)
+        return minimised(found, world.objective), cut_off(found, world.scene)
 
     def _lowest(self, found: list[Place], known: Place, most: int, starts: int, **free: bool) -> Place:
         """The lowest place to which a descent leads from the best ones that can be trusted; ``known`` at worst."""
-        trusted = (place for place in self._clear(found) if self._untrusted(place) <= most)
+        trusted = (place for place in _clear(found) if self._untrusted(place) <= most)
         ends = [known, *(self._descended(place, most, **free) for place in islice(trusted, starts))]
         return min((self._polished(end, most, **free) for end in sorted(ends, key=_value)[:_POLISHED]), key=_value)
 
@@ -214,48 +207,51 @@ class _Search:
         return place
 
     def _descended(
-        self, start: Place, most: int, sizes: tuple[float, ...] = _SIZES, *, poses: bool = True, angles: bool = True
+        self, begin: Place, most: int, sizes: tuple[float, ...] = _SIZES, *, poses: bool = True, angles: bool = True
     ) -> Place:
         """Downhill in the poses that are free and the angles that are varied, as long as it can be trusted."""
-        choice = start.choice
-        turning = [
-            name for vary, name in (("analyser", "analyser_deg"), ("polarisation", "polarisation_deg"))
-            if angles and vary in self.vary and getattr(choice, name) is not None
-        ]  # fmt: skip
-        free = tuple(poses and not held for held in self.held)
+        turning = self._turning(begin.choice) if angles else []
+        held = tuple(held or not poses for held in self.held)
+
+        def choice(turns: np.ndarray) -> Choice:
+            return replace(begin.choice, **{n: float(turn) % 180 for n, turn in zip(turning, turns, strict=True)})
 
         def value(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> float:
-            if any(free) and not self.limits.allows(self.scene, sensor, light):
+            if not all(held) and not self.problem.constraints.allows(self.scene, sensor, light):
                 return np.inf
-            world = with_choice(self.scene, self._turned(choice, turning, turns), self.hold)
-            (found,), (cut,) = self._values(world, sensor[None], light[None])
+            (found,), (cut,) = self._values(choice(turns), sensor[None], light[None])
             return np.inf if cut else float(found)
 
         def trust(sensor: np.ndarray, light: np.ndarray, turns: np.ndarray) -> bool:
-            return self._untrusted(Place(self._turned(choice, turning, turns), sensor, light, np.nan)) <= most
+            return self._untrusted(Place(choice(turns), sensor, light, np.nan)) <= most
 
-        begin = start.sensor, start.light, np.array([getattr(choice, name) for name in turning], float)
-        sensor, light, turns = descend(begin, free, value, trust, sizes, one_mount=self.limits.same_mount)
-        end = self._place(self._turned(choice, turning, turns), sensor, light)
-        return min(self._place(choice, start.sensor, start.light), end, key=_value)
+        own = np.array([getattr(begin.choice, name) for name in turning], float)
+        if not np.isfinite(value(begin.sensor, begin.light, own)):
+            return self._place(begin.choice, begin.sensor, begin.light)
+        start = Start(begin.sensor, begin.light, own, held, self.problem.constraints.same_mount)
+        sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=True)
+        ends = (choice(turns), sensor, light), (begin.choice, begin.sensor, begin.light)
+        return min((self._place(*end) for end in ends), key=_value)
 
-    def _turned(self, choice: Choice, names: list[str], turns: np.ndarray) -> Choice:
-        return replace(choice, **{name: float(turn) % 180 for name, turn in zip(names, turns, strict=True)})
+    def _turning(self, choice: Choice) -> list[str]:
+        """Names of a choice's angles that are varied."""
+        names = ("analyser", "analyser_deg"), ("polarisation", "polarisation_deg")
+        return [name for vary, name in names if vary in self.vary and getattr(choice, name) is not None]
 
     def _untrusted(self, place: Place) -> int:
-        return untrusted(with_choice(self.scene, place.choice, self.hold), place.sensor, place.light, self.model)
+        return RayTraced.of(self._with(place.choice), place.sensor, place.light).untrusted
 
     def _place(self, choice: Choice, sensor: np.ndarray, light: np.ndarray) -> Place:
-        """With what a close look says."""
-        world = with_choice(self.scene, choice, self.hold)
-        return Place(choice, sensor, light, float(variances(world, sensor, light, self.model, self.aim)))
+        """With its ray-traced value."""
+        world = self._with(choice)
+        return Place(choice, sensor, light, float(minimised(world.errors(sensor, light), world.objective)))
 
     def _told(self, place: Place) -> Chosen:
-        world = with_choice(self.scene, place.choice, self.hold)
+        world = self._with(place.choice)
+        status = RayTraced.of(world, place.sensor, place.light).prediction.status
         poses = Pose(*map(float, place.sensor)), Pose(*map(float, place.light))
-        status = predict(world, *poses, self.model).status
         time = exposure_time(self.scene, place.choice, self.hold)
-        return Chosen(place.choice, world, *poses, place.value, status, time)
+        return Chosen(place.choice, world.scene, *poses, place.value, status, time)
 
 
 _GUARANTEE = (
@@ -266,3 +262,8 @@ _GUARANTEE = (
 
 def _value(place: Place) -> float:
     return place.value
+
+
+def _clear(found: list[Place]) -> Iterator[Place]:
+    """Clearly different ones, the best first."""
+    return distinct(sorted(found, key=_value), Place.differs, _TRACED)

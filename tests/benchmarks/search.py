@@ -10,8 +10,9 @@ import numpy as np
 
 import planner
 import scenes
-from planner.search.exhaustive import evaluate_pairs, exhaustive
-from planner.search.viewing import ViewingSpace
+from planner.search.exhaustive import exhaustive
+from planner.search.grid import ViewingSpace
+from tests.pairs import evaluate_pairs
 
 PAPER_PAIR = np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]])
 TABLE_1 = (((40, 41), (4, 27), 0.1023), ((32, 140), (4, 27), 0.0960), ((32, 140), (14, 303), 0.0703))

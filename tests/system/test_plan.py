@@ -9,9 +9,9 @@ import pytest
 
 import planner
 import scenes
-from planner.search.exhaustive import evaluate_pairs
-from planner.search.robustness import altered
+from planner.robustness import altered
 from scenes import InvalidInput
+from tests.pairs import evaluate_pairs
 from validation.cli import main as cli
 
 

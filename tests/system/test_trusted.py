@@ -5,7 +5,9 @@ import pytest
 
 import planner
 import scenes
-from planner.search.trusted import DEAREST, trusted
+from planner.search.candidates import DEAREST, RayTraced, trusted
+from planner.search.constraints import Constraints
+from planner.search.objective import SearchProblem
 from validation.report.plan_table import report
 
 
@@ -36,8 +38,10 @@ def test_what_is_set_aside_is_better_and_not_to_be_trusted(wedge, found, capsys)
 
 def test_nothing_is_set_aside_for_what_costs_too_much(wedge, found):
     best = tuple(np.array(list(pose)) for pose in (found.grid_sensor, found.grid_light))
-    taken = trusted(wedge, best, found.grid_variance / (2 * DEAREST), found.candidates, found.model)
-    assert not taken.set_aside
+    problem = SearchProblem.of(wedge, found.model, found.objective, Constraints())
+    variance = found.grid_variance / (2 * DEAREST)
+    taken, set_aside = trusted(problem, RayTraced.of(problem, *best), found.candidates, variance)
+    assert not set_aside
     assert taken.untrusted > 0
     assert (taken.sensor == best[0]).all()
 

@@ -19,8 +19,8 @@ from imaging.light.revolved import rings_of
 from imaging.models import bias
 from measure.estimators.profile import profile_kernel, top_kernel
 from planner.combining import combined
-from planner.search.aim import Aim
-from planner.search.separable import separable
+from planner.search.bound import separable
+from planner.search.objective import Aim
 from render import curved
 from render.phenomena import transport
 from scenes import Backlight, Bar, Disc, InvalidInput, Light, Ring, Turned

@@ -9,7 +9,7 @@ from imaging.features.measurand import measurands
 from imaging.geometry.projection import direction
 from imaging.models.bound import bound, information, known, line_rows
 from planner import Pictures
-from planner.search.robustness import Tolerances, _with_pose_errors, altered
+from planner.robustness import Tolerances, _with_pose_errors, altered
 from scenes import InvalidInput
 
 SENSOR, LIGHT = np.array([30.0, 135.0]), np.array([15.0, 315.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imaging.blurred.boundaries import _SUPPORT, _interpolation
-from planner.search.separable import _DEGREE, _influence, _lagrange, _nodes
+from planner.search.bound import _DEGREE, _influence, _lagrange, _nodes
 
 
 def reproduced(weights, nodes, at, degree, rng):

@@ -8,7 +8,7 @@ import planner
 from imaging.features.propagation import corner_covariance
 from imaging.models.paper import paper
 from imaging.pictures import Pictures
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
 
 mp.mp.dps = 50
 

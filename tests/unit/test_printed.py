@@ -15,7 +15,7 @@ import measure
 import planner
 import scenes
 from planner.budgeting.budgets import budget
-from planner.search.choices import Choice
+from planner.search.design import Choice
 from render import Tolerance as LeaveOut
 from render.phenomena import Decision, Influence
 from scenes import Pose, Tolerance
@@ -167,8 +167,8 @@ def of_three(found):
 
 
 def robustly(found):
-    moves = (planner.search.robustness.Move("noise", 0.9, 0.81, 0.8, 1.5, 2.5),
-             planner.search.robustness.Move("roughness", 1.2, 1.4, 1.3, 3.5, 4.5))  # fmt: skip
+    moves = (planner.robustness.Move("noise", 0.9, 0.81, 0.8, 1.5, 2.5),
+             planner.robustness.Move("roughness", 1.2, 1.4, 1.3, 3.5, 4.5))  # fmt: skip
     return planner.Robust(Pose(31.5, 42), Pose(21.25, 250.5), 0.5, 0.25, 0.75, moves, 50)
 
 

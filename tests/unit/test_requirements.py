@@ -9,12 +9,13 @@ import scenes
 from imaging.models.calibrated import calibrated
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
-from planner.search.aim import Aim
-from planner.search.exhaustive import evaluate_pairs, exhaustive
-from planner.search.separable import separable
-from planner.search.viewing import ViewingSpace
+from planner.search.bound import separable
+from planner.search.exhaustive import exhaustive
+from planner.search.grid import ViewingSpace
+from planner.search.objective import Aim
 from planner.uncertainty.conformity import decide
 from scenes import InvalidInput, Tolerance
+from tests.pairs import evaluate_pairs
 from validation import statistics
 
 V3, V6 = {"vertex": "v3", "edges": ["e4", "e9"]}, {"vertex": "v6", "edges": ["e7", "e11"]}

@@ -5,12 +5,14 @@ import pytest
 
 import planner
 import scenes
-from planner.search.alternating import alternate
-from planner.search.exhaustive import _blocks, evaluate_pairs, exhaustive
-from planner.search.separable import separable
-from planner.search.viewing import ViewingSpace
+from planner.search.bound import separable
+from planner.search.exhaustive import _blocks, exhaustive
+from planner.search.grid import ViewingSpace
+from planner.search.local import alternate
+from planner.search.objective import SearchProblem
 from scenes import InvalidInput
 from tests.benchmarks.search import local_minima
+from tests.pairs import evaluate_pairs
 from tests.scalar import variance_evaluate
 
 PAPER = np.array([30.0, 135.0]), np.array([15.0, 315.0])
@@ -48,7 +50,7 @@ def test_exhaustive_search_against_every_pair(name, model, objective):
     exact = evaluate_pairs(scene, *(a.reshape(-1, 2) for a in grid(poses)), model, objective).reshape(len(poses), -1)
     table = separable(scene, poses, poses, model, objective)
     covered = 0
-    for rows, columns, bound in _blocks(table, scene, poses, poses, None):
+    for rows, columns, bound in _blocks(table, SearchProblem.of(scene, model, objective), poses, poses):
         # margin: a bound, by its kind: equality is allowed
         assert (bound <= exact[np.ix_(table.sensors[rows], columns)]).all()
         covered += bound.size

@@ -7,11 +7,10 @@ import pytest
 
 import planner
 import scenes
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.shares import shares_of, shares_of_two, with_shares
-from planner.search.sharing import search_shared
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
+from planner.search.lights import search_shared, shares_of, shares_of_two, with_shares
+from planner.search.objective import Aim, SearchProblem
 from scenes import InvalidInput
 
 STEP = 30
@@ -30,7 +29,9 @@ def test_no_combination_of_the_grid_is_better(scene):
     """Every sensor, both lights anywhere, shares in tenths, by `planner.variances`."""
     places = ViewingSpace(STEP, (0, 75)).poses
     aim = Aim.of(scene.quantities, "object")
-    found = search_shared(scene, places, places, "calibrated", aim, Constraints(), quiet, shares_of_two(scene))
+    found = search_shared(
+        SearchProblem(scene, "calibrated", aim, Constraints()), places, places, shares_of_two(scene), quiet
+    )
     each = np.array(list(product(range(len(places)), repeat=3)))
     allowed = Constraints().pairs(scene, places[each[:, 0]], np.hstack([places[each[:, 1]], places[each[:, 2]]]))
     each, best = each[allowed], np.inf

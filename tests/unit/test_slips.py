@@ -35,11 +35,10 @@ from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots
 from measure.photo import mtf as mtfs
 from measure.photo import recording
-from planner.search import exhaustive, robustness
-from planner.search.aim import Aim
-from planner.search.refinement import shifted
-from planner.search.shares import with_shares
-from planner.search.sharing import _Looks
+from planner import robustness
+from planner.search.lights import _Contrasts, with_shares
+from planner.search.local import Refined, shifted
+from planner.search.objective import Aim, SearchProblem, cut_off
 from planner.uncertainty import Input, monte_carlo
 from scenes import Camera, Noise, Picture, Pose
 from scenes.cameras.data_sheet import completed
@@ -152,9 +151,9 @@ def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
     scene = scenes.load("two_lights")
     scene, aim = changed(scene, camera={"focal_px": larger * scene.camera.focal_px}), Aim.of(scene.quantities, "object")
     place, ratios, lengths = np.array([[40.0, 300.0]]), [], []
-    looks = _Looks(scene, place, aim, planner.Constraints())
+    looks = _Contrasts(SearchProblem(scene, "calibrated", aim, planner.Constraints()), place)
     for sensor in np.array([[p, a] for p in (30.0, 60.0) for a in range(195, 360, 15)], float):
-        known = looks.look(sensor)
+        known = looks.of_sensor(sensor)
         for share in ((0.0, 1.0), (0.3, 0.7)) if known else ():
             exact = planner.variances(with_shares(scene, share), sensor, (place[0], place[0]))
             ratios.append(looks.bound(sensor) / min(looks.best(known, share)[0], float(exact)))
@@ -166,7 +165,7 @@ def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
 
 def test_levels_of_a_single_edge_that_are_cut_off_are_enough(task1):
     part = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 1.0], [0.9, 1.0, 1.0]]) * task1.noise.variance
-    assert exhaustive.cut_off(SimpleNamespace(noise_variance=part), task1).tolist() == [True, False, True]
+    assert cut_off(SimpleNamespace(noise_variance=part), task1).tolist() == [True, False, True]
 
 
 def test_the_moves_of_a_robust_plan_are_degrees_of_sensor_and_light(task1, monkeypatch):
@@ -174,11 +173,12 @@ def test_the_moves_of_a_robust_plan_are_degrees_of_sensor_and_light(task1, monke
     found = planner.plan(task1, step_deg=30, refined=False)
     away = {}
 
-    def refine(scene, sensor, light, *rest, value=None):
+    def refine(problem, pair, step_deg, value=None):
+        sensor, light = pair
         if value is not None:
-            return sensor, light, value(sensor, light)
+            return Refined(sensor, light, np.zeros(0), value(sensor, light))
         away["pair"] = shifted(sensor, np.array([3.0, 0.0])), shifted(light, np.array([0.0, 8.0]))
-        return *away["pair"], 0.5 * found.variance
+        return Refined(*away["pair"], np.zeros(0), 0.5 * found.variance)
 
     monkeypatch.setattr(robustness, "refine", refine)
     told = planner.robust(found, planner.Tolerances(noise=0.3, sensor_deg=1.0, light_deg=4.0))

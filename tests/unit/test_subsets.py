@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from planner.search.subsets import (
+from planner.search.candidates import DEAREST
+from planner.search.sets import (
     Information,
     better,
     every_set,
@@ -15,7 +16,6 @@ from planner.search.subsets import (
     least_value,
     sets_of,
 )
-from planner.search.trusted import DEAREST
 
 
 def random_table(seed: int, pictures: int = 14, over: str = "minimax") -> Information:

@@ -11,8 +11,8 @@ from imaging.light.appearance import analyser_axis, of_sides, polarisation_axis,
 from imaging.light.irradiance import bands
 from imaging.pictures import Pictures
 from planner.prediction import variances
-from planner.search.choices import Choice, exposure_time, own_choice, throughput, with_choice
-from planner.search.descent import descend
+from planner.search.design import Choice, exposure_time, own_choice, throughput, with_choice
+from planner.search.local import Start, descend
 from scenes import Filter, InvalidInput, Lamp
 from validation.vary_check import Scatter, judged
 
@@ -169,11 +169,13 @@ def test_bad_lamps(tmp_path, text, line):
 
 def test_descents_stay_where_trust_is():
     """The minimum of a square lies beyond a border: the descent comes near the border and not across."""
-    begin = np.array([40.0, 0.0]), np.array([20.0, 0.0]), np.array([50.0])
-    free = (False, False)
-    end = descend(begin, free, lambda _s, _k, turns: (turns[0] - 10) ** 2 + 1, lambda _s, _k, t: t[0] > 30, (8.0, 1.0))
-    assert 30 < end[2][0] < 30.5  # margin: near the border and not across it
-    assert (end[0] == begin[0]).all()
+    begin = Start(np.array([40.0, 0.0]), np.array([20.0, 0.0]), np.array([50.0]), held=(True, True))
+    end = descend(
+        begin, lambda _s, _k, turns: (turns[0] - 10) ** 2 + 1, sizes=(8.0, 1.0), trusted=lambda _s, _k, t: t[0] > 30,
+        fast=True,
+    )  # fmt: skip
+    assert 30 < end.angles[0] < 30.5  # margin: near the border and not across it
+    assert (end.sensor == begin.sensor).all()
 
 
 def scatter(rng, sigma2, predicted, n=1000):

@@ -5,7 +5,7 @@ import pytest
 
 import planner
 import scenes
-from planner.search.aim import Aim
+from planner.search.objective import Aim
 from tests.sides import sides
 
 

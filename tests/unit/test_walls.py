@@ -12,7 +12,8 @@ import trimesh
 import planner
 import scenes
 from imaging.features.circles import Rim, calibrated_circle
-from planner.search.refinement import refine, shifted
+from planner.search.local import refine
+from planner.search.objective import SearchProblem
 from render.curved import stands_for
 from scenes import InvalidInput
 from scenes.load import from_document
@@ -170,11 +171,11 @@ def test_refinement_begins_where_the_search_ended(task1):
     def value(sensor, light):
         return np.inf if (sensor == begun).all() else 1.0 + float(((sensor - [40, 52]) ** 2).sum())
 
-    begun = shifted(start[0], np.zeros(2))
-    told = [refine(task1, *start, "calibrated", "object", 5.0, value=value, known=known) for known in (5.0, 0.5)]
-    assert 1 <= told[0][2] < 1.1  # margin: a ratio of a minimum to where it began
+    begun, problem = start[0], SearchProblem.of(task1, "calibrated", "object")
+    told = [refine(problem, start, 5.0, value=value, known=known) for known in (5.0, 0.5)]
+    assert 1 <= told[0].value < 1.1  # margin: a ratio of a minimum to where it began
     assert told[0][0] == pytest.approx([40, 52], abs=0.3)
-    assert told[1][2] == 0.5
+    assert told[1].value == 0.5
     assert told[1][0] == pytest.approx(start[0])
     with pytest.raises(InvalidInput, match="must begin at a pose that is allowed"):
-        refine(task1, *start, "calibrated", "object", 5.0, value=value)
+        refine(problem, start, 5.0, value=value)

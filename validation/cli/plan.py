@@ -173,7 +173,7 @@ def _say_unchecked(scene: scenes.Scene, said: bool) -> None:
 
 def _varied(scene: scenes.Scene, vary: str | None, hold: str | None) -> dict:
     """What is varied beside the poses, checked before anything is searched."""
-    from planner.search.choices import DEFAULT_HOLD, check_vary
+    from planner.search.design import DEFAULT_HOLD, check_vary
 
     if vary is None:
         if hold is not None:
@@ -244,7 +244,7 @@ def _two(option: str, text: str) -> tuple[float, float]:
 
 def _tolerances(texts: list[str], scene: scenes.Scene) -> planner.Tolerances | None:
     import planner
-    from planner.search.robustness import check_robust
+    from planner.robustness import check_robust
 
     known = [field.name for field in dataclasses.fields(planner.Tolerances)]
     values = {}

@@ -9,8 +9,8 @@ import numpy as np
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.search.constraints import Constraints
-from planner.search.poses import by_light
-from planner.search.refinement import refine
+from planner.search.grid import by_light
+from planner.search.local import Start, descend
 from scenes import InvalidInput, Pose, Scene
 from validation.explore.state import State
 
@@ -31,16 +31,17 @@ def best_from(scene: Scene, state: State) -> State:
     sensor = np.array(list(state.sensor))
     lights = np.array([list(pose) for pose in state.lights]).reshape(-1)
 
-    def variance(sensor: np.ndarray, lights: np.ndarray) -> float:
+    limits = Constraints()
+
+    def variance(sensor: np.ndarray, lights: np.ndarray, _: np.ndarray | None = None) -> float:
+        if not limits.allows(scene, sensor, lights):
+            return np.inf
         given = by_light(lights[None])
         pictures = Pictures.of(scene, sensor[None], given if scene.free else None)
         return float(variance_model("calibrated")(pictures).variances_object.reshape(-1)[state.measurand])
 
-    try:
-        sensor, lights, _ = refine(scene, sensor, lights, "calibrated", "object", _STEP_DEG, Constraints(), variance)
-    except InvalidInput as error:
-        if "refinement must begin" not in str(error):
-            raise
-        raise InvalidInput("the descent must begin where the measurand can be measured and bodies are clear") from None
+    if not np.isfinite(variance(sensor, lights)):
+        raise InvalidInput("the descent must begin where the measurand can be measured and bodies are clear")
+    sensor, lights, *_ = descend(Start(sensor, lights, unit_deg=_STEP_DEG), variance, sizes=(0.7, 0.1))
     poses = [Pose(*map(float, pose.round(2))) for pose in (sensor, *lights.reshape(-1, 2))]
     return replace(state, sensor=poses[0], lights=tuple(poses[1:]))

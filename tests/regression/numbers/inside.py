@@ -17,7 +17,7 @@ from measure.find import four_sides, rounds
 from measure.photo import rounding
 from planner.budgeting.plans import systematic
 from planner.budgeting.sources import sources
-from planner.search import choices, sharing, varied
+from planner.search import design, lights, varying
 from render import adaptive, optics
 from scenes.parts.surfaces import roots
 from tests.regression.numbers.poses import load, uneven, without_error
@@ -59,9 +59,9 @@ def _shared():
     noise = rng.uniform(2, 5, (4, 2, 7))
     mixed = rng.uniform(1, 9, (3, 2, 2, 4)), rng.uniform(1, 9, (5, 2, 2, 4))
     return {
-        "even": sharing._variances(weights, squared.copy(), 3.1),
-        "own": sharing._variances(weights, squared.copy(), noise),
-        "mixtures": [list(sharing._mixtures(*mixed, share)) for share in ((0.3, 0.7), (1.0, 0.0), (0.0, 1.0))],
+        "even": lights._variances(weights, squared.copy(), 3.1),
+        "own": lights._variances(weights, squared.copy(), noise),
+        "mixtures": [list(lights._mixtures(*mixed, share)) for share in ((0.3, 0.7), (1.0, 0.0), (0.0, 1.0))],
     }  # fmt: skip
 
 
@@ -69,9 +69,9 @@ def _polarisers():
     angles = (None, 0.0, 31.0, 89.0, 90.0, 133.0, 179.0)
     scene = load("copper")
     return {
-        "apart": [[varied._apart(a, b) for a in angles] for b in angles],
-        "bands": choices.bands_of(scene), "angles": choices.angles_of(load("polarised"), ("analyser",), 45.0),
-        "through": [choices.throughput(load("polarised"), planner.Choice(a, b)) for a in angles for b in angles],
+        "apart": [[varying._apart(a, b) for a in angles] for b in angles],
+        "bands": design.bands_of(scene), "angles": design.angles_of(load("polarised"), ("analyser",), 45.0),
+        "through": [design.throughput(load("polarised"), planner.Choice(a, b)) for a in angles for b in angles],
     }  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def _of_two_lamps():
     both = scene.model_copy(update={"light": None, "several_lights": (first, second)})
     made = [without_error(lambda c=c: planner.with_choice(both, c)) for c in (planner.Choice(None, None, filter=f.name)
                                                                               for f in scene.filters)]  # fmt: skip
-    return {"own": choices.own_choice(both), "wavelengths": choices._wavelengths(both, None, None),
+    return {"own": design.own_choice(both), "wavelengths": design._wavelengths(both, None, None),
             "made": [each if isinstance(each, str) else [each.lights, each.camera.exposure]
                      for each in made]}  # fmt: skip
 

@@ -10,7 +10,7 @@ from imaging.models import variance_model
 from imaging.models.bias import bias, cluttered
 from imaging.pictures import Pictures
 from planner.budgeting.sensitivities import sensitivities
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
 from planner.uncertainty import improve, risks
 from scenes import Pose
 from tests.regression.numbers.poses import CHANGED, load, uneven, without_error

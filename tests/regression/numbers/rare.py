@@ -16,7 +16,7 @@ from imaging.models import moments
 from imaging.pictures import Pictures
 from planner.budgeting import plans
 from planner.budgeting.sources import sources
-from planner.search.viewing import ViewingSpace
+from planner.search.grid import ViewingSpace
 from planner.uncertainty import Input, budget, conformity, gauge, improve, inputs, risks, uncertainty_ratio
 from planner.uncertainty.groups import Group, draw
 from planner.uncertainty.ufloats import as_ufloats

@@ -13,7 +13,7 @@ import numpy as np
 
 import planner
 import scenes
-from planner.search.robustness import Move, Robust
+from planner.robustness import Move, Robust
 from scenes import Pose, errors, results
 from scenes.files import written
 from scenes.load import from_document

@@ -2,15 +2,15 @@
 
 Light adds up: with c_l the contrast along an edge under light l alone with all of the total, it is sum_l share_l c_l
 under all of them, and the variance of a line is the sum of a sensor's weights over squared contrasts
-(`models.calibrated`, long edges). So one look at each light's place tells of all their combinations. What no mixture
-can exceed is the greatest contrast of any single place, which bounds a sensor from below: only sensors whose bound is
-below the best value known are looked at.
+(`models.calibrated`, long edges). So one evaluation of each light's place tells of all their combinations. What no
+mixture can exceed is the greatest contrast of any single place, which bounds a sensor from below: only sensors whose
+bound is below the best value known are evaluated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,12 +24,35 @@ from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
 from imaging.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
-from planner.search.aim import Aim
-from planner.search.constraints import Constraints
-from planner.search.exhaustive import Found, Report, evaluate_pairs
-from planner.search.poses import by_light
-from planner.search.shares import with_shares
+from planner.search.exhaustive import BestPair
+from planner.search.grid import Grid, by_light
+from planner.search.objective import Report, SearchProblem
 from scenes import Scene
+
+_STEP = 0.1  # between shares
+Shares = tuple[tuple[float, ...], ...]
+
+
+def with_shares(scene: Scene, shares: tuple[float, ...]) -> Scene:
+    """The scene whose lights have shares of the sum of their intensities."""
+    total = sum(light.intensity for light in scene.lights)
+    lights = [light.model_copy(update={"intensity": s * total}) for light, s in zip(scene.lights, shares, strict=True)]
+    return scene.lit_by(*lights)
+
+
+def shares_of(scene: Scene) -> tuple[float, ...]:
+    """Shares that a scene's lights have of the sum of their intensities."""
+    total = sum(light.intensity for light in scene.lights)
+    return tuple(light.intensity / total for light in scene.lights)
+
+
+def shares_of_two(scene: Scene) -> tuple[tuple[float, float], ...]:
+    """Shares of two lights in tenths; lights that are alike may change places, so the first has at most half."""
+    one, two = (light.model_copy(update={"intensity": 1.0}) for light in scene.lights)
+    count = round(1 / _STEP)
+    most = count // 2 if one == two and one.mount == "free" else count
+    return tuple((i / count, 1 - i / count) for i in range(most + 1))
+
 
 _EXACT = 32  # sensors whose best combination is evaluated exactly
 BETTER = 1 - 1e-9  # than which a value must be less to be better
@@ -38,11 +61,11 @@ _ENDS = 0.85  # of a line's first-order variance, at most, is what its ends are 
 _UNEVEN = 2.0  # ... a short one: they are taken to take so many times as much as at even contrast
 
 
-class Alone(NamedTuple):
-    """The best setting with one light that has all: what is minimised, shares, sensor (2,) and lights (2 F,)."""
+class Mixture(NamedTuple):
+    """A setting of several lights: what is minimised, shares, sensor (2,) and lights (2 F,)."""
 
     value: float
-    shares: tuple[float, float]
+    shares: tuple[float, ...]
     sensor: np.ndarray
     lights: np.ndarray
 
@@ -57,16 +80,16 @@ class Shared:
         Its lights with the best shares as their intensities.
     lights : ndarray, shape (S, 2 F)
         Poses of the free lights that are best for each sensor with these shares.
-    found : Found
+    found : BestPair
         The best sensor; its lights are those of the same number.
-    alone : Alone or None
+    alone : Mixture or None
         The best where one light has all; None where that was not asked.
     """
 
     scene: Scene
     lights: np.ndarray
-    found: Found
-    alone: Alone | None
+    found: BestPair
+    alone: Mixture | None
 
 
 def applies(scene: Scene, model: str) -> bool:
@@ -74,66 +97,77 @@ def applies(scene: Scene, model: str) -> bool:
     return model == "calibrated" and not circles(scene) and len(scene.lights) == 2
 
 
+def best_lights(problem: SearchProblem, grid: Grid, shares: str, report: Report) -> Shared:
+    """Several lights at once, or one after the other where their contrasts do not tell of mixtures.
+
+    The ``best`` shares of two lights in tenths, else those that the scene gives.
+    """
+    scene = problem.scene
+    mixed = shares_of_two(scene) if shares == "best" and len(scene.lights) == 2 else (shares_of(scene),)
+    search = search_shared if applies(scene, problem.model) else by_turns
+    return search(problem, grid.sensors, grid.lights, mixed, report)
+
+
 def search_shared(
-    scene: Scene, sensors: np.ndarray, places: np.ndarray, model: str, aim: Aim,
-    constraints: Constraints, report: Report, shares: tuple[tuple[float, float], ...],
-) -> Shared:  # fmt: skip
+    problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares, report: Report
+) -> Shared:
     """Search all sensors (S, 2), all places (L, 2) of each free light, and shares of two lights.
 
     Places that a light may not have beside a sensor are left out one by one (`Constraints.pairs`).
     """
-    looks = _Looks(scene, places, aim, constraints)
-    bounds = np.array([looks.bound(sensor) for sensor in sensors])
+    seen = _Contrasts(problem, places)
+    bounds = np.array([seen.bound(sensor) for sensor in sensors])
     order = np.argsort(bounds)
     best, chosen, alone = np.inf, shares[0], None
     for done, s in enumerate(order.tolist()):
         report("lights", done + 1, 2 * len(sensors))
         if not bounds[s] <= best:
             break
-        known = looks.look(sensors[s])
+        known = seen.of_sensor(sensors[s])
         for share in shares:
-            value, lights = looks.best(known, share)
+            value, lights = seen.best(known, share)
             if max(share) == 1 and np.isfinite(value) and (alone is None or value < alone.value):
-                alone = Alone(value, share, sensors[s], lights)
+                alone = Mixture(value, share, sensors[s], lights)
             if value < best * BETTER:
                 best, chosen = value, share
-    return _table(scene, sensors, order, bounds, looks, model, aim, chosen, (best, alone), report)
-
-
-def _table(scene, sensors, order, bounds, looks, model, aim, chosen, known, report) -> Shared:
-    """For each sensor the best lights with the chosen shares; the best of all is evaluated exactly."""
-    free = len(scene.free)
-    lights, least = np.zeros((len(sensors), 2 * free)), np.full(len(sensors), np.inf)
+    lights, least = np.zeros((len(sensors), 2 * len(problem.scene.free))), np.full(len(sensors), np.inf)
     for done, s in enumerate(order.tolist()):
         report("lights", len(sensors) + done + 1, 2 * len(sensors))
         if not np.isfinite(bounds[s]):
             break
-        if bounds[s] <= 16 * known[0]:  # beyond there is no candidate
-            least[s], lights[s] = looks.best(looks.look(sensors[s]), chosen)
-    other = with_shares(scene, chosen)
+        if bounds[s] <= 16 * best:  # beyond there is no candidate
+            least[s], lights[s] = seen.best(seen.of_sensor(sensors[s]), chosen)
     first = np.argsort(least)[:_EXACT]
     first = first[np.isfinite(least[first])]
+    mixed = replace(problem, scene=with_shares(problem.scene, chosen))
     if len(first):
-        least[first] = evaluate_pairs(other, sensors[first], lights[first], model, aim)
-    best = int(np.argmin(least))
-    pairs = len(sensors) * looks.combinations
-    which = np.where(np.isfinite(least), np.arange(len(sensors)), -1)
-    found = Found(best, best, float(least[best]), pairs, len(first), which, least, guaranteed=True)
-    return Shared(other, lights, found, known[1])
+        least[first] = mixed.values(sensors[first], lights[first])
+    return _shared(mixed.scene, lights, least, (len(sensors) * seen.combinations, len(first), True), alone)
 
 
-class _Looks:
+def _shared(
+    scene: Scene, lights: np.ndarray, least: np.ndarray, known: tuple[int, int, bool], alone: Mixture | None
+) -> Shared:
+    """The result, from pairs, how many of them were evaluated, and whether none is better."""
+    best, (pairs, evaluated, guaranteed) = int(least.argmin()), known
+    which = np.where(np.isfinite(least), np.arange(len(least)), -1)
+    found = BestPair(best, best, float(least[best]), pairs, evaluated, which, least, guaranteed)
+    return Shared(scene, lights, found, alone)
+
+
+class _Contrasts:
     """Contrasts of a scene's edges under each light alone, from each of its places."""
 
-    def __init__(self, scene: Scene, places: np.ndarray, aim: Aim, constraints: Constraints) -> None:
-        self.scene, self.aim, self.constraints = scene, aim, constraints
+    def __init__(self, problem: SearchProblem, places: np.ndarray) -> None:
+        self.problem, self.scene, self.aim = problem, problem.scene, problem.objective
+        scene = problem.scene
         total = sum(light.intensity for light in scene.lights)
         whole = [light.model_copy(update={"intensity": total}) for light in scene.lights]
         self.lone = [scene.lit_by(light) for light in whole]
         self.places = [places if light.mount == "free" else np.zeros((1, 0)) for light in scene.lights]
         self.combinations = int(np.prod([len(each) for each in self.places]))
 
-    def look(self, sensor: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]] | None:
+    def of_sensor(self, sensor: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]] | None:
         """Weights (2, M, E, n) of 1 / C^2, and signals (L, E, 2, n) under each light; None where nothing is seen."""
         alone = Pictures(self.scene, sensor, tuple(np.zeros(2) for _ in self.scene.lights))
         known = measurands(alone)
@@ -162,12 +196,13 @@ class _Looks:
         pictures = Pictures.of(scene, np.broadcast_to(sensor, (len(places), 2)), by_light(places))
         found = side_signals(pictures, names, np.broadcast_to(points, (len(places), *points.shape)))
         if places.shape[1]:
-            found = np.where(self.constraints.pairs(scene, sensor, places)[:, None, None, None], found, np.nan)
+            allowed = self.problem.constraints.pairs(scene, sensor, places)
+            found = np.where(allowed[:, None, None, None], found, np.nan)
         return found
 
     def bound(self, sensor: np.ndarray) -> float:
         """What no mixture of the lights can be below."""
-        known = self.look(sensor)
+        known = self.of_sensor(sensor)
         if known is None:
             return np.inf
         weights, signals = known
@@ -181,7 +216,7 @@ class _Looks:
     def best(self, known: tuple | None, share: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The least of what is minimised under mixtures with these shares, and the free lights' poses (2 F,).
 
-        ``known`` is what `look` gives of the sensor.
+        ``known`` is what `of_sensor` gives of the sensor.
         """
         if known is None:
             return np.inf, np.zeros(2 * len(self.scene.free))
@@ -238,3 +273,73 @@ def _mixtures(one: np.ndarray, two: np.ndarray, share: tuple[float, float]) -> I
 
 def _finite(value: np.ndarray) -> float:
     return float(value) if np.isfinite(value) else np.inf
+
+
+def by_turns(problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares, report: Report) -> Shared:
+    """Coordinate search: the sensor, each free light and the shares in turn take the best of all their candidates.
+
+    No guarantee, for whatever a mixture of contrasts does not tell of. Begins from the best of a coarse sample with all
+    lights at one place: with the first and the last of the shares, and those in the middle.
+    """
+    starts = dict.fromkeys((shares[0], shares[len(shares) // 2], shares[-1]))
+    turns = _Turns(problem, sensors, places if problem.scene.free else np.zeros((1, 0)), shares)
+    ends = []
+    for done, share in enumerate(starts):
+        report("turns", done, len(starts))
+        ends.append(turns.run(share))
+    report("turns", len(starts), len(starts))
+    best = min(ends, key=_value)
+    alone = [end for end in turns.alone if np.isfinite(end.value)]
+    lights, mixed = np.tile(best.lights, (len(sensors), 1)), turns.mixed(best.shares)
+    least, count = mixed.feasible_values(sensors, lights), turns.evaluated
+    return _shared(mixed.scene, lights, least, (count, count, False), min(alone, key=_value) if alone else None)
+
+
+def _value(setting: Mixture) -> float:
+    return setting.value
+
+
+class _Turns:
+    """Moves one thing at a time; remembers where one light had all."""
+
+    def __init__(self, problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares) -> None:
+        self.problem, self.sensors, self.places, self.shares = problem, sensors, places, shares
+        self.evaluated, self.alone = 0, []
+
+    def mixed(self, share: tuple[float, ...]) -> SearchProblem:
+        return replace(self.problem, scene=with_shares(self.problem.scene, share))
+
+    def _best(self, share: tuple[float, ...], sensors: np.ndarray, lights: np.ndarray) -> Mixture:
+        """The best of pairs (n, 2), (n, 2 F)."""
+        self.evaluated += len(sensors)
+        values = self.mixed(share).feasible_values(sensors, lights)
+        at = int(values.argmin())
+        return Mixture(float(values[at]), share, sensors[at], lights[at])
+
+    def run(self, share: tuple[float, ...]) -> Mixture:
+        """Where it stops."""
+        some = [poses[:: max(1, len(poses) // 40)] for poses in (self.sensors, self.places)]
+        sensors = np.repeat(some[0], len(some[1]), 0)
+        lights = np.tile(some[1], (len(some[0]), max(1, len(self.problem.scene.free))))
+        here, before = self._best(share, sensors, lights), np.inf
+        while here.value < before:
+            before = here.value
+            for role in range(len(self.problem.scene.free) + 1):
+                here = _better(here, self._moved(here, role))
+            for other in self.shares:
+                here = _better(here, self._best(other, here.sensor[None], here.lights[None]))
+            if max(here.shares) == 1 and len(here.shares) > 1:
+                self.alone.append(here)
+        return here
+
+    def _moved(self, here: Mixture, role: int) -> Mixture:
+        """With the sensor (0) or a free light (1, ...) at the best of its candidates."""
+        tried = self.sensors if role == 0 else self.places
+        sensors, lights = np.tile(here.sensor, (len(tried), 1)), np.tile(here.lights, (len(tried), 1))
+        (sensors if role == 0 else lights[:, 2 * role - 2 : 2 * role])[:] = tried
+        return self._best(here.shares, sensors, lights)
+
+
+def _better(one: Mixture, other: Mixture) -> Mixture:
+    """The other where it is clearly better."""
+    return other if other.value < one.value * BETTER else one

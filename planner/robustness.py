@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import product
 
 import numpy as np
 
 from imaging.geometry.projection import direction
 from planner.planning import Plan
-from planner.search.aim import Aim
 from planner.search.constraints import Constraints
-from planner.search.exhaustive import evaluate_pairs
-from planner.search.refinement import refine, shifted
+from planner.search.local import refine, shifted
+from planner.search.objective import Aim, SearchProblem
 from scenes import InvalidInput, Material, Pose, Scene
 
 
@@ -142,37 +141,37 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
         As `check_robust`, or if nothing can always measure.
     """
     check_robust(plan.scene, tolerances)
-    names, aim = tolerances.of_the_scene, Aim.of(plan.scene.quantities, plan.objective, plan.over)
+    names, problem = tolerances.of_the_scene, _problem(plan, constraints)
     corners = [dict(zip(names, signs, strict=True)) for signs in product((-1, 1), repeat=len(names))]
-    worlds = [altered(plan.scene, {n: 1 + sign * getattr(tolerances, n) for n, sign in c.items()}) for c in corners]
+    factors = [{n: 1 + sign * getattr(tolerances, n) for n, sign in corner.items()} for corner in corners]
+    worlds = [replace(problem, scene=altered(plan.scene, each)) for each in factors]
 
     def worst(sensor: np.ndarray, light: np.ndarray) -> float:
         pairs = _with_pose_errors(sensor, light, tolerances)
-        return max(float(evaluate_pairs(world, *pairs, plan.model, aim).max()) for world in worlds)
+        return max(float(world.values(*pairs).max()) for world in worlds)
 
-    starts = [(plan.sensor, plan.light)]
+    starts = [plan.poses]
     starts += [(c.sensor, c.light) for c in plan.candidates[:6] if c.edges == plan.scene.required]
     starts = [tuple(np.array(list(pose)) for pose in pair) for pair in starts]
     values = [worst(*pair) for pair in starts]
     best = int(np.argmin(values))
     if not np.isfinite(values[best]):
         raise InvalidInput("tolerances must leave a setting that can always measure, got none")
-    sensor, light, value = refine(
-        plan.scene, *starts[best], plan.model, aim, 2.0, constraints, value=worst
-    )  # fmt: skip
-    nominal = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, aim)[0])
-    moves = tuple(
-        _move(plan, name, sign * getattr(tolerances, name), constraints) for name in names for sign in (-1, 1)
-    )
+    end = refine(problem, starts[best], 2.0, value=worst)
     return Robust(
-        sensor=Pose(*map(float, sensor)),
-        light=Pose(*map(float, light)),
-        worst=value,
-        nominal=nominal,
+        sensor=Pose(*map(float, end.sensor)),
+        light=Pose(*map(float, end.lights)),
+        worst=end.value,
+        nominal=float(problem.values(end.sensor[None], end.lights[None])[0]),
         plan_worst=values[0],
-        moves=moves,
-        cases=len(worlds) * len(_with_pose_errors(sensor, light, tolerances)[0]),
+        moves=tuple(_move(plan, problem, n, sign * getattr(tolerances, n)) for n in names for sign in (-1, 1)),
+        cases=len(worlds) * len(_with_pose_errors(end.sensor, end.lights, tolerances)[0]),
     )
+
+
+def _problem(plan: Plan, constraints: Constraints | None) -> SearchProblem:
+    aim = Aim.of(plan.scene.quantities, plan.objective, plan.over)
+    return SearchProblem(plan.scene, plan.model, aim, constraints or Constraints())
 
 
 def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Tolerances) -> tuple[np.ndarray, np.ndarray]:
@@ -186,16 +185,15 @@ def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Toleran
     return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
 
 
-def _move(plan: Plan, name: str, by: float, constraints: Constraints | None) -> Move:
-    world, aim = altered(plan.scene, {name: 1 + by}), Aim.of(plan.scene.quantities, plan.objective, plan.over)
-    sensor, light = (np.array(list(pose)) for pose in plan.poses)
-    here = float(evaluate_pairs(world, sensor[None], light[None], plan.model, aim)[0])
-    before = float(evaluate_pairs(plan.scene, sensor[None], light[None], plan.model, aim)[0])
+def _move(plan: Plan, problem: SearchProblem, name: str, by: float) -> Move:
+    world = replace(problem, scene=altered(plan.scene, {name: 1 + by}))
+    pair = tuple(np.array(list(pose)) for pose in plan.poses)
+    here, before = (float(each.values(*(pose[None] for pose in pair))[0]) for each in (world, problem))
     if not np.isfinite(here):
         return Move(name, 1 + by, np.inf, np.inf, np.nan, np.nan)
-    there = refine(world, sensor, light, plan.model, aim, 1.0, constraints)
+    there = refine(world, pair, 1.0)
     apart = [
         float(np.degrees(np.arccos(np.clip(direction(a) @ direction(b), -1, 1))))
-        for a, b in zip((sensor, light), there[:2], strict=True)
+        for a, b in zip(pair, there[:2], strict=True)
     ]
-    return Move(name, 1 + by, here / before, there[2] / before, *apart)
+    return Move(name, 1 + by, here / before, there.value / before, *apart)

@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from scenes import Filter, InvalidInput, Lamp, Material, Scene
+from scenes import Filter, InvalidInput, Lamp, Material, Pose, Scene
 
 Vary = Literal["analyser", "polarisation", "band"]
 Hold = Literal["time", "white"]
@@ -212,3 +212,70 @@ def _resampled(scene: Scene, wavelengths: np.ndarray) -> tuple:
 
 def _rows(*columns: np.ndarray) -> tuple:
     return tuple(map(tuple, np.column_stack(columns).tolist()))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A setting with its choice.
+
+    Attributes
+    ----------
+    choice : Choice
+    scene : Scene
+        With that choice: ready to predict, render and measure.
+    sensor, light : Pose
+    variance : float
+        What is minimised, as `Plan.variance`.
+    status : str
+        The worst of the measurands.
+    exposure_time : float
+        Over that of the scene's own choice.
+    """
+
+    choice: Choice
+    scene: Scene
+    sensor: Pose
+    light: Pose
+    variance: float
+    status: str
+    exposure_time: float
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What varying more than the poses gains.
+
+    Attributes
+    ----------
+    vary : tuple of str
+    hold : {"time", "white"}
+        What is equal: exposure time, or the grey level of a white diffuse surface.
+    fixed : Chosen
+        The scene's own choice at its best poses: the plan's, after the same descent.
+    same_poses : Chosen
+        The best choice at those poses.
+    best : Chosen
+        Poses and choice together.
+    evaluated : int
+        Settings evaluated.
+    guarantee : str
+        What is known about the optimum.
+    """
+
+    vary: tuple[str, ...]
+    hold: str
+    fixed: Chosen
+    same_poses: Chosen
+    best: Chosen
+    evaluated: int
+    guarantee: str
+
+    @property
+    def gain(self) -> float:
+        """Variance of the fixed choice over that of the best one, each at its own poses; never below 1."""
+        return self.fixed.variance / self.best.variance
+
+    @property
+    def gain_same_poses(self) -> float:
+        """The same at the poses of the fixed choice."""
+        return self.fixed.variance / self.same_poses.variance

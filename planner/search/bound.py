@@ -23,7 +23,7 @@ from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge,
 from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS
 from imaging.pictures import Pictures
 from imaging.sensor import headroom, shot_noise
-from planner.search.aim import Aim
+from planner.search.objective import Aim
 from scenes import Scene
 
 _DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the smooth functions here

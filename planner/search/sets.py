@@ -1,4 +1,8 @@
-"""Which pictures together: sets, with repeats, chosen from a table of what each picture tells of each quantity."""
+"""Several pictures of one object: sets, with repeats, chosen from a table of what each picture tells of each quantity.
+
+``told`` (S, L, M) is the information (1 / variance) that each sensor x light pair has about each of M measurands, by
+fast evaluation.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,20 @@ from itertools import combinations_with_replacement, islice
 
 import numpy as np
 
-from planner.search.trusted import DEAREST
+from imaging.geometry.projection import direction
+from planner.prediction import Prediction, predict
+from planner.search.candidates import DEAREST
+from planner.search.local import refine
+from planner.search.objective import Aim, Report, SearchProblem
+from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one
 _CHUNK = 20_000
 _BLOCK = 4096  # pictures compared at a time with those that are kept
 _SEEDS, _SMALL = 64, 4  # pictures, of them all and of a set, that are few enough to begin it with each of them
+_GROUPS = 24  # places of what is shared that are searched on
+_ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is traced
+_SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a local search
 _LESS = 1 - 1e-9  # times what is minimised: what differs less is the same
 
 
@@ -43,6 +55,10 @@ class Information:
         """Some of the pictures."""
         return Information(self.ok[rows], self.clutter[rows], self.over)
 
+    def together(self, rows: list[int]) -> Information:
+        """What some of the pictures tell together, one row."""
+        return Information(self.ok[rows].sum(0)[None], self.clutter[rows].sum(0)[None], self.over)
+
     def of_sets(self, members: np.ndarray) -> Score:
         """Of sets of pictures, indices (..., K)."""
         return self._score(self.ok[members].sum(-2), self.clutter[members].sum(-2))
@@ -51,6 +67,10 @@ class Information:
         """Of a set of K pictures and each of the P as one more."""
         kept = list(members)
         return self._score(self.ok[kept].sum(0) + self.ok, self.clutter[kept].sum(0) + self.clutter)
+
+    def plus(self, ok: np.ndarray, clutter: np.ndarray) -> tuple[int, float, float]:
+        """Of a set whose one row this is, and one more picture (M,)."""
+        return self._score(self.ok[0] + ok, self.clutter[0] + clutter).at(0)
 
     def _score(self, ok: np.ndarray, clutter: np.ndarray) -> Score:
         told = np.where(ok > 0, ok, clutter / DEAREST)
@@ -224,3 +244,156 @@ def _least_sum(told: np.ndarray, rounds: int = 300) -> tuple[float, np.ndarray]:
         weights = weights * np.sqrt(slope / (weights @ slope))
         weights /= weights.sum()
     return bound, weights
+
+
+def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
+    """1 / (share x variance) of variances (..., M); 0 where infinite."""
+    with np.errstate(divide="ignore"):
+        return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
+
+
+def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> np.ndarray:
+    """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible."""
+    told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
+    for part, errors, allowed in problem.table(sensors, lights, report):
+        told[part] = information(errors.variances_object, problem.objective) * allowed[..., None]
+    return told
+
+
+def undominated(told: np.ndarray, aim: Aim) -> np.ndarray:
+    """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
+    flat = told.reshape(-1, told.shape[-1])
+    best = [told[..., m].argmax(1) for m in range(told.shape[-1])]
+    best.append(alone(told, aim).argmin(1))
+    each = [np.arange(len(told)) * told.shape[1] + column for column in best]
+    rows = np.unique(np.concatenate([front(all_ok(flat, aim)), *each]))
+    return rows[flat[rows].any(1)]
+
+
+def alone(told: np.ndarray, aim: Aim) -> np.ndarray:
+    """What is minimised of each pair alone; infinite where not all is measured."""
+    with np.errstate(divide="ignore"):
+        parts = 1 / told
+    return parts.max(-1) if aim.over == "minimax" else parts.sum(-1)
+
+
+def undominated_shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np.ndarray:
+    """The same where pictures share their sensor, or their light (``share``).
+
+    For each of its places the greedy set of ``count`` pictures is valued; the pairs that none dominates at the best
+    places are returned.
+    """
+    axis = 0 if share == "sensor" else 1
+    found = []
+    for place in range(told.shape[axis]):
+        table = all_ok(told.take(place, axis), aim)
+        kept = front(table)
+        if len(kept):
+            own = table.only(kept)
+            found.append((own.of_sets(np.array(greedy(own, count)[-1])).at(0), place, kept))
+    found.sort(key=lambda each: each[0])
+    rows = [np.ravel_multi_index((place, kept) if axis == 0 else (kept, place), told.shape[:2])
+            for _, place, kept in found[:_GROUPS]]  # fmt: skip
+    return np.concatenate(rows)
+
+
+def all_ok(told: np.ndarray, aim: Aim) -> Information:
+    return Information(told, np.zeros_like(told), aim.over)
+
+
+class Pool:
+    """Candidates, rows of ``poses``; grows when a local search finds one beside them.
+
+    Attributes
+    ----------
+    problem : SearchProblem
+    poses : ndarray, shape (P, 4)
+        Sensor and light, each polar angle and azimuth, degrees.
+    told : ndarray, shape (P, M)
+        Their information by fast evaluation (`information`).
+    traced : dict
+        Predictions of the rows that were ray-traced.
+    """
+
+    def __init__(self, problem: SearchProblem, poses: np.ndarray, told: np.ndarray) -> None:
+        self.problem, self.poses, self.told = problem, poses, told
+        self.traced: dict[int, Prediction] = {}
+
+    def trace(self, row: int) -> None:
+        """Ray-traced evaluation of a row, once."""
+        if row not in self.traced:
+            sensor, light = (tuple(map(float, part)) for part in np.split(self.poses[row], 2))
+            self.traced[row] = predict(self.problem.scene, sensor, light, self.problem.model)
+
+    def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
+        """A further row; its number."""
+        self.poses = np.concatenate([self.poses, np.concatenate([sensor, light])[None]])
+        self.told = np.concatenate([self.told, told[None]])
+        return len(self.poses) - 1
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Ray-traced rows, in their order."""
+        return np.array(sorted(self.traced), int)
+
+    def known(self) -> Information:
+        """What the rows `seen` tell."""
+        told = [self.traced[row].measurands for row in self.seen]
+        values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.objective)
+        fine = np.array([[is_trusted(each.status) for each in row] for row in told])
+        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
+
+    def expected(self) -> Information:
+        """What all rows tell: ray-traced, else by fast evaluation, cluttered as the nearest ray-traced row is."""
+        cluttered = np.zeros(self.told.shape, bool)
+        seen = self.seen
+        if len(seen):
+            known = self.known()
+            sensors, lights = direction(self.poses[:, :2]), direction(self.poses[:, 2:])
+            cosine = np.minimum(sensors @ sensors[seen].T, lights @ lights[seen].T)
+            nearest = cosine.argmax(1)
+            beside = cosine[np.arange(len(cosine)), nearest] > np.cos(np.radians(_ALIKE))
+            cluttered = (known.clutter > 0)[nearest] & beside[:, None]
+        ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
+        if len(seen):
+            ok[seen], clutter[seen] = known.ok, known.clutter
+        return Information(ok, clutter, self.problem.objective.over)
+
+    def refine(self, row: int, rest: Information, step_deg: float) -> int:
+        """The row after a local search of its poses, or itself where that finds nothing better; the row's number.
+
+        Parameters
+        ----------
+        rest : Information
+            One row: what the other pictures of its set tell.
+
+        What is clutter in the row is taken to stay so on the way. If ray-traced evaluation does not bear out what the
+        fast one told, a shorter search is tried.
+        """
+        sensor, light = np.split(self.poses[row], 2)
+        cluttered = np.array([not is_trusted(each.status) for each in self.traced[row].measurands])
+
+        def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
+            return information(self.problem.errors(s[None], k[None]).variances_object[0], self.problem.objective)
+
+        def score(s: np.ndarray, k: np.ndarray) -> tuple[int, float, float]:
+            values = told(s, k)
+            return rest.plus(np.where(cluttered, 0.0, values), np.where(cluttered, values, 0.0))
+
+        def value(s: np.ndarray, k: np.ndarray) -> float:
+            here = score(s, k)
+            return here[1] if here[0] <= begun[0] else np.inf
+
+        def ray_traced(which: int) -> tuple[int, float, float]:
+            known, at = self.known(), int(np.searchsorted(self.seen, which))
+            return rest.plus(known.ok[at], known.clutter[at])
+
+        begun = score(sensor, light)
+        for size in _SIZES:
+            end = refine(self.problem, (sensor, light), step_deg, value=value, sizes=(size,))
+            if end.value < begun[1]:
+                found = self.add(end.sensor, end.lights, told(end.sensor, end.lights))
+                self.trace(found)
+                if better(ray_traced(found), ray_traced(row)):
+                    return found
+        return row
