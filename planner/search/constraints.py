@@ -57,29 +57,23 @@ class Constraints:
     same_mount: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("sensor_polar_deg", "light_polar_deg"):
-            low, high = getattr(self, name)
-            if not 0 <= low <= high <= 180:
-                raise InvalidInput(f"{name} must be two rising angles between 0 and 180, got {(low, high)}")
-        for name in ("sensor_azimuth_deg", "light_azimuth_deg"):
-            limits = getattr(self, name)
-            if limits is not None and not (np.isfinite(limits).all() and abs(limits[1] - limits[0]) <= 360):
-                raise InvalidInput(f"{name} must be two azimuths at most 360 degrees apart, got {limits}")
+        for role in ("sensor", "light"):
+            low, high = getattr(self, f"{role}_polar_deg")
+            _check(0 <= low <= high <= 180, f"{role}_polar_deg", "two rising angles between 0 and 180", (low, high))
+            limits = getattr(self, f"{role}_azimuth_deg")
+            told = limits is None or (np.isfinite(limits).all() and abs(limits[1] - limits[0]) <= 360)
+            _check(told, f"{role}_azimuth_deg", "two azimuths at most 360 degrees apart", limits)
+            for polar, azimuth, radius in getattr(self, f"forbidden_{role}"):
+                told = 0 <= polar <= 180 and np.isfinite(azimuth) and 0 <= radius <= 180
+                _check(told, f"forbidden_{role}", "polar, azimuth and radius in degrees", (polar, azimuth, radius))
         for name in ("camera_body", "light_body"):
             radius = getattr(self, name)
-            if radius is not None and not 0 <= radius <= 1e12:
-                raise InvalidInput(f"{name} must be a radius of at least 0, got {radius}")
-        if self.same_mount and self.min_separation_deg > 0:
-            raise InvalidInput(f"min_separation_deg must be 0 with same_mount, got {self.min_separation_deg}")
+            _check(radius is None or 0 <= radius <= 1e12, name, "a radius of at least 0", radius)
         for name, most in (("min_edge_px", 1e9), ("min_clearance_px", 1e9), ("min_separation_deg", 180)):
             value = getattr(self, name)
-            if not 0 <= value <= most:
-                raise InvalidInput(f"{name} must be at {f'most {most:g}' if value > most else 'least 0'}, got {value}")
-        for name in ("forbidden_sensor", "forbidden_light"):
-            for region in getattr(self, name):
-                polar, azimuth, radius = region
-                if not (0 <= polar <= 180 and np.isfinite(azimuth) and 0 <= radius <= 180):
-                    raise InvalidInput(f"{name} must be polar, azimuth and radius in degrees, got {region}")
+            _check(0 <= value <= most, name, f"at {f'most {most:g}' if value > most else 'least 0'}", value)
+        _check(not (self.same_mount and self.min_separation_deg > 0), "min_separation_deg", "0 with same_mount",
+               self.min_separation_deg)  # fmt: skip
 
     @property
     def on_pairs(self) -> bool:
@@ -145,7 +139,9 @@ class Constraints:
         )
 
 
-UNCONSTRAINED = Constraints((0.0, 180.0), (0.0, 180.0), camera_body=0.0, light_body=0.0)
+def _check(good: bool, name: str, must: str, got: object) -> None:
+    if not good:
+        raise InvalidInput(f"{name} must be {must}, got {got}")
 
 
 def _cosines(sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
@@ -205,3 +201,6 @@ def _to_segment(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
     size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
     fraction = np.clip(((points - start) * along).sum(-1) / size, 0, 1)
     return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)
+
+
+UNCONSTRAINED = Constraints((0.0, 180.0), (0.0, 180.0), camera_body=0.0, light_body=0.0)
