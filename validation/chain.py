@@ -8,18 +8,20 @@ at some draws and told. Pictures have everything in themselves: noise, pattern a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from measure import best_estimator
 from measure.believed import believed
 from planner.budgeting.budgets import SceneBudget
 from planner.budgeting.station import Station
 from planner.budgeting.terms import EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE
 from planner.uncertainty.groups import draw
-from validation.stations import measured
+from validation.stations import exposed
 
 _AT_ONCE = 64  # pictures in memory
 _IN_A_PICTURE = (NOISE, PATTERN, MODEL, ROUNDING)
@@ -127,19 +129,22 @@ class Chain:
         self, rng: np.random.Generator, count: int, estimator: str | None = None, report=lambda done: None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Values (count, M) measured in one picture of each drawn station, and statuses; plain scenes only."""
-        errors = self.deviations(rng, count)
-        values, states = [], []
-        for at in range(0, count, _AT_ONCE):
-            stations = [self.station(row) for row in errors[at : at + _AT_ONCE]]
-            found, state = measured(stations, self.budget.picture, rng, estimator)
-            values.append(found)
-            states.append(state)
-            report(min(at + _AT_ONCE, count))
-        whole = np.concatenate(values)
+        from validation.remeasured import Method, batches, remeasured
+
+        stations, picture = map(self.station, self.deviations(rng, count)), self.budget.picture
+
+        def exposures() -> Iterator[np.ndarray]:
+            done = 0
+            for size in batches(count, _AT_ONCE):
+                yield exposed(itertools.islice(stations, size), rng)
+                done += size
+                report(done)
+
+        (found,) = remeasured(picture, exposures(), (Method(estimator or best_estimator(picture.scene)),))
         for m, rows in enumerate(self.budget.terms):
             drawn = draw([row.as_input for row in rows], rng, count)
-            whole[:, m] += self.added(m, drawn, pictured=True)
-        return self._rounded(whole), np.concatenate(states)
+            found.object[:, m] += self.added(m, drawn, pictured=True)
+        return self._rounded(found.object), found.status
 
     def _rounded(self, values: np.ndarray) -> np.ndarray:
         said = self.budget.picture.scene.uncertainty

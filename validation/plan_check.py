@@ -12,9 +12,10 @@ import measure
 import planner
 import render
 from render import Quality
-from scenes import InvalidInput, Pose, Scene, Setting, several, status
+from scenes import InvalidInput, Picture, Pose, Scene, Setting, several, status
+from validation.remeasured import GRADIENT, propagated
 
-ESTIMATOR = "gradient"  # whose closed form the calibrated model is
+ESTIMATOR = GRADIENT.locator
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
 
 
@@ -151,8 +152,7 @@ def _checked(
     found: planner.Plan, sensor: Pose, light: Pose, edges: tuple[str, ...], rank: int, quality: Quality
 ) -> CheckedSetting:
     scene = _with_edges(found.scene, edges)
-    picture = render.image(scene, sensor, light, quality)
-    measured = measure.propagate(picture, scene, sensor, light, ESTIMATOR).measurands
+    _, measured = propagated(Picture.of(scene, sensor, light), quality)
     calibrated = planner.predict(scene, sensor, light, "calibrated").measurands
     aim = planner.Aim.of(scene.quantities, found.objective, found.over)
     in_object = found.objective == "object"

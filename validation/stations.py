@@ -1,18 +1,18 @@
-"""Simulated stations: inputs drawn, a picture of each draw, measured as the scene says."""
+"""Pictures of simulated stations, whose inputs are drawn."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-import measure
 from imaging.blurred.arrangement import arrangement_of
 from imaging.blurred.model import BlurredModel
 from imaging.geometry.lens import undistorted
 from imaging.light.appearance import is_plain
 from planner.budgeting.station import Station
-from scenes import InvalidInput, Picture
+from scenes import InvalidInput
 
 
 def clean_image(station: Station) -> np.ndarray:
@@ -37,18 +37,12 @@ def clean_image(station: Station) -> np.ndarray:
     return model.image(model.start()).reshape(camera.height, camera.width) + scene.noise.dark_level
 
 
-def measured(
-    stations: list[Station], picture: Picture, rng: np.random.Generator, estimator: str | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Values (n, M) measured in one noisy picture of each station by who believes the scene, and statuses (n, M).
-
-    Each station's sensor has a fixed pattern of its own.
-    """
+def exposed(stations: Iterable[Station], rng: np.random.Generator) -> np.ndarray:
+    """One noisy picture of each station, whose sensor has a fixed pattern of its own, shape (n, height, width)."""
     from render.sensor import expose
 
     images = []
     for station in stations:
         noise = station.scene.noise.model_copy(update={"pattern_seed": int(rng.integers(2**31))})
         images.append(expose(clean_image(station), noise, rng, 1)[0])
-    found = measure.measure(np.stack(images), picture, estimator=estimator)
-    return found.value, found.status
+    return np.stack(images)

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-import measure
 import planner
 import render
 from planner import Chosen, Varied
 from render import Quality
-from scenes import status
-from validation.plan_check import ESTIMATOR
-from validation.statistics import STRAY, ratio_interval
+from scenes import Picture, status
+from validation.remeasured import Sample, propagated, remeasured
+from validation.statistics import STRAY
 
 LEVEL = 0.01  # probability of contradicting a prediction that is true
 IMAGES = 1000
@@ -122,23 +121,20 @@ def _scatter(found: planner.Plan, chosen: Chosen, images: int, quality: Quality,
     told = planner.predict(scene, chosen.sensor, chosen.light, found.model).measurands
     predicted = np.array([e.variance_object if in_object else e.variance_image for e in told])
     worst = int(np.argmax(predicted * aim.shares))
-    clean = render.image(scene, chosen.sensor, chosen.light, quality)
-    known = measure.propagate(clean, scene, chosen.sensor, chosen.light, ESTIMATOR).measurands
-    noisy = render.expose(clean, scene.noise, rng, images)
-    seen = measure.measure(noisy, scene, chosen.sensor, chosen.light, ESTIMATOR)
-    values = (seen.value if in_object else seen.value_image)[:, worst]
-    values = values[np.isfinite(values)]
-    measured = float(values.var(ddof=1)) if values.size > 1 else float("nan")
-    propagated = float(np.diag(known.covariance if in_object else known.covariance_image)[worst])
+    picture = Picture.of(scene, chosen.sensor, chosen.light)
+    clean, known = propagated(picture, quality)
+    (seen,) = remeasured(picture, [render.expose(clean, scene.noise, rng, images)])
+    sample = Sample.of((seen.object if in_object else seen.image)[:, worst])
+    variance = float(np.diag(known.covariance if in_object else known.covariance_image)[worst])
     return Scatter(
         measurand=told[worst].name,
         predicted=float(predicted[worst]),
-        propagated=propagated if np.isfinite(propagated) else float("nan"),
-        measured=measured,
+        propagated=variance if np.isfinite(variance) else float("nan"),
+        measured=sample.variance,
         share=float(aim.shares[worst]),
         n=images,
-        failed=images - values.size,
-        interval=ratio_interval(measured, values.size),
+        failed=sample.failed,
+        interval=sample.interval(1.0),
         status=str(known.status[worst]),
     )
 

@@ -16,7 +16,7 @@ from scenes import Picture, Pose
 from scenes.status import counted, is_trusted
 from validation import statistics
 from validation.batch.measurands import independent
-from validation.plan_check import ESTIMATOR
+from validation.remeasured import GRADIENT, Sample, batches, propagated, remeasured
 
 IMAGES = 300  # of each picture: a variance is known to 8 %
 _PIXELS = 1 << 23  # of the images measured at a time
@@ -131,22 +131,11 @@ def _key(view: planner.View) -> tuple[Pose, Pose]:
 
 
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
-    clean, rng = render.image(picture, quality=quality), np.random.default_rng(seed)
-    told = measure.propagate(clean, picture, estimator=ESTIMATOR).measurands
-    size, where = max(1, _PIXELS // clean.size), measure.region_of_interest(picture, estimators=(ESTIMATOR,))
-    parts = (render.expose(clean, picture.scene.noise, rng, count, where) for count in _parts(repeats * images, size))
-    values = [measure.measure(part, picture, estimator=ESTIMATOR).value for part in parts]
-    return _Shot(np.concatenate(values).reshape(repeats, images, -1), told.covariance)
-
-
-def _parts(whole: int, size: int) -> Iterator[int]:
-    """A number in parts of at most a size.
-
-    >>> list(_parts(7, 3))
-    [3, 3, 1]
-    """
-    for at in range(0, whole, size):
-        yield min(size, whole - at)
+    (clean, known), rng = propagated(picture, quality), np.random.default_rng(seed)
+    size, where = max(1, _PIXELS // clean.size), measure.region_of_interest(picture, estimators=(GRADIENT.locator,))
+    noise, counts = picture.scene.noise, batches(repeats * images, size)
+    (values,) = remeasured(picture, (render.expose(clean, noise, rng, count, where) for count in counts))
+    return _Shot(values.object.reshape(repeats, images, -1), known.covariance)
 
 
 def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[CheckedQuantity, np.ndarray]]:
@@ -162,32 +151,28 @@ def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[Checked
     stack = np.stack(values)
     weighted, jointly = both.weighted(stack), both.least_squares(stack)
     with np.errstate(invalid="ignore"):
-        propagated = np.where(both.used, both.weights**2 * np.stack(covariances), 0.0).sum(0)
+        expected = np.where(both.used, both.weights**2 * np.stack(covariances), 0.0).sum(0)
     for m, forecast in enumerate(chosen.views[0].prediction.measurands):
         if not both.used[:, m].any():
             continue
-        known = np.isfinite(weighted[:, m])
-        n = int(known.sum())
-        empirical = float(weighted[known, m].var(ddof=1)) if n > 1 else None
-        ratio, interval = _ratio(weighted[known, m], both.variances[m])
-        own = jointly[np.isfinite(jointly[:, m]), m]
+        sample = Sample.of(weighted[:, m])
+        n = sample.n - sample.failed
+        ratio, interval = _ratio(sample, both.variances[m])
+        ratio_jointly, interval_jointly = _ratio(Sample.of(jointly[:, m]), both.covariance_least_squares[m, m])
         yield CheckedQuantity(
             pictures=len(chosen.views), name=forecast.name, unit=forecast.unit, status=both.status[m],
-            predicted=float(both.variances[m]), propagated=float(propagated[m]), empirical=empirical, n=n,
-            failed=len(known) - n, ratio=ratio, ratio_interval=interval,
-            **dict(zip(("ratio_least_squares", "interval_least_squares"),
-                       _ratio(own, both.covariance_least_squares[m, m]), strict=True)),
-            bias=float(weighted[known, m].mean() - forecast.value_object) if n else None,
+            predicted=float(both.variances[m]), propagated=float(expected[m]),
+            empirical=sample.variance if n > 1 else None, n=n, failed=sample.failed, ratio=ratio,
+            ratio_interval=interval, ratio_least_squares=ratio_jointly, interval_least_squares=interval_jointly,
+            bias=sample.mean - forecast.value_object if n else None,
             predicted_bias=float(both.bias[m]), judged=is_trusted(both.status[m]),
         ), weighted[:, m]  # fmt: skip
 
 
-def _ratio(values: np.ndarray, predicted: float) -> tuple[float | None, tuple[float, float] | None]:
-    """Sample variance over the predicted one, and its interval."""
-    if len(values) < 2:
-        return None, None
-    ratio = float(values.var(ddof=1) / predicted)
-    return ratio, statistics.ratio_interval(ratio, len(values))
+def _ratio(sample: Sample, predicted: float) -> tuple[float | None, tuple[float, float] | None]:
+    """Sample variance over the predicted one, and its interval; None where there is none."""
+    ratio = sample.ratio(predicted)
+    return (None, None) if np.isnan(ratio) else (float(ratio), sample.interval(predicted))
 
 
 def judge(told: list[tuple[CheckedQuantity, np.ndarray]], seconds: float) -> ViewsCheck:
@@ -198,13 +183,13 @@ def judge(told: list[tuple[CheckedQuantity, np.ndarray]], seconds: float) -> Vie
             rows, None, f"nothing that is measured is proven ({counted(r.status for r in rows)})", seconds
         )
     verdict = statistics.verdict(
-        [np.nan if row.ratio is None else row.ratio for row in rows],
-        [row.n for row in rows],
-        lost=[row.failed for row in rows],
-        bias_px=[np.nan if row.bias is None else row.bias for row in rows],
-        predicted_bias_px=[row.predicted_bias for row in rows],
-        sigma_px=[row.predicted**0.5 for row in rows],
-        status=[row.status for row in rows],
-        independent=independent([values for row, values in told if row.judged]),
-    )
+        _column(rows, "ratio"), _column(rows, "n"), lost=_column(rows, "failed"), bias_px=_column(rows, "bias"),
+        predicted_bias_px=_column(rows, "predicted_bias"), sigma_px=np.sqrt(_column(rows, "predicted")),
+        status=[row.status for row in rows], independent=independent([values for row, values in told if row.judged]),
+    )  # fmt: skip
     return ViewsCheck(rows, verdict, "", seconds)
+
+
+def _column(rows: tuple[CheckedQuantity, ...], name: str) -> np.ndarray:
+    """A number of each quantity, NaN where there is none."""
+    return np.array([getattr(row, name) for row in rows], float)

@@ -15,7 +15,8 @@ import typer
 from render import Quality
 from validation.batch import campaign
 from validation.batch.job import run
-from validation.cost.goal import reach, seconds
+from validation.batch.options import RunOptions
+from validation.cost.goal import Goal, reach, seconds
 from validation.cost.interval import images
 
 _ACCURACIES = [0.2, 0.1, 0.05, 0.02]
@@ -42,7 +43,7 @@ def main(
 def _accuracy(scene: str, value: float, hand: bool) -> None:
     loaded = campaign.load(scene)
     with tempfile.TemporaryDirectory() as folder:
-        _, found = reach(loaded, value, out=Path(folder))
+        _, found = reach(loaded, Goal(value), RunOptions(out=Path(folder)))
     took = f"{_by_hand(loaded, value):.1f}" if hand else "-"
     _print(
         f"{value:g}", f"{found.widest:.4f}", _count(found.images), f"{found.seconds:.1f}",

@@ -9,8 +9,9 @@ import render
 import validation
 from tests.commands import ice
 from validation.batch import campaign
+from validation.batch.options import RunOptions
 from validation.cost import locators, sampling, size, watch
-from validation.cost.goal import reach
+from validation.cost.goal import Goal, reach
 from validation.cost.trial import trial
 from validation.cost.watch import Watch
 
@@ -18,16 +19,16 @@ pytestmark = pytest.mark.render
 
 
 def test_accuracy_asked_for_is_reached_in_every_setting(small_toml, tmp_path):
-    said = []
+    said, options = [], RunOptions(workers=1, out=tmp_path)
     loaded = campaign.load(small_toml)
-    found, reached = reach(loaded, 0.15, workers=1, out=tmp_path, say=said.append)
+    found, reached = reach(loaded, Goal(0.15), options, said.append)
     assert reached.widest == pytest.approx(0.15, rel=0.1)
     assert "images a setting" in said[0]
     for row in found.rows:  # what is said of all sources holds at least the interval itself
         low, high = row.main.ratio_interval
         assert (high - low) / 2 <= 1.001 * max(reached.half_widths)
     assert len(set(reached.images)) > 1  # settings stopped on their own
-    again, _ = reach(loaded, 0.15, workers=1, out=tmp_path)  # nothing is left to be done
+    again, _ = reach(loaded, Goal(0.15), options)  # nothing is left to be done
     assert [row.main.empirical for row in again.rows] == [row.main.empirical for row in found.rows]
 
 

@@ -8,6 +8,7 @@ from measure.features.optics import Optics
 from planner import plan
 from scenes import Locator, Noise
 from validation import run
+from validation.batch.options import RunOptions
 from validation.cli.batch import validate_command
 from validation.cli.calibrate import calibrate_command
 from validation.cli.cost import cost_command
@@ -17,10 +18,15 @@ from validation.cost.sweep import sweep
 from validation.cost.trial import trial
 
 
-@pytest.mark.parametrize("function", [run, reach, sweep, trial, validate_command, cost_command, calibrate_command])
+@pytest.mark.parametrize("function", [run, RunOptions, sweep, validate_command, cost_command, calibrate_command])
 def test_one_seed(function):
     """A run from Python and one from the command line give the same numbers."""
     assert inspect.signature(function).parameters["seed"].default == 1995
+
+
+@pytest.mark.parametrize("function", [reach, trial])
+def test_one_record_of_options(function):
+    assert inspect.signature(function).parameters["options"].default == RunOptions()
 
 
 def test_one_start(task1):

@@ -48,7 +48,7 @@ from scenes.parts import mesh, step, step_kernel
 from scenes.parts.surfaces import Torus
 from scenes.photograph import Photograph
 from tests.boards import SMALL, poses, told
-from validation import vary_check
+from validation import remeasured, vary_check
 from validation.batch import work
 from validation.explore import session
 from validation.explore.state import State
@@ -361,10 +361,9 @@ def test_lost_pictures_are_not_in_the_interval_of_a_plan_s_scatter(task1, monkey
     values[4:11] = np.nan
     known = SimpleNamespace(status=("ok",), covariance=np.array([[2e-4]]), covariance_image=np.array([[3e-2]]))
     seen = SimpleNamespace(value=values, value_image=80 * values + 1, status=states)
-    monkeypatch.setattr(vary_check.render, "image", lambda *_: None)
     monkeypatch.setattr(vary_check.render, "expose", lambda *_: None)
-    monkeypatch.setattr(vary_check.measure, "propagate", lambda *_: SimpleNamespace(measurands=known))
-    monkeypatch.setattr(vary_check.measure, "measure", lambda *_: seen)
+    monkeypatch.setattr(vary_check, "propagated", lambda *_: (None, known))
+    monkeypatch.setattr(remeasured.measure, "measure_by", lambda *_: (seen,))
     for objective, scale, propagated in (("object", 1.0, 2e-4), ("image", 6400.0, 3e-2)):
         plan = SimpleNamespace(scene=task1, objective=objective, over="minimax", model="calibrated")
         chosen = SimpleNamespace(scene=task1, sensor=(30, 135), light=(15, 315))

@@ -8,6 +8,7 @@ import numpy as np
 
 from scenes import status as statuses
 from validation import statistics
+from validation.remeasured import Sample
 
 STATUSES = tuple(sorted(statuses.ALL))
 
@@ -35,13 +36,10 @@ class Found:
 
     def scatter(self, true: float) -> dict[str, float]:
         """Variance and mean error of what was measured (NaN of too little), number of images, of those that failed."""
-        good = self.distances[np.isfinite(self.distances)]
+        sample = Sample.of(self.distances)
         return {
-            "empirical": np.var(good, ddof=1) if good.size > 1 else np.nan,
-            "bias": good.mean() - true if good.size else np.nan,
-            "n": self.distances.size,
-            "failed": self.distances.size - good.size,
-        }
+            "empirical": sample.variance, "bias": sample.mean - true, "n": sample.n, "failed": sample.failed,
+        }  # fmt: skip
 
 
 def ratios(empirical: np.ndarray, predicted: np.ndarray) -> np.ndarray:

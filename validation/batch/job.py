@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -20,18 +20,19 @@ import render
 import scenes
 from render import Quality, Tolerance
 from render import variant as variants
-from render.phenomena import named
 from scenes import InvalidInput, Scene
+from validation import remeasured
 from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
-from validation.batch.campaign import Campaign, Case
+from validation.batch.campaign import Campaign
+from validation.batch.options import RunOptions
 from validation.batch.photographs import Photographs
 from validation.batch.pool import Crew
 from validation.batch.result import Validation, collect
 from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
-from validation.batch.work import CHUNK, Found, Packed, Rendering, Task
+from validation.batch.work import CHUNK, Found, Rendering, Task
 from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
@@ -104,33 +105,34 @@ def run(
     Stopped
         If workers keep dying, the scheduler goes away, or the run file cannot be written. The same call continues.
     """
-    _check(scene, renders, seed, workers, effects)
-    if dask:
-        cluster.check_address(dask)
-    started = time.perf_counter()
+    how = RunOptions(seed, out, workers, fresh, dask, executor, Rendering(quality, effects, tolerance))
+    return run_by(how, scene, renders, progress, more, photos)
+
+
+def run_by(
+    options: RunOptions,
+    scene: Scene | Campaign,
+    renders: int = 1000,
+    progress: Progress | None = None,
+    more: More | None = None,
+    photos: Photographs | None = None,
+) -> Validation:
+    """As `run`, by options in one record."""
+    if renders < 2:
+        raise InvalidInput(f"renders must be at least 2, got {renders}")
+    if isinstance(scene, Scene) and not scene.settings:
+        raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
     campaign = photos.campaign if photos else Campaign.of(scene)
     variant = _PHOTOGRAPHS if photos else variants.choose()
     renders = max(photos.counts) if photos else renders
-    count, how = workers or pools.cores(), Rendering(quality, effects, tolerance)
-    store = RunFile(
-        Path(out or Path("runs") / campaign.name), _identity(campaign, renders, seed, variant, how, photos), fresh
-    )
+    identity = _identity(campaign, renders, options.seed, variant, options.rendering, photos)
+    store = RunFile(options.directory(campaign.name), identity, options.fresh)
     try:
         _note_machine(store)
         if photos is None:
-            store.note("effects", {sample.name: work.effects(sample, how) for sample in campaign.samples()})
-        batch = _Batch(campaign, renders, seed, variant, store, progress or (lambda *_: None), how, more, photos)
-        log.info(
-            "started", extra={"facts": {"seed": seed, "variant": variant, "done": batch.done, "total": batch.total}}
-        )
-        before, spent = batch.done, store.fact("wall", 0.0)
-        try:
-            batch.finish(lambda: _crew(count, executor, dask))
-        finally:
-            if batch.done > before:
-                with suppress(Stopped):
-                    store.note("wall", spent + time.perf_counter() - started)
-                    store.note("workers", count)
+            told = {sample.name: work.effects(sample, options.rendering) for sample in campaign.samples()}
+            store.note("effects", told)
+        _finish(_Batch(campaign, options, renders, variant, store, progress or (lambda *_: None), more, photos))
         found = collect(campaign, store)
         log.info("finished", extra={"facts": {"verdict": found.verdict.text, "agrees": found.verdict.agrees}})
         return found
@@ -138,17 +140,19 @@ def run(
         store.close()
 
 
-def _check(scene: Scene | Campaign, renders: int, seed: int, workers: int | None, effects: str) -> None:
-    if effects != "auto":
-        named(effects)
-    if renders < 2:
-        raise InvalidInput(f"renders must be at least 2, got {renders}")
-    if seed < 0:
-        raise InvalidInput(f"seed must be at least 0, got {seed}")
-    if workers is not None and workers < 1:
-        raise InvalidInput(f"workers must be at least 1, got {workers}")
-    if isinstance(scene, Scene) and not scene.settings:
-        raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
+def _finish(batch: _Batch) -> None:
+    """Do what is left, and note the time that it took."""
+    options, store, started = batch.options, batch.store, time.perf_counter()
+    count, before, spent = options.workers or pools.cores(), batch.done, store.fact("wall", 0.0)
+    facts = {"seed": options.seed, "variant": batch.variant, "done": batch.done, "total": batch.total}
+    log.info("started", extra={"facts": facts})
+    try:
+        batch.finish(lambda: _crew(count, options.executor, options.dask))
+    finally:
+        if batch.done > before:
+            with suppress(Stopped):
+                store.note("wall", spent + time.perf_counter() - started)
+                store.note("workers", count)
 
 
 def _identity(
@@ -172,7 +176,7 @@ def _code() -> str:
     """Digest of the code that makes the numbers."""
     folders = [Path(package.__file__).parent for package in (scenes, imaging, planner, render, measure)]
     files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
-        Path(module.__file__) for module in (work, photographs)
+        Path(module.__file__) for module in (work, photographs, remeasured)
     ]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
@@ -201,12 +205,11 @@ class _Batch:
     """The work of a run that is not yet done; each result is committed as it arrives."""
 
     campaign: Campaign
+    options: RunOptions
     renders: int
-    seed: int
     variant: str
     store: RunFile
     progress: Progress
-    how: Rendering = Rendering()
     more: More | None = None
     photos: Photographs | None = None
 
@@ -260,8 +263,8 @@ class _Batch:
                 setting = opened.popleft() if opened else next(fresh, None)
                 if setting is None:
                     break
-                pending[crew.executor.submit(work.perform, setting.task(group))] = setting
-                if setting.image and setting.left:
+                pending[crew.executor.submit(work.perform, setting.next_task(group))] = setting
+                if setting.task.image and setting.left:
                     opened.appendleft(setting)
             if not pending:
                 return
@@ -272,9 +275,9 @@ class _Batch:
             for future in done:
                 setting = pending.pop(future)
                 found = self._result(future, crew)
-                self._commit(setting.case.index, found)
+                self._commit(setting.task.case.index, found)
                 if found.clean and setting.left:
-                    setting.image = found.clean.image
+                    setting.task = replace(setting.task, image=found.clean.image)
                     opened.append(setting)
 
     def _result(self, future: Future, crew: Crew) -> Found:
@@ -311,7 +314,8 @@ class _Batch:
                 self._commit(index, Found(None, {}, str(error)))
                 continue
             files = self.photos.files[index] if self.photos else ()
-            yield _Setting(case, left, self.seed, self.variant, self.how, self.store.packed(index), files)
+            how = self.options
+            yield _Setting(Task(case, (), how.seed, self.variant, self.store.packed(index), how.rendering, files), left)
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
@@ -322,15 +326,10 @@ class _Batch:
 class _Setting:
     """A setting that has chunks left: its first task renders the image, which then goes with the others."""
 
-    case: Case
+    task: Task
     left: deque[tuple[int, int]]
-    seed: int
-    variant: str
-    how: Rendering
-    image: Packed | None
-    photos: tuple[str, ...] = ()
 
-    def task(self, group: int) -> Task:
-        """The next task."""
+    def next_task(self, group: int) -> Task:
+        """Some of the chunks."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
-        return Task(self.case, chunks, self.seed, self.variant, self.image, self.how, self.photos)
+        return replace(self.task, chunks=chunks)

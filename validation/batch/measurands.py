@@ -78,6 +78,13 @@ class JudgedMeasurand:
     independent: float
     texture: float | None = None
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """All fields, the interval's ends as two of them."""
+        low, high = self.ratio_interval or (None, None)
+        facts = {key: value for key, value in vars(self).items() if key != "ratio_interval"}
+        return facts | {"ratio_low": low, "ratio_high": high}
+
 
 _NUMBERS = (
     "value",

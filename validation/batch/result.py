@@ -17,7 +17,7 @@ from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
 from validation.batch.found import Found
-from validation.batch.measurands import JudgedMeasurand, column
+from validation.batch.measurands import column
 from validation.batch.rows import Row, Rows
 from validation.batch.store import RunFile
 from validation.batch.work import methods
@@ -56,20 +56,13 @@ class Validation(Shown):
     def as_rows(self) -> list[dict[str, Any]]:
         """One record a setting and measurand: poses, variances in the scene's unit squared, ratio, status."""
         return [
-            {"scene": row.scene, **poses(row.sensor, row.light), **row.parameters, **_told(each)}
+            {"scene": row.scene, **poses(row.sensor, row.light), **row.parameters, **each.record}
             for row in self.rows
             for each in row.measurands
         ]
 
     def _line(self) -> str:
         return f"{self.scene}: {len(self.rows)} settings, {self.verdict.text.split(';')[0]}"
-
-
-def _told(each: JudgedMeasurand) -> dict[str, Any]:
-    """The numbers of a measurand, its interval as two."""
-    facts = vars(each).copy()
-    low, high = facts.pop("ratio_interval") or (None, None)
-    return facts | {"ratio_low": low, "ratio_high": high}
 
 
 def collect(campaign: Campaign, store: RunFile) -> Validation:

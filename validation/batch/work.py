@@ -24,6 +24,7 @@ from scenes import InvalidInput, Jitter, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
 from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
+from validation.remeasured import GRADIENT, Method, Values, batches, remeasured
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time, and fewer of more than ...
@@ -32,22 +33,9 @@ Shots = Callable[[np.random.Generator, int], np.ndarray]  # stacks of pictures
 _RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mitsuba loads and renders in one
 
 
-@dataclass(frozen=True)
-class Method:
-    """A locator, with its gradient threshold if it has one."""
-
-    locator: str
-    threshold: float | None = None
-
-    @property
-    def name(self) -> str:
-        """Name in tables and in the run file: "gradient", "canny@12"."""
-        return self.locator if self.threshold is None else f"{self.locator}@{self.threshold:g}"
-
-
 def methods(scene: Scene) -> tuple[Method, ...]:
     """All methods that a run compares; the first is the one its verdict is about."""
-    return (Method("gradient"), *(Method("canny", threshold) for threshold in scene.locator.thresholds))
+    return (GRADIENT, *(Method("canny", threshold) for threshold in scene.locator.thresholds))
 
 
 class Packed(NamedTuple):
@@ -243,32 +231,37 @@ def measure_chunk(
     with any number of workers, and a longer run begins with the shorter one's.
     """
     cv2.setNumThreads(1)  # workers share the cores among themselves
-    clock = _Clock()
-    scene, picture = case.scene, case.picture
+    clock, picture = _Clock(), case.picture
     where = measure.region_of_interest(picture)
     clock.lap("prepare")
-    parts: dict[str, list[measure.Measurements]] = {method.name: [] for method in methods(scene)}
-    size = max(1, min(_BATCH, _MOST_PIXELS // image.size))
-    for batch, first in enumerate(range(0, count, size)):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.index, chunk, batch)))
-        many = min(size, count - first)
-        pictures = shots(rng, many) if shots else render.expose(image, scene.noise, rng, many, where)
-        clock.lap("expose")
-        for method in methods(scene):
-            parts[method.name] += measure.measure_by(pictures, picture, ((method.locator, method.threshold),))
-            clock.lap(method.name)
-    distances = {name: np.concatenate([part.value_image[:, 0] for part in found]) for name, found in parts.items()}
-    statuses = {name: np.concatenate([part.status[:, 0] for part in found]) for name, found in parts.items()}
-    main = methods(scene)[0].name
+    take = shots or (lambda rng, many: render.expose(image, case.scene.noise, rng, many, where))
+    counts = batches(count, max(1, min(_BATCH, _MOST_PIXELS // image.size)))
+    exposures = (take(_stream(seed, case.index, chunk, batch), many) for batch, many in enumerate(counts))
+    found = remeasured(picture, exposures, methods(case.scene), clock.lap)
+    values, statuses = _columns(case.scene, found)
+    return Chunk(values, {name: _failures(values[name], statuses[name]) for name in values}, clock.seconds)
+
+
+def _stream(*place: int) -> np.random.Generator:
+    """The random numbers of a batch: of seed, setting, chunk, and batch."""
+    seed, *key = place
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=tuple(key)))
+
+
+def _columns(scene: Scene, found: tuple[Values, ...]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Values and statuses as of a `Chunk`, by name."""
+    names = [method.name for method in methods(scene)]
+    values = {name: each.image[:, 0] for name, each in zip(names, found, strict=True)}
+    statuses = {name: each.status[:, 0] for name, each in zip(names, found, strict=True)}
     for k in range(len(scene.quantities)):
-        name = measurands.column(main, k)
-        distances[name] = np.concatenate([part.value[:, k] for part in parts[main]])
-        statuses[name] = np.concatenate([part.status[:, k] for part in parts[main]])
-    failures = {
-        name: {int(i): str(statuses[name][i]) for i in np.flatnonzero(np.isnan(values))}
-        for name, values in distances.items()
-    }
-    return Chunk(distances, failures, clock.seconds)
+        name = measurands.column(names[0], k)
+        values[name], statuses[name] = found[0].object[:, k], found[0].status[:, k]
+    return values, statuses
+
+
+def _failures(values: np.ndarray, statuses: np.ndarray) -> dict[int, str]:
+    """Status by image of those that gave no value."""
+    return {int(i): str(statuses[i]) for i in np.flatnonzero(np.isnan(values))}
 
 
 def effects(scene: Scene, how: Rendering = Rendering()) -> list[dict[str, Any]]:

@@ -34,7 +34,7 @@ from validation.report.terminal import console
 if TYPE_CHECKING:
     from validation.batch import photographs
     from validation.batch.result import Validation
-    from validation.cost.goal import Reached
+    from validation.cost.goal import Goal, Reached
 
 commands = commands()
 _MOST_RENDERS = 10_000_000
@@ -99,27 +99,29 @@ def validate_command(
     loaded = campaign.load(scene)
     out = out or Path("runs") / loaded.name
     check_directory("--out", out)
-    from validation.batch.job import run
+    from validation.batch.job import run_by
+    from validation.batch.options import RunOptions
+    from validation.batch.work import Rendering
     from validation.cost.goal import reach
 
-    limit = _goal(accuracy, budget)
-    taken = _photographs(loaded, photos, exact_poses, accuracy is not None or limit is not None)
+    goal = _goal(accuracy, budget, started)
+    taken = _photographs(loaded, photos, exact_poses, goal is not None)
     loaded = taken.campaign if taken else loaded
-    how = {
-        "seed": seed, "out": out, "workers": workers, "fresh": fresh, "dask": dask, "effects": effects,
-        "tolerance": tolerance(bias_px, variance),
-    }  # fmt: skip
+    rendering = Rendering(effects=effects, tolerance=tolerance(bias_px, variance))
+    options = RunOptions(seed, out, workers, fresh, dask, rendering=rendering)
     with continued(log_json):
         with nullcontext() if log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
-            if accuracy is None and limit is None:
-                found, goal = run(loaded, renders, progress=shown, photos=taken, **how), None
+            if goal is None:
+                found, reached = run_by(options, loaded, renders, shown, photos=taken), None
             else:
-                how |= {"say": lambda line: print(line, file=sys.stderr), "progress": shown, "started": started}
-                found, goal = reach(loaded, accuracy, limit, **how)
-        _write(loaded, found, how["out"])
-    goal = goal and replace(goal, seconds=time.perf_counter() - started)
-    one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
-    _show(found, goal, out, as_json, explain, one, taken)
+                found, reached = reach(loaded, goal, options, lambda line: print(line, file=sys.stderr), shown)
+        _write(loaded, found, out)
+    reached = reached and replace(reached, seconds=time.perf_counter() - started)
+    if as_json:
+        _print_json(found, reached, taken)
+    else:
+        one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
+        _print_tables(found, reached, out, one, explain)
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
@@ -144,23 +146,16 @@ def _photographs(
     return taken
 
 
-def _show(
-    found: Validation,
-    goal: Reached | None,
-    directory: Path,
-    as_json: bool,
-    explain: bool,
-    scene: str | None,
-    taken: photographs.Photographs | None,
-) -> None:
-    """The whole result, as JSON or as tables; ``scene`` as it was named, None of a campaign."""
-    if as_json:
-        from validation.batch.document import pieces
+def _print_json(found: Validation, goal: Reached | None, taken: photographs.Photographs | None) -> None:
+    from validation.batch.document import pieces
 
-        more = ({"goal": goal.to_json()} if goal else {}) | ({"left_out": list(taken.left_out)} if taken else {})
-        sys.stdout.writelines(pieces(found, more))
-        print()
-        return
+    more = ({"goal": goal.to_json()} if goal else {}) | ({"left_out": list(taken.left_out)} if taken else {})
+    sys.stdout.writelines(pieces(found, more))
+    print()
+
+
+def _print_tables(found: Validation, goal: Reached | None, directory: Path, scene: str | None, explain: bool) -> None:
+    """The whole result as tables; ``scene`` as it was named, None of a campaign."""
     from validation.report import guide
     from validation.report.table import report
 
@@ -172,15 +167,15 @@ def _show(
         shown_on.print(line, highlight=False, soft_wrap=True)
 
 
-def _goal(accuracy: float | None, budget: str | None) -> float | None:
-    """Seconds of the budget; both options are checked."""
-    from validation.cost.goal import check_accuracy, seconds
+def _goal(accuracy: float | None, budget: str | None, started: float) -> Goal | None:
+    """What the run is to reach, if anything; both options are checked."""
+    from validation.cost.goal import Goal, seconds
 
     if accuracy is not None and budget is not None:
         raise InvalidInput(f"--budget must be given without --accuracy, got both ({budget}, {accuracy:g})")
-    if accuracy is not None:
-        check_accuracy(accuracy)
-    return None if budget is None else seconds(budget)
+    if accuracy is None and budget is None:
+        return None
+    return Goal(accuracy, None if budget is None else seconds(budget), started)
 
 
 def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> None:

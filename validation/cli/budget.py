@@ -63,11 +63,7 @@ def budget_command(
 ) -> None:
     """The uncertainty of every measurand: each source, its share, and the expanded uncertainty."""
     check_number("--p", p, 0.5, 0.9999)
-    check_number("--stations", stations, 0, _MOST_PICTURES)
-    if 0 < stations < _FEWEST_PICTURES:
-        raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {stations}")
-    if reach is not None and not (reach > 0 and math.isfinite(reach)):
-        raise scenes.InvalidInput(f"--reach must be greater than 0, got {reach}")
+    _check(stations, reach)
     check_seed(seed)
     check_file("--csv", csv_file, ".csv")
     check_directory("--out", out)
@@ -84,12 +80,7 @@ def budget_command(
     shown = budgets.pictured(found, stations, seed) if stations else None
     facts = budgets.facts(found, drawn, shown, reach)
     if out:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "budget.json").write_text(dumps(facts), encoding="utf-8")
-        write_csv(found, out / "budget.csv")
-        from validation.report import budget_figure
-
-        budget_figure.draw(found.measurands, out / "budget.png")
+        _write(found, facts, out)
     if csv_file:
         write_csv(found, csv_file)
     if as_json:
@@ -98,6 +89,24 @@ def budget_command(
     _show(found, drawn, shown, reach)
     if out:
         console().print(f"budget.json, budget.csv and budget.png: {out}", highlight=False)
+
+
+def _check(stations: int, reach: float | None) -> None:
+    check_number("--stations", stations, 0, _MOST_PICTURES)
+    if 0 < stations < _FEWEST_PICTURES:
+        raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {stations}")
+    if reach is not None and not (reach > 0 and math.isfinite(reach)):
+        raise scenes.InvalidInput(f"--reach must be greater than 0, got {reach}")
+
+
+def _write(found: SceneBudget, facts: dict, out: Path) -> None:
+    """All that is known, as files of a directory."""
+    from validation.report import budget_figure
+
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "budget.json").write_text(dumps(facts), encoding="utf-8")
+    write_csv(found, out / "budget.csv")
+    budget_figure.draw(found.measurands, out / "budget.png")
 
 
 def _poses(sensor: str | None, light: str | None) -> tuple[Any, Any]:

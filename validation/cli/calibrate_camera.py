@@ -72,21 +72,32 @@ def calibrate_camera_command(
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, square, seen.image_shape, model, square_sd)
     lines = camera_table.scene_lines(found, scene, output and _beside(output)) if scene is not None else None
-    if output is not None:
-        _write(output, camera_table.lens_file(found))
-        _write(_beside(output), camera_table.covariance_file(found))
-    if residuals is not None:
-        from validation.report import camera_figure  # matplotlib takes half a second to load
-
-        camera_figure.draw(found, seen.boards, residuals)
+    written = _write_files(found, seen, output, residuals)
     if as_json:
         told = camera_table.facts(found, seen, units)
         say(told if lines is None else {**told, "scene": lines}, True, "")
     else:
         _show(found, seen, units, lines)
-        for path in filter(None, (output, output and _beside(output), residuals)):
+        for path in written:
             console().print(f"written: {path}", highlight=False)
     raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
+
+
+def _write_files(found, seen, output: Path | None, residuals: Path | None) -> list[Path]:
+    """The lens with its covariance beside it, and the picture, those that are wanted."""
+    from validation.report import camera_table
+
+    written = []
+    if output is not None:
+        written += [output, _beside(output)]
+        _write(output, camera_table.lens_file(found))
+        _write(_beside(output), camera_table.covariance_file(found))
+    if residuals is not None:
+        from validation.report import camera_figure  # matplotlib takes half a second to load
+
+        written.append(residuals)
+        camera_figure.draw(found, seen.boards, residuals)
+    return written
 
 
 def _show(found, seen, units: str, lines: str | None) -> None:

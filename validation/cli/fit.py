@@ -98,12 +98,11 @@ def facts(found: Fit) -> dict[str, Any]:
 
 
 def _table(name: str, found: Fit) -> Table:
-    from rich.table import Table
+    from validation.report import cells
 
-    made = Table(title=f"{name} fitted to {sum(map(len, found.members))} photograph(s)", title_justify="left", box=None,
-                 padding=(0, 1), title_style="bold")  # fmt: skip
-    for column in ("parameter", "start", "fitted", "standard error", "unit", ""):
-        made.add_column(column, justify="left" if column in ("parameter", "unit", "") else "right", no_wrap=True)
+    title = f"{name} fitted to {sum(map(len, found.members))} photograph(s)"
+    columns = ("parameter", "start", "fitted", "standard error", "unit", "")
+    made = cells.table(title, *columns, words=("parameter", "unit", ""))
     rows = zip(found.names, found.units, found.start, found.values, found.standard_errors, found.statuses, strict=True)
     for name, unit, start, value, error, status in rows:
         told = f"{error:.2g}" if status == "ok" else "-"

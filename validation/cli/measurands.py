@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
+from validation.report import cells
+from validation.strict_json import plain
+
 if TYPE_CHECKING:
     import measure
 
@@ -16,39 +19,35 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
     from planner.uncertainty.conformity import decide
 
-    rows = []
-    sigma, sigma_image = found.sigma, np.sqrt(np.einsum("mm->m", found.covariance_image))
+    rows, sigma_image = [], np.sqrt(np.einsum("mm->m", found.covariance_image))
     for k, quantity in enumerate(found.quantities):
-        zone, nominal = quantity.tolerance, float(found.nominal[k])
-        good = bool(np.isfinite(found.value[k]))
-        value, spread = float(found.value[k]), float(sigma[k])
+        zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
+        state, good = str(found.status[k]), bool(np.isfinite(value))
         rows.append({
             "name": quantity.name,
             "kind": quantity.kind,
             "unit": found.units[k],
-            "value": value if good else None,
+            "value": value,
             "sigma": spread if good else None,
-            "value_image": float(found.value_image[k]) if good else None,
-            "sigma_image": float(sigma_image[k]) if good else None,
+            "value_image": found.value_image[k] if good else None,
+            "sigma_image": sigma_image[k] if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(value, spread, nominal, zone, status=str(found.status[k])),
-            "status": str(found.status[k]),
+            "decision": zone and decide(float(value), float(spread), nominal, zone, status=state),
+            "status": state,
         })  # fmt: skip
-    return rows
+    return plain(rows)
 
 
 def covariance(found: measure.Measurements) -> list[list[float | None]]:
     """Joint covariance of all values; null for what is not known."""
-    return [[float(v) if math.isfinite(v) else None for v in row] for row in found.covariance]
+    return plain(found.covariance)
 
 
 def table(rows: list[dict[str, Any]]) -> Table:
     """The same for a terminal."""
-    shown = Table(title="Measurands (+- 1 sigma)", title_justify="left", box=None, padding=(0, 1), title_style="bold",
-                  caption=_CAPTION, caption_justify="left")  # fmt: skip
-    for name in ("name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status"):
-        shown.add_column(name, justify="left" if name in ("name", "kind", "unit") else "right", no_wrap=True)
+    columns = ("name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status")
+    shown = cells.table("Measurands (+- 1 sigma)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
     for row in rows:
         places = digits(row["sigma"])
         value = "-" if row["value"] is None else f"{row['value']:.{places}f}"

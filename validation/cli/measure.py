@@ -18,6 +18,7 @@ from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
@@ -66,30 +67,23 @@ def measure_command(
     cannot be measured; of a photograph's shapes, if none can.
     """
     import measure
-    from validation import picture_file
 
     if estimator is not None and estimator not in measure.ESTIMATORS:
         raise InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {estimator!r}")
     check_file("--output", output, ".png", ".pdf", ".svg")
     check_file("--mtf", mtf, ".png")
-    chosen = {"--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output}
-    chosen["--all"] = every or None
+    options = {
+        "--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output,
+        "--all": every or None, "--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf,
+    }  # fmt: skip
     if scene is None:
-        if every and most is not None:
-            raise InvalidInput(f"--most must be left out with --all, got {most}")
-        wanted = {
-            "near": photograph.numbers("--near", near, 2),
-            "box": photograph.numbers("--box", box, 4),
-            "corners": corners and [photograph.numbers("--corners", corner, 2) for corner in corners],
-            "kinds": None if kind is None else tuple(kind.split(",")),
-            "most": _ALL if every else _MOST if most is None else most,
-        }
-        if mtf is not None:
-            recorded.check_mtf(wanted["kinds"])
+        wanted = _shapes_wanted(options)
         photo = scenes.photograph.read(file, gamma, channel, bayer)
-        _photograph(file, photo, wanted, estimator, lens, output, mtf, as_json)
-    chosen |= {"--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf}
-    for option, value in chosen.items():
+        found = measure.photograph(
+            photo, **wanted, estimator=estimator or "arrangement", lens=lens and measure.load_lens(lens)
+        )
+        _say_shapes(file, photo, found, output, mtf, as_json)
+    for option, value in options.items():
         if value is not None:
             raise InvalidInput(f"{option} must be left out with a scene, got {value}")
     if sensor is None:
@@ -97,12 +91,37 @@ def measure_command(
     if lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
     poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
+    from validation import picture_file
+
     known = scenes.load(scene)
     picture = picture_file.read(file, Size.of_camera(known.camera))
     found = measure.measure(picture, known, *poses, estimator, threshold)
+    _say_measurands(file, found, found.first if known.task is not None else None, as_json)
+
+
+def _shapes_wanted(options: dict[str, Any]) -> dict[str, Any]:
+    """Which shapes of a photograph are measured, as `measure.photograph` takes it."""
+    corners, kind, most = options["--corners"], options["--kind"], options["--most"]
+    if options["--all"] and most is not None:
+        raise InvalidInput(f"--most must be left out with --all, got {most}")
+    wanted = {
+        "near": photograph.numbers("--near", options["--near"], 2),
+        "box": photograph.numbers("--box", options["--box"], 4),
+        "corners": corners and [photograph.numbers("--corners", corner, 2) for corner in corners],
+        "kinds": None if kind is None else tuple(kind.split(",")),
+        "most": _ALL if options["--all"] else _MOST if most is None else most,
+    }
+    if options["--mtf"] is not None:
+        recorded.check_mtf(wanted["kinds"])
+    return wanted
+
+
+def _say_measurands(
+    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool
+) -> NoReturn:
+    """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}
-    distance = found.first if known.task is not None else None
     if distance is not None:
         told |= _distance_facts(distance)
     if as_json:
@@ -117,22 +136,10 @@ def measure_command(
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 
-def _photograph(
-    file: Path,
-    photo: Photograph,
-    wanted: dict[str, Any],
-    estimator: str | None,
-    lens: Path | None,
-    output: Path | None,
-    mtf: Path | None,
-    as_json: bool,
+def _say_shapes(
+    file: Path, photo: Photograph, found: measure.Shapes, output: Path | None, mtf: Path | None, as_json: bool
 ) -> NoReturn:
-    """Find and measure; exit status 1 where nothing could be measured."""
-    import measure
-
-    found = measure.photograph(
-        photo, **wanted, estimator=estimator or "arrangement", lens=lens and measure.load_lens(lens)
-    )
+    """The shapes of a photograph, drawn if wanted; exit status 1 where nothing could be measured."""
     sharp = recorded.sharpness(photo, found, mtf) if mtf is not None else {}
     if output is not None:
         from validation.report import overlay
@@ -151,23 +158,16 @@ def _photograph(
 
 def _distance_facts(found: measure.Measurement) -> dict:
     good = bool(np.isfinite(found.value_px))
-    return {
-        "value_px": float(found.value_px) if good else None,
-        "variance_px2": float(found.variance_px2) if good else None,
+    edges = zip(found.edge_names, found.edge_status, found.used, found.rejected, found.edge_contrast, strict=True)
+    keys = ("name", "status", "used", "rejected", "contrast")
+    return plain({
+        "value_px": found.value_px,
+        "variance_px2": found.variance_px2 if good else None,
         "status": str(found.status),
-        "p_value": float(found.p_value) if np.isfinite(found.p_value) else None,
-        "corners": found.corners.tolist() if good else None,
-        "edges": [
-            {
-                "name": name,
-                "status": str(found.edge_status[i]),
-                "used": int(found.used[i]),
-                "rejected": int(found.rejected[i]),
-                "contrast": float(found.edge_contrast[i]),
-            }
-            for i, name in enumerate(found.edge_names)
-        ],
-    }
+        "p_value": found.p_value,
+        "corners": found.corners if good else None,
+        "edges": [dict(zip(keys, edge, strict=True)) for edge in edges],
+    })  # fmt: skip
 
 
 def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:

@@ -11,6 +11,8 @@ from rich.table import Table
 from scenes import InvalidInput
 from validation.cli import recorded
 from validation.cli.measurands import digits
+from validation.report import cells
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
@@ -37,12 +39,12 @@ def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | No
 
 def facts(found: measure.Shapes) -> dict[str, Any]:
     """What was measured, and the shapes that were found; null for what is not known."""
-    return {
+    return plain({
         "found": [_facts(one) for one in found.found],
         "candidates": [
             {"kind": one.kind, "outline": one.outline.tolist(), **_standing_out(one)} for one in found.candidates
         ],
-    }
+    })  # fmt: skip
 
 
 def _facts(one: measure.Found) -> dict[str, Any]:
@@ -55,15 +57,15 @@ def _facts(one: measure.Found) -> dict[str, Any]:
         shape = None if one.ellipse is None else one.ellipse.tolist()
         told |= {"centre": shape and shape[:2], "axes": shape and shape[2:4], "angle": shape and shape[4]}
     else:
-        told["corners"] = None if one.corners is None else [[_known(v) for v in row] for row in one.corners]
+        told["corners"] = one.corners
         told["sides"] = _sides(one)
     return told | {
-        "covariance": None if one.covariance is None else [[_known(v) for v in row] for row in one.covariance],
-        "quantities": [vars(quantity) | {"sigma": _known(quantity.sigma)} for quantity in one.quantities],
+        "covariance": one.covariance,
+        "quantities": [vars(quantity) for quantity in one.quantities],
         "residual_px": [side.rms for side in one.residuals],
-        "p_value": _known(one.p_value),
+        "p_value": one.p_value,
         "noise": one.noise,
-        "blur_px": _known(one.blur_px),
+        "blur_px": one.blur_px,
         **({} if one.quadrilateral is None else recorded.of_sides(one.quadrilateral)),
         **({} if one.candidate is None else _standing_out(one.candidate)),
     }
@@ -77,10 +79,6 @@ def _sides(one: measure.Found) -> list[dict[str, Any]]:
 
 def _standing_out(one: measure.Candidate) -> dict[str, float]:
     return {"score": one.score, "support": one.support, "contrast": one.contrast}
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def text(found: measure.Shapes) -> str:
@@ -118,10 +116,8 @@ def _board(one: measure.Found) -> str:
 def table(found: measure.Shapes) -> Table:
     """All shapes that were found, ranked."""
     measured = {id(one.candidate): number for number, one in enumerate(found.found, 1)}
-    shown = Table(title="Found", title_justify="left", box=None, padding=(0, 1), title_style="bold",
-                  caption=_CAPTION, caption_justify="left")  # fmt: skip
-    for name in ("kind", "at px", "size px", "support", "contrast/noise", "score", "measured as"):
-        shown.add_column(name, justify="left" if name == "kind" else "right", no_wrap=True)
+    columns = ("kind", "at px", "size px", "support", "contrast/noise", "score", "measured as")
+    shown = cells.table("Found", *columns, words=("kind",), caption=_CAPTION)
     for one in found.candidates[:_ROWS]:
         (x, y), (long, short) = one.centre, one.sizes
         shown.add_row(

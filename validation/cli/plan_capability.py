@@ -26,28 +26,18 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
     if as_json:
         say(facts(scene, found, step, seconds), True, "")
         return
-    from rich.table import Table
+    from validation.report.cells import number, table
 
+    title = f"{scene.title or scene.name}: poses of the smallest worst U / T"
+    columns = ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T", "status")
+    rows = [
+        (words, str(placed.sensor), scenes.shown(scenes.pairs(placed.light)), row["name"],
+         *(f"{row[key]:.3g}" for key in ("repeatability", "u", "U")), number(row["ratio"], ".3f"), row["status"])
+        for words, placed in (("U / T", found.best), ("noise alone", found.quiet))
+        for row in _rows(placed)
+    ]  # fmt: skip
     shown_on = console()
-    table = Table(
-        title=f"{scene.title or scene.name}: poses of the smallest worst U / T", title_justify="left", box=None
-    )
-    for name in ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T", "status"):
-        table.add_column(name, no_wrap=True)
-    for words, placed in (("U / T", found.best), ("noise alone", found.quiet)):
-        for row in _rows(placed):
-            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.3f}"
-            numbers = (f"{row[key]:.3g}" for key in ("repeatability", "u", "U"))
-            table.add_row(
-                words,
-                str(placed.sensor),
-                scenes.shown(scenes.pairs(placed.light)),
-                row["name"],
-                *numbers,
-                ratio,
-                row["status"],
-            )
-    shown_on.print(table)
+    shown_on.print(table(title, *columns, rows=rows, words=columns))
     shown_on.print(f"T: half of the tolerance zone. {_guarantee(found, step)}. {seconds:.1f} s.", highlight=False)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import scenes
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import planner
@@ -20,7 +21,7 @@ def facts(
     """The plan for JSON."""
 
     p = found.prediction
-    return {
+    return plain({
         "scene": found.scene.name,
         "objective": found.objective,
         "model": found.model,
@@ -50,16 +51,14 @@ def facts(
         "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
         **_checked(checked),
         "robust": None if safe is None else _with_poses(safe),
-        "pictures": [str(path) for path in pictures],
+        "pictures": pictures,
         "seconds": seconds,
-    }
+    })  # fmt: skip
 
 
 def _measurand(each: planner.Forecast) -> dict:
     zone = each.tolerance
-    sigma, sigma_image = (
-        math.sqrt(v) if math.isfinite(v) else None for v in (each.variance_object, each.variance_image)
-    )
+    sigma, sigma_image = math.sqrt(each.variance_object), math.sqrt(each.variance_image)
     return {
         "name": each.name,
         "kind": each.kind,
@@ -69,7 +68,7 @@ def _measurand(each: planner.Forecast) -> dict:
         "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
         "sigma": sigma,
         "sigma_image": sigma_image,
-        "ratio": each.ratio if sigma is not None else None,
+        "ratio": each.ratio if math.isfinite(sigma) else None,
         "status": each.status,
         **_texture(each),
     }
@@ -81,7 +80,7 @@ def _texture(each: planner.Forecast) -> dict:
         return {}
     names = ("sigma_texture", "sigma_texture_image", "bias")
     values = each.texture_variance_object**0.5, each.texture_variance_image**0.5, each.bias_object
-    return {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}
+    return dict(zip(names, values, strict=True))
 
 
 def _with_poses(found) -> dict:
@@ -120,14 +119,12 @@ def _checked(checked: PlanCheck | None) -> dict:
 
 
 def _setting(row: CheckedSetting) -> dict:
-    variances = {
-        name: value if math.isfinite(value) else None
-        for name, value in (("calibrated", row.calibrated), ("propagated", row.propagated))
-    }
-    poses = {"sensor": list(row.sensor), "light": scenes.pairs(row.light), "edges": list(row.edges)}
     return {
-        **poses,
-        **variances,
+        "sensor": list(row.sensor),
+        "light": scenes.pairs(row.light),
+        "edges": row.edges,
+        "calibrated": row.calibrated,
+        "propagated": row.propagated,
         "ratio": row.ratio,
         "status": row.status,
         "without_formula": list(row.without_formula),

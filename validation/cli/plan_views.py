@@ -13,6 +13,7 @@ import scenes
 from planner.views import MOST_VIEWS
 from validation.cli.common import check_left_out, progress, say
 from validation.report.terminal import console
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import planner
@@ -70,7 +71,7 @@ def _pictures(found: planner.Views, out: Path) -> list[Path]:
 
 def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], seconds: float) -> dict:
     """Everything for JSON; null is what is infinite or not known."""
-    return {
+    return plain({
         "scene": found.scene.name,
         "objective": "object",
         "over": found.over,
@@ -82,14 +83,13 @@ def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], 
         "looked": found.looked,
         "guarantee": found.guarantee,
         "check": None if check is None else _checked(check),
-        "pictures": [str(path) for path in pictures],
+        "pictures": pictures,
         "seconds": seconds,
-    }
+    })  # fmt: skip
 
 
 def _set(each: planner.ViewSet) -> dict:
     both, first = each.combination, each.views[0].prediction.measurands
-    joint = {"covariance": both.covariance, "covariance_least_squares": both.covariance_least_squares}
     return {
         "count": len(each.views),
         "poses": [{"sensor": list(view.sensor), "light": list(view.light)} for view in each.views],
@@ -103,20 +103,20 @@ def _set(each: planner.ViewSet) -> dict:
         "gap": each.gap,
         "bound": each.bound,
         "measurands": [_measurand(each, m) for m in range(len(first))],
-        **{name: [[_known(value) for value in row] for row in matrix.tolist()] for name, matrix in joint.items()},
+        "covariance": both.covariance,
+        "covariance_least_squares": both.covariance_least_squares,
     }
 
 
 def _measurand(each: planner.ViewSet, m: int) -> dict:
     both, forecast = each.combination, each.views[0].prediction.measurands[m]
-    sigma, jointly = (_known(float(matrix[m, m])) for matrix in (both.covariance, both.covariance_least_squares))
     return {
         "name": forecast.name,
         "kind": forecast.kind,
         "unit": forecast.unit,
-        "sigma": None if sigma is None else math.sqrt(sigma),
-        "sigma_least_squares": None if jointly is None else math.sqrt(jointly),
-        "bias": _known(float(both.bias[m])),
+        "sigma": math.sqrt(both.covariance[m, m]),
+        "sigma_least_squares": math.sqrt(both.covariance_least_squares[m, m]),
+        "bias": both.bias[m],
         "status": both.status[m],
         "pictures": [v + 1 for v in range(len(each.views)) if both.used[v, m]],
         "weights": both.weights[:, m].tolist(),
@@ -126,22 +126,13 @@ def _measurand(each: planner.ViewSet, m: int) -> dict:
 
 def _alone(forecast: planner.Forecast) -> dict:
     """What one picture tells."""
-    variance = _known(forecast.variance_object)
-    return {"sigma": None if variance is None else math.sqrt(variance), "status": forecast.status}
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return {"sigma": math.sqrt(forecast.variance_object), "status": forecast.status}
 
 
 def _checked(check: ViewsCheck) -> dict:
-    rows = [
-        {name: _known(value) if isinstance(value, float) else value for name, value in vars(row).items()}
-        for row in check.rows
-    ]
     verdict = check.verdict
     return {
-        "rows": rows,
+        "rows": check.rows,
         "agrees": None if verdict is None else verdict.agrees,
         "verdict": None if verdict is None else verdict.text,
         "reason": check.reason or None,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 import scenes
 from scenes import InvalidInput, Pose, several
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -55,51 +55,36 @@ def _pictures(scene: scenes.Scene, sensor: Pose | None, light: Any) -> list[scen
 
 def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
     """Variances, not standard deviations; null for what is not known."""
-    return {
+    return plain({
         "sensor": list(picture.sensor),
         "light": [list(pose) for pose in picture.lights],
         "status": found.status,
         "measurands": [
             {
-                "name": each.name, "kind": each.kind, "unit": each.unit, "value": _known(each.value_object),
-                "variance": _known(each.variance_object), "bias": _known(each.bias_object),
-                "value_image": _known(each.value_image), "variance_image": _known(each.variance_image),
-                "bias_image": _known(each.bias_image), "status": each.status,
+                "name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object,
+                "variance": each.variance_object, "bias": each.bias_object, "value_image": each.value_image,
+                "variance_image": each.variance_image, "bias_image": each.bias_image, "status": each.status,
             }
             for each in found.measurands
         ],
-    }  # fmt: skip
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    })  # fmt: skip
 
 
 def _table(scene: scenes.Scene, model: str, rows: list[dict[str, Any]]) -> Table:
-    from rich.table import Table
+    from validation.report.cells import number, sigma, table
 
-    made = Table(title=f"{scene.name}: predicted ({model}, +- 1 sigma)", title_justify="left", box=None, padding=(0, 1),
-                 title_style="bold")  # fmt: skip
-    for column in ("sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma", "status"):
-        made.add_column(column, justify="left" if column in ("measurand", "unit", "status") else "right", no_wrap=True)
+    columns = ("sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma", "status")
+    made = table(f"{scene.name}: predicted ({model}, +- 1 sigma)", *columns, words=("measurand", "unit", "status"))
     for row in rows:
         lights = " ".join(_pose(pose) for pose in row["light"])
         for each in row["measurands"]:
-            sigma, image = (_root(each[key]) for key in ("variance", "variance_image"))
             made.add_row(
-                _pose(row["sensor"]), lights, each["name"], _number(each["value"], 6), sigma,
-                _number(each["bias"], 2), each["unit"], _number(each["value_image"], 6), image, each["status"],
+                _pose(row["sensor"]), lights, each["name"], number(each["value"], ".6g"), sigma(each["variance"]),
+                number(each["bias"], ".2g"), each["unit"], number(each["value_image"], ".6g"),
+                sigma(each["variance_image"]), each["status"],
             )  # fmt: skip
     return made
 
 
 def _pose(pose: list[float]) -> str:
     return f"({pose[0]:.4g}, {pose[1]:.4g})"
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}g}"
-
-
-def _root(variance: float | None) -> str:
-    return "-" if variance is None else f"{np.sqrt(variance):.3g}"

@@ -10,6 +10,7 @@ import typer
 
 from scenes import InvalidInput
 from scenes.photograph import Photograph
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
@@ -45,7 +46,7 @@ def of_sides(found: measure.Quadrilateral) -> dict[str, Any]:
         "estimator": found.estimator,
         "noise_curve": {"dark_variance": curve.dark, "gain": curve.gain, "dark_level": curve.dark_level,
                         "rounding_step": curve.step},
-        "side_blur_px": [_number(b) for b in found.side_blur_px],
+        "side_blur_px": plain(found.side_blur_px),
     }  # fmt: skip
 
 
@@ -96,15 +97,10 @@ def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str,
             refused.append({"side": side + 1, "refused": str(error)})
     sharpness.write(plot, sides)
     told = [
-        {"side": side, "direction_deg": one.direction_deg, "mtf50": _number(one.mtf50),
-         "error": _number(one.mtf50_error)}
+        {"side": side, "direction_deg": one.direction_deg, "mtf50": plain(one.mtf50), "error": plain(one.mtf50_error)}
         for side, one in sides
     ]  # fmt: skip
     return {"mtf": told + refused}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def sharpness_lines(told: dict[str, Any]) -> list[str]:

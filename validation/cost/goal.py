@@ -5,23 +5,24 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from render import Quality, Tolerance
+from render import Quality
 from scenes import InvalidInput
 from validation.batch.campaign import Campaign
-from validation.batch.job import run
+from validation.batch.job import More, Progress, run_by
+from validation.batch.options import RunOptions
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.batch.work import Rendering, methods
+from validation.batch.work import methods
 from validation.cost.interval import LEAST, wanted
 from validation.cost.model import Choice, CostModel, combined
 from validation.cost.trial import trial
-from validation.defaults import DEFAULT_SEED
+from validation.remeasured import Sample
 
 _FIRST = 0.25  # part of the images that are taken before the first look at the clock
 _FINE = 0.05  # of the accuracy: a render of this sigma adds half a per cent to the half-width
@@ -99,72 +100,88 @@ def check_accuracy(accuracy: float) -> float:
     return accuracy
 
 
+@dataclass(frozen=True)
+class Goal:
+    """What a run is to reach: an accuracy, or as much of it as a time allows.
+
+    Attributes
+    ----------
+    accuracy : float, optional
+        Half-width of the 95 % interval on each setting's variance ratio, all error sources included.
+    budget : float, optional
+        Seconds, instead, from ``started`` on (`time.perf_counter`).
+    """
+
+    accuracy: float | None = None
+    budget: float | None = None
+    started: float = field(default_factory=time.perf_counter)
+
+    def __post_init__(self) -> None:
+        if self.accuracy is not None:
+            check_accuracy(self.accuracy)
+
+    @property
+    def asked(self) -> tuple[float, str]:
+        """Number and unit."""
+        return (self.accuracy, "half-width") if self.budget is None else (self.budget, "seconds")
+
+    def trial(self, campaign: Campaign, options: RunOptions) -> CostModel:
+        """What the run will cost; of short runs a shorter trial."""
+        short = (self.budget or np.inf) <= _SHORT_S or (self.accuracy or 0.0) >= _COARSE
+        return trial(campaign, options, 2 if short else 3, _FINE * (self.accuracy or _USUAL))
+
+    def choice(self, model: CostModel) -> Choice:
+        """Rays and images that reach it."""
+        if self.accuracy is not None:
+            return model.for_accuracy(self.accuracy)
+        return model.for_budget(self.started + self.budget - time.perf_counter())
+
+    def stages(self, campaign: Campaign, model: CostModel, choice: Choice) -> tuple[int, More]:
+        """The first images of each setting, and what asks for more of them."""
+        if self.accuracy is not None:
+            return max(LEAST, int(0.8 * choice.renders)), _Narrower(campaign, model, choice, self.accuracy)
+        return max(LEAST, int(_FIRST * choice.renders)), _Longer(model, choice, self.started + self.budget)
+
+
 def reach(
     campaign: Campaign,
-    accuracy: float | None = None,
-    budget: float | None = None,
-    *,
-    seed: int = DEFAULT_SEED,
-    out: Path | None = None,
-    workers: int | None = None,
-    fresh: bool = False,
+    goal: Goal,
+    options: RunOptions = RunOptions(),
     say: Callable[[str], None] = lambda line: None,
-    progress=None,
-    dask: str | None = None,
-    started: float | None = None,
-    effects: str = "auto",
-    tolerance: Tolerance = Tolerance(),
+    progress: Progress | None = None,
 ) -> tuple[Validation, Reached]:
     """Run to an accuracy, or for a time.
 
     Parameters
     ----------
     campaign : Campaign
-    accuracy : float, optional
-        Half-width of the 95 % interval on each setting's variance ratio, all error sources included.
-    budget : float, optional
-        Seconds, instead.
+    goal : Goal
+    options : RunOptions
+        The quality of the renders is chosen.
     say : callable
         Given one line about what was chosen, before the run.
-    started : float, optional
-        When the budget began to run, `time.perf_counter`; now when not given.
-    effects, tolerance
-        What is simulated (`validation.run`).
 
     Raises
     ------
     InvalidInput
         If the accuracy cannot be reached whatever the time, or the budget is too short.
     """
-    started = time.perf_counter() if started is None else started
-    short = (budget or np.inf) <= _SHORT_S or (accuracy or 0.0) >= _COARSE
-    tried = 2 if short else 3
-    how = Rendering(effects=effects, tolerance=tolerance)
-    model = trial(campaign, seed, workers, tried, _FINE * (accuracy or _USUAL), how=how)
-    if accuracy is not None:
-        choice = model.for_accuracy(check_accuracy(accuracy))
-        more = _Narrower(campaign, model, choice, accuracy)
-        first = max(LEAST, int(0.8 * choice.renders))
-    else:
-        choice = model.for_budget(started + budget - time.perf_counter())
-        more = _Longer(model, choice, started + budget)
-        first = max(LEAST, int(_FIRST * choice.renders))
+    model = goal.trial(campaign, options)
+    choice = goal.choice(model)
+    first, more = goal.stages(campaign, model, choice)
     say(f"{choice.text}; trial {model.seconds:.1f} s")
-    first, quality = _begun(out, fresh) or (first, choice.rendered.quality)
-    found = run(
-        campaign, first, seed, out, workers, fresh, progress,
-        dask=dask, quality=quality, more=more, effects=effects, tolerance=tolerance,
-    )  # fmt: skip
-    asked, unit = (accuracy, "half-width") if budget is None else (budget, "seconds")
+    first, quality = _begun(options) or (first, choice.rendered.quality)
+    options = replace(options, rendering=replace(options.rendering, quality=quality))
+    found = run_by(options, campaign, first, progress, more)
     widths, counts = _widths(found, model, choice)
-    return found, Reached(asked, unit, model, choice, widths, counts, time.perf_counter() - started)
+    return found, Reached(*goal.asked, model, choice, widths, counts, time.perf_counter() - goal.started)
 
 
-def _begun(out: Path | None, fresh: bool) -> tuple[int, Quality] | None:
+def _begun(options: RunOptions) -> tuple[int, Quality] | None:
     """First images and quality of a run that was begun in a directory: it goes on with them."""
-    if fresh or out is None or not (out / "run.sqlite").exists():
+    if options.fresh or options.out is None or not (Path(options.out) / "run.sqlite").exists():
         return None
-    store = RunFile.reopen(out)
+    store = RunFile.reopen(Path(options.out))
     try:
         identity = store.identity()
         return identity["renders"], Quality(**identity["quality"])
@@ -197,14 +214,14 @@ class _Narrower:
             return 0
         main = methods(self.campaign.case(index).scene)[0].name
         values, (propagated, _, _) = store.distances(index, main), store.propagated(index, main)
-        values = values[np.isfinite(values)]
-        if values.size < LEAST or not np.isfinite(propagated):
+        sample = Sample.of(values)
+        good, ratio = sample.n - sample.failed, sample.ratio(propagated)
+        if good < LEAST or not np.isfinite(ratio):
             return there  # more of what cannot be measured does not help
-        ratio = float(values.var(ddof=1)) / propagated
         width = ratio * self.model.sampling_for(self.choice.rendered, min(self.accuracy / ratio, 0.999))
         if not width > 0:
             return there  # the other error sources alone are wider: `Reached` tells
-        return int(np.ceil(wanted(ratio, values.size, width) * there / values.size))
+        return int(np.ceil(wanted(ratio, good, width) * there / good))
 
 
 class _Longer:

@@ -12,6 +12,7 @@ import render
 from render import variant as variants
 from scenes import InvalidInput
 from validation.batch.campaign import Campaign
+from validation.batch.options import RunOptions
 from validation.cost.effects import effects_parameter
 from validation.cost.grid import grid_parameter
 from validation.cost.locators import estimators_parameter
@@ -78,7 +79,7 @@ def sweep(
     """
     whole, tell = Watch(budget), report or (lambda *_: None)
     tell("trial", 0, _STEPS)
-    model = trial(campaign, seed, report=lambda *_: tell("trial", 0, _STEPS), watch=Watch(budget / 3))
+    model = trial(campaign, RunOptions(seed), report=lambda *_: tell("trial", 0, _STEPS), watch=Watch(budget / 3))
     variant, spread = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)
     cases = spread[1::2] or spread
     images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]

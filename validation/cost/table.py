@@ -11,6 +11,7 @@ from rich.text import Text
 
 from validation.cost.parameter import Parameter
 from validation.cost.sweep import Sweep
+from validation.report.cells import table
 
 
 def tables(found: Sweep) -> Group:
@@ -31,13 +32,8 @@ def write_csv(found: Sweep, directory: Path) -> list[Path]:
 
 
 def _table(parameter: Parameter) -> Table:
-    made = Table(title=f"\n{parameter.title}", title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in parameter.columns:
-        made.add_column(name, justify="right")
     rows = [row for row in parameter.rows if "front" not in parameter.columns or row[-1]]  # the others are in the CSV
-    for row in rows:
-        made.add_row(*map(_cell, row))
-    return made
+    return table(f"\n{parameter.title}", *parameter.columns, rows=[map(_cell, row) for row in rows], wrap=True)
 
 
 def _below(parameter: Parameter) -> Text:

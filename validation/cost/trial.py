@@ -18,10 +18,10 @@ from render import variant as variants
 from scenes import InvalidInput, Pose
 from validation.batch import pool, work
 from validation.batch.campaign import Campaign, Case
-from validation.batch.work import Rendering
+from validation.batch.options import RunOptions
 from validation.cost.model import CostModel, Rendered, qualities
 from validation.cost.watch import Watch, at_once
-from validation.defaults import DEFAULT_SEED
+from validation.remeasured import batches
 
 SAMPLES = (4, 16, 64)
 _IMAGES = 100  # a setting
@@ -32,12 +32,10 @@ Report = Callable[[str, int, int], None]
 
 def trial(
     campaign: Campaign,
-    seed: int = DEFAULT_SEED,
-    workers: int | None = None,
+    options: RunOptions = RunOptions(),
     settings: int = 3,
     fine: float = 0.0,
     report: Report | None = None,
-    how: Rendering = Rendering(),
     watch: Watch = Watch(),
 ) -> CostModel:
     """Measure what the run of a campaign will cost, on a few settings spread over it.
@@ -45,18 +43,14 @@ def trial(
     Parameters
     ----------
     campaign : Campaign
-    seed : int
-        Of the trial's images, which are not the run's.
-    workers : int, optional
-        Of the run to come; all available cores when not given.
+    options : RunOptions
+        Of the run to come: its effects and workers; the seed is that of the trial's images, which are not the run's.
     settings : int
         How many to try.
     fine : float
         Relative sigma of a render's variance that is small enough: more rays are not tried.
     report : callable, optional
         As report(what, done, total).
-    how : Rendering
-        Which effects are simulated.
     watch : Watch
         Once its time is over, no further setting and no more rays are tried.
 
@@ -67,13 +61,13 @@ def trial(
     """
     imports, started = time.process_time(), time.perf_counter()  # so far this process has done little but import
     variant, cases = variants.choose(), spread_cases(campaign, settings)
-    warm = _timed(lambda: work.render_setting(cases[0], variant, how))
+    warm = _timed(lambda: work.render_setting(cases[0], variant, options.rendering))
     found = []
     for done in watch.samples(len(cases), least=1):
         case = cases[done]
         tell = partial(report or (lambda *_: None), "trial", done, len(cases))
         tell()
-        found.append(_Tried(case, variant, seed, how, tell))
+        found.append(_Tried(case, variant, options, tell))
     good = [tried for tried in found if tried.usable]
     if not good:
         raise InvalidInput(f"{campaign.name}: settings must be measurable for a trial, got {found[0].status}")
@@ -82,7 +76,7 @@ def trial(
     model = math.sqrt(max(0.0, float(np.mean([delta**2 - se**2 for delta, se in squares]))))
     return CostModel(
         settings=len(campaign),
-        workers=workers or pool.cores(),
+        workers=options.workers or pool.cores(),
         variant=variant,
         rendered=rendered,
         phase=_rms([tried.phase() for tried in good]),
@@ -124,24 +118,24 @@ def spread_cases(campaign: Campaign, count: int) -> list[Case]:
 class _Tried:
     """One setting of the trial."""
 
-    def __init__(self, case: Case, variant: str, seed: int, how: Rendering, tell: Callable[[], None]) -> None:
-        self.case, self.variant, self.seed, self.how, self.tell = case, variant, seed, how, tell
-        clean = work.render_setting(case, variant, how)
+    def __init__(self, case: Case, variant: str, options: RunOptions, tell: Callable[[], None]) -> None:
+        self.case, self.variant, self.seed, self.how, self.tell = case, variant, options.seed, options.rendering, tell
+        clean = work.render_setting(case, variant, self.how)
         self.seconds = sum(clean.seconds.values())
         self.image = clean.image.array()
         self.found = self._propagate(self.image, case.setting.sensor)
         self.status = self.found.status
         self.usable = math.isfinite(self.found.variance_px2)
         self.overhead = clean.seconds["predict"] + clean.seconds["propagate"]
-        work.measure_chunk(case, self.image, seed, 0, 2)  # prepares the estimators
+        work.measure_chunk(case, self.image, self.seed, 0, 2)  # prepares the estimators
         tell()
         self.image_seconds = _timed(self._measure_images) / _IMAGES
 
     def _measure_images(self) -> None:
         size = at_once(self.image.size, _IMAGES)
-        for number, first in enumerate(range(0, _IMAGES, size)):
+        for number, count in enumerate(batches(_IMAGES, size)):
             self.tell()
-            work.measure_chunk(self.case, self.image, self.seed, number, min(size, _IMAGES - first))
+            work.measure_chunk(self.case, self.image, self.seed, number, count)
 
     def rendered(self, quality: Quality) -> tuple[float, float]:
         """Seconds of a render, and relative sigma of the predicted variance from two seeds."""
@@ -177,9 +171,9 @@ class _Tried:
         where = measure.region_of_interest(scene, sensor)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.case.index, 1 << 30)))
         parts, size = [], at_once(self.image.size, _IMAGES)
-        for first in range(0, _IMAGES, size):
+        for count in batches(_IMAGES, size):
             self.tell()
-            pictures = render.expose(self.image, scene.noise, rng, min(size, _IMAGES - first), where)
+            pictures = render.expose(self.image, scene.noise, rng, count, where)
             found = measure.measure(pictures, scene, sensor, estimator="gradient").value_image[:, 0]
             parts.append((found, np.einsum("nij,ij->n", pictures - self.image, self.found.response)))
         values, linear = np.concatenate(parts, axis=1)

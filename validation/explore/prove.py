@@ -16,7 +16,7 @@ from validation.batch.work import Clean, Found, Task, methods
 from validation.defaults import DEFAULT_SEED
 from validation.explore.answers import finite
 from validation.explore.state import State
-from validation.statistics import ratio_interval
+from validation.remeasured import Sample, batches
 
 RENDERS = 1000
 CHUNK = 50  # images between two reports, and after which it can be stopped
@@ -29,9 +29,8 @@ def rendering(scene: Scene, state: State, variant: str) -> Task:
 
 def measuring(scene: Scene, state: State, variant: str, clean: Clean, renders: int = RENDERS) -> list[Task]:
     """The work of measuring so many images of it, in pieces."""
-    sizes = [min(CHUNK, renders - at) for at in range(0, renders, CHUNK)]
     case = _case(scene, state)
-    return [Task(case, ((k, n),), DEFAULT_SEED, variant, clean.image) for k, n in enumerate(sizes)]
+    return [Task(case, ((k, n),), DEFAULT_SEED, variant, clean.image) for k, n in enumerate(batches(renders, CHUNK))]
 
 
 def _case(scene: Scene, state: State) -> Case:
@@ -88,17 +87,14 @@ def proofs(scene: Scene, clean: Clean, found: list[Found]) -> list[Proof]:
     made = []
     for k, about in enumerate(clean.predicted["measurands"]):
         values = np.concatenate([chunk.distances[column(main, k)] for chunk in chunks])
-        good = values[np.isfinite(values)]
-        propagated, _, status = clean.propagated[column(main, k)]
-        variance = float(good.var(ddof=1)) if len(good) > 1 else math.nan
-        ratio = variance / propagated if 0 < propagated < math.inf else math.nan
+        sample, (propagated, _, status) = Sample.of(values), clean.propagated[column(main, k)]
         made.append(
             Proof(
                 name=about["name"], unit=about["unit"], calibrated=math.sqrt(about["calibrated"]),
-                propagated=math.sqrt(propagated), measured=math.sqrt(variance), ratio=ratio,
-                interval=ratio_interval(ratio, len(good)), n=len(values), failed=len(values) - len(good),
-                bias=float(good.mean()) - about["value"] if len(good) else math.nan,
-                predicted_bias=about["predicted_bias"], status=status, values=tuple(good.tolist()),
+                propagated=math.sqrt(propagated), measured=math.sqrt(sample.variance),
+                ratio=sample.ratio(propagated), interval=sample.interval(propagated), n=sample.n, failed=sample.failed,
+                bias=sample.mean - about["value"], predicted_bias=about["predicted_bias"], status=status,
+                values=tuple(values[np.isfinite(values)].tolist()),
             )
         )  # fmt: skip
     return made

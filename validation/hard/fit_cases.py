@@ -14,7 +14,9 @@ from measure.features.lines import fit_lines, regression, trapezoid
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints
 from measure.measurement import separation
+from validation.hard import precise
 from validation.hard.case import Answer, Case, Reference
+from validation.hard.precise import mp
 
 
 def cases() -> list[Case]:
@@ -70,9 +72,6 @@ def line(points: EdgePoints, weights: np.ndarray | float, place: str) -> Answer:
 
 def line_reference(points: EdgePoints, weights: np.ndarray | float, place: str) -> Reference:
     """Principal axis by the plain formulas at 50 digits."""
-    from validation.hard import precise
-    from validation.hard.precise import mp, mpf
-
     count = points.along.size
 
     def value(numbers):
@@ -87,8 +86,7 @@ def line_reference(points: EdgePoints, weights: np.ndarray | float, place: str) 
         return tilt if place == "tilt" else my + mp.tan(tilt) * (xs[-1] - mx)
 
     weights = np.broadcast_to(weights, count)
-    numbers = [mpf(float(v)) for v in (*points.along[0], *points.offset[0], *weights)]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*points.along[0], *points.offset[0], *weights))
 
 
 def _covariances() -> list[Case]:
@@ -114,9 +112,6 @@ def _spread(along: np.ndarray, weights: np.ndarray | float) -> Answer:
 
 
 def _spread_reference(along: np.ndarray, weights: np.ndarray | float) -> Reference:
-    from validation.hard import precise
-    from validation.hard.precise import mpf
-
     count = along.size
 
     def value(numbers):
@@ -127,8 +122,7 @@ def _spread_reference(along: np.ndarray, weights: np.ndarray | float) -> Referen
         square = sum(w * s * s for w, s in zip(shares, away, strict=True))
         return sum((w / total + away[-1] * w * s / square) ** 2 for w, s in zip(shares, away, strict=True))
 
-    numbers = [mpf(float(v)) for v in (*along, *np.broadcast_to(weights, count))]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*along, *np.broadcast_to(weights, count)))
 
 
 def _corners() -> list[Case]:
@@ -163,14 +157,11 @@ def _corner(normals: np.ndarray) -> Answer:
 
 
 def _corner_reference(normals: np.ndarray) -> Reference:
-    from validation.hard import precise
-
     def value(numbers):
         (a1, b1), (a2, b2), (v1, v2) = numbers[:2], numbers[2:4], numbers[4:]
         return ((a2**2 + b2**2) * v1 + (a1**2 + b1**2) * v2) / (a1 * b2 - a2 * b1) ** 2
 
-    numbers = [precise.mpf(float(x)) for x in (*normals.ravel(), 0.01, 0.02)]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*normals.ravel(), 0.01, 0.02))
 
 
 def _crossings(normals: np.ndarray, points: np.ndarray):
@@ -184,15 +175,12 @@ def _crossings(normals: np.ndarray, points: np.ndarray):
 
 
 def _crossing(normals: np.ndarray, points: np.ndarray) -> Reference:
-    from validation.hard import precise
-
     def value(numbers):
         (a1, b1), (a2, b2), p, q = numbers[:2], numbers[2:4], numbers[4:6], numbers[6:]
         c1, c2 = a1 * p[0] + b1 * p[1], a2 * q[0] + b2 * q[1]
         return (c1 * b2 - c2 * b1) / (a1 * b2 - a2 * b1)
 
-    numbers = [precise.mpf(float(x)) for x in (*normals.ravel(), *points.ravel())]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*normals.ravel(), *points.ravel()))
 
 
 _LEVEL, _SLOPE = 0.01, 1e-6  # variance of a line's offset at its caliper's origin, px^2, and of its slope
@@ -210,8 +198,6 @@ def _response(normals: np.ndarray, points: np.ndarray) -> Answer:
 
 
 def _response_reference(normals: np.ndarray, points: np.ndarray) -> Reference:
-    from validation.hard import precise
-
     def value(numbers):
         (a1, b1), (a2, b2), p, q, (level, slope) = (numbers[i : i + 2] for i in range(0, 10, 2))
         size = a1 * b2 - a2 * b1
@@ -221,8 +207,7 @@ def _response_reference(normals: np.ndarray, points: np.ndarray) -> Reference:
         first, second = (a2**2 + b2**2) / size**2, (a1**2 + b1**2) / size**2
         return first * (level + slope * along1**2) + second * (level + slope * along2**2)
 
-    numbers = [precise.mpf(float(x)) for x in (*normals.ravel(), *points.ravel(), _LEVEL, _SLOPE)]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*normals.ravel(), *points.ravel(), _LEVEL, _SLOPE))
 
 
 _JOINT = np.diag([0.01, 0.02, 0.03, 0.04]) + 0.005  # covariance of the two ends' (x, y), px^2
@@ -248,18 +233,15 @@ def _distance(ends: np.ndarray, place: int) -> Answer:
 
 
 def _distance_reference(ends: np.ndarray, place: int) -> Reference:
-    from validation.hard import precise
-
     def value(numbers):
         r, c = numbers[2] - numbers[0], numbers[3] - numbers[1]
-        size = precise.mp.sqrt(r * r + c * c)
+        size = mp.sqrt(r * r + c * c)
         pull = [-r / size, -c / size, r / size, c / size]
         joint = [precise.mpf(float(v)) for v in _JOINT.ravel()]
         variance = sum(pull[i] * joint[4 * i + j] * pull[j] for i in range(4) for j in range(4))
         return (size, variance)[place]
 
-    numbers = [precise.mpf(float(v)) for v in ends.ravel()]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, ends.ravel())
 
 
 def _on_ellipse(parameters, t: np.ndarray) -> np.ndarray:

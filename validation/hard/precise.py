@@ -5,13 +5,14 @@ Nothing here is shared with the planner but the input: vertices, faces and edges
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from mpmath import MPContext
 
 from scenes import Scene
+from validation.hard.case import Reference
 
 DIGITS = 50
 mp = MPContext()  # a context of its own: nobody else's precision changes
@@ -73,6 +74,12 @@ def condition_of(function: Callable[[list], mpf], numbers: list) -> float:
             moved = [*numbers[:i], number * (1 + mpf(10) ** -_STEP), *numbers[i + 1 :]]
             total += abs(function(moved) / value - 1)
     return float(total * mpf(10) ** _STEP)
+
+
+def reference(function: Callable[[list], mpf], numbers: Iterable[float]) -> Reference:
+    """The value of a function of exactly these floating-point numbers, and its condition."""
+    exact = [mpf(float(x)) for x in numbers]
+    return Reference.precise(function(exact), condition_of(function, exact))
 
 
 def dot(a, b):

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from scenes import Material
+from validation.hard import precise
 from validation.hard.case import Answer, Case, Reference
 
 _NORMAL = np.array([0.0, 0.0, 1.0])
@@ -48,11 +49,9 @@ def _ours(material: Material, to_light: np.ndarray, to_sensor: np.ndarray) -> An
 
 def _reference(material: Material, to_light: np.ndarray, to_sensor: np.ndarray) -> Reference:
     """From the components of the same vectors, the unit length of which is good to the last digit only."""
-    from validation.hard import precise
 
     def value(numbers):
         light, sensor = (tuple(numbers[i : i + 3]) for i in (0, 3))
         return precise.brightness(material, (0, 0, 1), light, sensor)
 
-    numbers = [precise.mpf(float(x)) for x in (*to_light, *to_sensor)]
-    return Reference.precise(value(numbers), precise.condition_of(value, numbers))
+    return precise.reference(value, (*to_light, *to_sensor))

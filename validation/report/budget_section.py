@@ -10,8 +10,6 @@ from planner.uncertainty.budget import Budget
 from scenes import InvalidInput, Picture, Scene, Uncertainty
 from validation.report.budget_table import sentence, summary
 
-COLUMNS = ["source", "u", "sensitivity", "contribution", "share", "type", "dof"]
-
 
 def budgets_of(scenes: tuple[Scene, ...]) -> Iterator[SceneBudget]:
     """Budgets of the scenes that have uncertainties and a setting at which all can be measured."""

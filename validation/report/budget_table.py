@@ -8,6 +8,7 @@ from rich.table import Table
 
 from planner.uncertainty.budget import Budget
 from scenes.status import doubt, is_trusted
+from validation.report import cells
 
 TERMS = (
     "u: standard uncertainty of a source; contribution = |sensitivity| u; share of u_c^2; A: from observations or the",
@@ -15,32 +16,25 @@ TERMS = (
     "probability given. TUR: half the tolerance over U. Cg, Cgk: capability of the gauge, from simulated repeats.",
 )
 
+COLUMNS = ["source", "u", "sensitivity", "contribution", "share", "type", "dof"]
 _LEAST = 5e-4  # of the variance: sources below are one row
 
 
 def table(budget: Budget) -> Table:
     """All contributions to one measurand, the largest first."""
-    shown = Table(
-        title=f"{budget.name} [{budget.unit}]", title_justify="left", title_style="bold", box=None, padding=(0, 1)
-    )  # fmt: skip
-    for name in ("source", "u", "sensitivity", "contribution", "share", "type", "dof"):
-        shown.add_column(name, justify="left" if name in ("source", "type") else "right", no_wrap=True)
+    shown = cells.table(f"{budget.name} [{budget.unit}]", *COLUMNS, words=("source", "type"))
     rows = sorted(budget.contributions, key=lambda row: -row.share)
     for row in rows:
         if row.share < _LEAST:
             break
         dof = "-" if math.isinf(row.dof) else f"{row.dof:.0f}"
-        numbers = f"{row.u:.3g}", _sensitivity(row.sensitivity), f"{row.contribution:.3g}", f"{100 * row.share:.1f} %"
+        numbers = f"{row.u:.3g}", cells.number(row.sensitivity), f"{row.contribution:.3g}", f"{100 * row.share:.1f} %"
         shown.add_row(row.source, *numbers, row.type, dof)
     if rest := [row for row in rows if row.share < _LEAST]:
         together = math.hypot(*(row.contribution for row in rest))
         share = sum(row.share for row in rest)
         shown.add_row(f"others ({len(rest)})", "", "", f"{together:.3g}", f"{100 * share:.2f} %", "", "")
     return shown
-
-
-def _sensitivity(value: float | None) -> str:
-    return "-" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
 def summary(budget: Budget) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 from rich.table import Table
 
-from measure.calibration import Calibration, blur_for
+from measure.calibration import Calibration, Curve, blur_for
+from validation.report import cells
 
 
 def facts(found: Calibration) -> dict:
@@ -21,20 +21,13 @@ def table(found: Calibration) -> Table:
         "floor: noise-free error of the points. strip and arrangement find none: theirs is the variance "
         "of a line's middle, told at gradient's length."
     )
-    made = Table(title=f"{found.scene}: position noise of the locators", caption=caption, box=None, padding=(0, 2))
-    made.title_justify = made.caption_justify = "left"
-    for name in (
-        "locator",
-        "floor px",
-        "kappa^2",
-        "correlation px",
-        "product px",
-        "efficiency",
-        "linear to noise/contrast",
-    ):
-        made.add_column(name, justify="right", no_wrap=True)
-    for curve in found.curves:
-        product = curve.kappa2 * curve.correlation_px
-        cells = (curve.floor_px, curve.kappa2, curve.correlation_px, product, curve.efficiency, curve.linear_to)
-        made.add_row(curve.name, *(f"{value:.3g}" if np.isfinite(value) else "-" for value in cells))
-    return made
+    columns = ("locator", "floor px", "kappa^2", "correlation px", "product px", "efficiency",
+               "linear to noise/contrast")  # fmt: skip
+    title, rows = f"{found.scene}: position noise of the locators", map(_row, found.curves)
+    return cells.table(title, *columns, rows=rows, caption=caption, padding=(0, 2))
+
+
+def _row(curve: Curve) -> list[str]:
+    product = curve.kappa2 * curve.correlation_px
+    values = (curve.floor_px, curve.kappa2, curve.correlation_px, product, curve.efficiency, curve.linear_to)
+    return [curve.name, *map(cells.number, values)]

@@ -13,6 +13,7 @@ import scenes
 from measure.boards.camera import CameraCalibration
 from scenes import InvalidInput
 from validation.boards import Boards
+from validation.report import cells
 from validation.strict_json import dumps
 
 _STRONG = 0.9  # correlation that is told of
@@ -20,9 +21,8 @@ _STRONG = 0.9  # correlation that is told of
 
 def boards(found: CameraCalibration, seen: Boards, units: str) -> Table:
     """One row a board."""
-    table = Table(title="Boards", title_justify="left", box=None)
-    for name in ("file", "corners", "not ok", "noise", "blur px", "rms px", f"distance {units}", "+-"):
-        table.add_column(name, justify="left" if name == "file" else "right")
+    columns = ("file", "corners", "not ok", "noise", "blur px", "rms px", f"distance {units}", "+-")
+    table = cells.table("Boards", *columns, words=("file",), wrap=True)
     for each in _board_facts(found, seen):
         size = f"{each['shape'][0]} x {each['shape'][1]}"
         bad = ", ".join(f"{count} {name}" for name, count in each["status"].items() if name != "ok") or "-"
@@ -35,9 +35,7 @@ def boards(found: CameraCalibration, seen: Boards, units: str) -> Table:
 
 def parameters(found: CameraCalibration) -> Table:
     """One row an intrinsic."""
-    table = Table(title="Camera", title_justify="left", box=None)
-    for name in ("", "value", "+- (1 sigma)", "unit"):
-        table.add_column(name, justify="left" if name in ("", "unit") else "right")
+    table = cells.table("Camera", "", "value", "+- (1 sigma)", "unit", words=("", "unit"), wrap=True)
     for name, value, sd in zip(found.names, found.values, found.sd, strict=True):
         pixels = name in ("fx", "fy", "cx", "cy")
         digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 12)) if 0 < sd < np.inf else 4

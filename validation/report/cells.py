@@ -1,18 +1,50 @@
-"""What the tables of plans share: their looks, and poses in their cells."""
+"""What all printed tables share: their looks, and numbers and poses in their cells."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
 
 from rich.table import Table
 
 from scenes import Pose
 
 
-def table(title: str, *columns: str) -> Table:
-    """An empty table of numbers."""
-    made = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
+def table(
+    title: str,
+    *columns: str,
+    rows: Iterable[Iterable[str]] = (),
+    words: Iterable[str] = (),
+    wrap: bool = False,
+    **looks: Any,
+) -> Table:
+    """A table for a terminal: columns of numbers to the right, those of ``words`` to the left.
+
+    Cells are broken where there is no room only with ``wrap``; ``looks`` are rich's.
+    """
+    made = Table(
+        title=title, title_justify="left", title_style="bold", box=None, **{"caption_justify": "left", **looks}
+    )
     for name in columns:
-        made.add_column(name, justify="right", no_wrap=True)
+        made.add_column(name, justify="left" if name in words else "right", no_wrap=not wrap)
+    for row in rows:
+        made.add_row(*row)
     return made
+
+
+def number(value: float | None, form: str = ".3g") -> str:
+    """A number, "-" for none that is known.
+
+    >>> number(0.12345), number(None), number(math.inf)
+    ('0.123', '-', '-')
+    """
+    return "-" if value is None or not math.isfinite(value) else format(value, form)
+
+
+def sigma(variance: float | None) -> str:
+    """Standard deviation of a variance."""
+    return number(variance if variance is None else math.sqrt(variance))
 
 
 def pose(poses: Pose | tuple[Pose, ...]) -> str:

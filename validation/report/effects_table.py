@@ -9,6 +9,10 @@ from rich.table import Table
 from render.phenomena import Decision, Effect
 from scenes import pairs, shown
 from validation.effects_check import RENDERED, Switched
+from validation.report import cells
+from validation.strict_json import plain
+
+_LOOKS = {"wrap": True, "caption_justify": "center"}
 
 
 def saving(decisions: tuple[Decision, ...]) -> float:
@@ -28,20 +32,19 @@ def fact(decision: Decision) -> dict:
         "name": effect.name,
         "on": decision.on,
         "reason": decision.reason,
-        "bias_px": bias if math.isfinite(bias) else None,
-        "variance": change if math.isfinite(change) else None,
+        "bias_px": plain(bias),
+        "variance": plain(change),
         "cost": effect.cost,
         "switch": effect.switch,
     }
 
 
 def checked(row: Switched) -> dict:
-    bounds = [value if math.isfinite(value) else None for value in row.estimated]
     return {
         "sensor": list(row.setting.sensor),
         "light": pairs(row.setting.light),
         "effect": row.name,
-        "estimated": bounds,
+        "estimated": plain(tuple(row.estimated)),
         "measured": [row.bias_px, row.variance],
         "resolution": [row.resolution_px, row.resolution_variance],
         "seconds": row.seconds,
@@ -55,38 +58,37 @@ def _number(value: float) -> str:
 
 
 def table(decisions: tuple[Decision, ...]) -> Table:
-    made = Table(title="Effects: influence on the distance, at most", box=None, title_justify="left")
-    for name in ("effect", "", "reason"):
-        made.add_column(name)
-    for name in ("bias px", "variance", "cost"):
-        made.add_column(name, justify="right")
-    for decision in decisions:
-        influence = (_number(value) for value in decision.influence)
-        cost = "each picture" if decision.effect.name == "pose_jitter" else f"{decision.effect.cost:.1f}"
-        made.add_row(decision.effect.name, "on" if decision.on else "off", decision.reason, *influence, cost)
-    made.caption = "variance: relative change. cost: time of a render with it over that without."
-    return made
+    columns = ("effect", "", "reason", "bias px", "variance", "cost")
+    caption = "variance: relative change. cost: time of a render with it over that without."
+    rows = map(_effect, decisions)
+    title = "Effects: influence on the distance, at most"
+    return cells.table(title, *columns, rows=rows, words=columns[:3], **_LOOKS, caption=caption)
+
+
+def _effect(decision: Decision) -> list[str]:
+    effect = decision.effect
+    cost = "each picture" if effect.name == "pose_jitter" else f"{effect.cost:.1f}"
+    return [effect.name, "on" if decision.on else "off", decision.reason, *map(_number, decision.influence), cost]
 
 
 def check_table(rows: list[Switched]) -> Table:
-    made = Table(title="\nSwitched on: measured against the bound", box=None, title_justify="left")
-    made.add_column("sensor, light")
-    made.add_column("effect")
-    for name in ("bias px", "bound", "variance", "bound", "time", ""):
-        made.add_column(name, justify="right")
-    for row in rows:
-        made.add_row(
-            f"{row.setting.sensor} {shown(pairs(row.setting.light))}",
-            row.name,
-            f"{row.bias_px:+.4f}",
-            f"{_number(row.estimated.bias_px)} +{row.resolution_px:.4f}",
-            f"{row.variance:+.4f}",
-            f"{_number(row.estimated.variance)} +{row.resolution_variance:.4f}",
-            f"{row.seconds / row.seconds_auto:.1f}",
-            "ok" if row.holds else "EXCEEDED",
-        )
-    made.caption = "bound: estimated, + what the renders scatter by (0.1 %). time: of one render over that of auto."
-    return made
+    columns = ("sensor, light", "effect", "bias px", "bound", "variance", "bound", "time", "")
+    caption = "bound: estimated, + what the renders scatter by (0.1 %). time: of one render over that of auto."
+    title = "\nSwitched on: measured against the bound"
+    return cells.table(title, *columns, rows=map(_switched, rows), words=columns[:2], **_LOOKS, caption=caption)
+
+
+def _switched(row: Switched) -> list[str]:
+    return [
+        f"{row.setting.sensor} {shown(pairs(row.setting.light))}",
+        row.name,
+        f"{row.bias_px:+.4f}",
+        f"{_number(row.estimated.bias_px)} +{row.resolution_px:.4f}",
+        f"{row.variance:+.4f}",
+        f"{_number(row.estimated.variance)} +{row.resolution_variance:.4f}",
+        f"{row.seconds / row.seconds_auto:.1f}",
+        "ok" if row.holds else "EXCEEDED",
+    ]
 
 
 def total(rows: list[Switched]) -> str:

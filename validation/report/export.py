@@ -10,7 +10,6 @@ from pathlib import Path
 
 from scenes import InvalidInput
 from validation.batch.document import pieces
-from validation.batch.measurands import JudgedMeasurand
 from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
 
@@ -122,12 +121,4 @@ def measurands(found: Validation) -> Iterator[dict[str, object]]:
             "index": row.index, "scene": row.scene, "sensor_polar": row.sensor[0], "sensor_azimuth": row.sensor[1],
             "light_polar": _angle(row.light, 0), "light_azimuth": _angle(row.light, 1),
         }  # fmt: skip
-        yield from ({**place, **_flat(each)} for each in row.measurands)
-
-
-def _flat(each: JudgedMeasurand) -> dict[str, object]:
-    low, high = each.ratio_interval or (None, None)
-    return {key: value for key, value in vars(each).items() if key != "ratio_interval"} | {
-        "ratio_low": low,
-        "ratio_high": high,
-    }
+        yield from ({**place, **each.record} for each in row.measurands)

@@ -16,7 +16,7 @@ from planner.budgeting.budgets import SceneBudget
 from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.report import budget_figure, budget_section, diagnostics, figures, guide, page_tables
+from validation.report import budget_figure, budget_section, budget_table, diagnostics, figures, guide, page_tables
 from validation.report.page_tables import Table
 
 
@@ -110,7 +110,7 @@ def _budget(found: SceneBudget, folder: Path) -> Section:
     tables = [
         Table(
             f"{each.name} [{each.unit}]",
-            budget_section.COLUMNS,
+            budget_table.COLUMNS,
             budget_section.cells(each),
             budget_section.note(found, m),
             advice=guide.advice(True)["budget"],

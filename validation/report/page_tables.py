@@ -9,7 +9,18 @@ from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import guide
-from validation.report.run_cells import errors, failed, far, names, number, ratio, shift, small, small_sigma
+from validation.report.run_cells import (
+    failed,
+    far,
+    is_printed,
+    names,
+    of_errors,
+    of_measurand,
+    of_paper,
+    of_variances,
+    other_methods,
+    ratio,
+)
 from validation.statistics import ALLOWANCE, LEVEL, Verdict
 
 _ROWS = 64  # rows of the table of settings without a result
@@ -37,22 +48,10 @@ def ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found, rows)
     columns = [
-        *key,
-        f"{rows[0].main.method}: measured / predicted [95 %]",
-        "images",
-        "failed",
-        "bias, px: predicted",
-        "measured",
-        "rmse, px",
-        "status",
-    ]
-    lines = [
-        [
-            *cells[row.index], ratio(row.main), str(row.main.n), failed(row),
-            shift(row.main.predicted_bias), *errors(row.main), row.main.status,
-        ]
-        for row in rows
+        *key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px: predicted",
+        "measured", "rmse, px", "status",
     ]  # fmt: skip
+    lines = [[*cells[row.index], ratio(row.main), str(row.main.n), failed(row), *of_errors(row)] for row in rows]
     terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
     note = " ".join([*terms, *legend(row.main.status for row in rows), which])
     return Table("Measured over predicted variance, by setting", columns, lines, note, advice=_advice(found, "ratios"))
@@ -61,19 +60,10 @@ def ratios(found: Validation) -> Table:
 def variances(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found, rows)
-    others = list(dict.fromkeys(judged.method for row in found.rows for judged in row.classic))
-    main, printed = rows[0].main.method, any(row.paper_ice or row.paper_real for row in found.rows)
+    main, others, printed = rows[0].main.method, other_methods(found.rows), is_printed(found)
     paper = ["paper ICE", "ours ICE", "paper real 12.0", "paper real 10.0"] if printed else []
     columns = [*key, *paper, "calibrated", "propagated", f"measured: {main}", *others, "Cramer-Rao bound"]
-    lines = []
-    for row in rows:
-        classic = {judged.method: judged for judged in row.classic}
-        measured = [small(classic[name].empirical) if name in classic else "-" for name in others]
-        theirs = [number(row.paper_ice), number(row.paper), *map(number, row.paper_real or (None, None))]
-        lines.append([
-            *cells[row.index], *(theirs if printed else []),
-            small(row.calibrated), small(row.main.propagated), small(row.main.empirical), *measured, small(row.bound),
-        ])  # fmt: skip
+    lines = [[*cells[row.index], *(of_paper(row) if printed else []), *of_variances(row, others)] for row in rows]
     terms = [*guide.paper_terms(found), *guide.variance_terms([main, *others], max(row.main.n for row in rows))]
     title = f"{'Table 3: variance' if printed else 'Variance'} of the first measurand in the image, by setting"
     return Table(title, columns, lines, " ".join([*terms, which]), advice=_advice(found, "variances"))
@@ -87,14 +77,7 @@ def units(found: Validation) -> Table:
         *key, "measurand", "value", "unit", "sigma: calibrated", "propagated", "measured", "ratio of variances [95 %]",
         "bias", "status",
     ]  # fmt: skip
-    lines = [
-        [
-            *cells[row.index], each.name, f"{each.value:.6g}", each.unit,
-            *(small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical)), ratio(each),
-            "-" if each.bias is None else f"{each.bias:+.2g}", each.status,
-        ]
-        for row in rows for each in row.measurands
-    ]  # fmt: skip
+    lines = [[*cells[row.index], *of_measurand(each)] for row in rows for each in row.measurands]
     statuses = (each.status for row in rows for each in row.measurands)
     note = " ".join([*guide.unit_terms(statuses, any(len(row.measurands) > 1 for row in rows)), which])
     return Table("All measurands in the scene's unit, by setting", columns, lines, note, advice=_advice(found, "units"))

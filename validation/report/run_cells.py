@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Iterable
 
 from scenes import shown
+from validation.batch.measurands import JudgedMeasurand
 from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
 
@@ -73,3 +75,37 @@ def errors(judged: Judged) -> tuple[str, str]:
 
 def failed(row: Row) -> str:
     return " ".join(str(judged.failed) for judged in (row.main, *row.classic))
+
+
+def other_methods(rows: Iterable[Row]) -> list[str]:
+    """All methods but the verdict's."""
+    return list(dict.fromkeys(judged.method for row in rows for judged in row.classic))
+
+
+def is_printed(found: Validation) -> bool:
+    """Whether the paper printed numbers for some settings."""
+    return any(row.paper_ice or row.paper_real for row in found.rows)
+
+
+def of_paper(row: Row) -> list[str]:
+    """What the paper predicted, our number for it, and what the paper measured by its two thresholds."""
+    return [number(row.paper_ice), number(row.paper), *map(number, row.paper_real or (None, None))]
+
+
+def of_variances(row: Row, others: list[str]) -> list[str]:
+    """Predicted variances, those measured by the verdict's and the other methods, and the bound."""
+    classic = {judged.method: judged.empirical for judged in row.classic}
+    measured = (row.main.empirical, *(classic.get(name) for name in others))
+    return [small(value) for value in (row.calibrated, row.main.propagated, *measured, row.bound)]
+
+
+def of_errors(row: Row) -> list[str]:
+    """Predicted and measured bias, root mean square error, and status."""
+    return [shift(row.main.predicted_bias), *errors(row.main), row.main.status]
+
+
+def of_measurand(each: JudgedMeasurand) -> list[str]:
+    """A measurand in the scene's unit: value, standard deviations, ratio of variances, bias, and status."""
+    sigmas = (small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical))
+    bias = "-" if each.bias is None else f"{each.bias:+.2g}"
+    return [each.name, f"{each.value:.6g}", each.unit, *sigmas, ratio(each), bias, each.status]

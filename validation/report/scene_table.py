@@ -2,78 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from scenes import AnyLight, Curved, Mesh, Scene
 from scenes.parts.recognised import Recognised, cylinders
+from scenes.parts.solid import Edge, Solid
+from validation.report.cells import table
+from validation.strict_json import plain
 
 
 def facts(scene: Scene) -> dict[str, Any]:
     """For JSON; lengths in the scene's unit."""
     solid = scene.solid
-    here = {name: solid.vertex(name).tolist() for name in solid.corner_names}
     facets = {each.name: each for each in (cylinders(solid) if isinstance(scene.object, Mesh) else ())}
-    return {
+    return plain({
         "scene": scene.name,
         "units": scene.units,
-        "vertices": [{"name": name, "at": at} for name, at in here.items()],
-        "edges": [
-            {
-                "name": edge.name,
-                "ends": [solid.vertex_names[end] for end in edge.ends],
-                "length": float(np.linalg.norm(np.subtract(*solid.vertices[list(edge.ends)]))),
-                "convex": edge.convex,
-            }
-            for edge in solid.sharp
-        ],
+        "vertices": [{"name": name, "at": solid.vertex(name)} for name in solid.corner_names],
+        "edges": [_edge(solid, edge) for edge in solid.sharp],
         "circles": [
-            {
-                "name": circle.name,
-                "centre": circle.centre.tolist(),
-                "axis": circle.axis.tolist(),
-                "diameter": 2 * circle.radius,
-                "hole": circle.hole,
-            }
+            {"name": circle.name, "centre": circle.centre, "axis": circle.axis, "diameter": 2 * circle.radius,
+             "hole": circle.hole}
             for circle in solid.circles
         ],
-        "faces": [
-            {
-                "name": solid.face_names[f],
-                "at": solid.vertices[list(face)].mean(0).tolist(),
-                "normal": solid.normals[f].tolist(),
-                "material": _material(scene, f),
-            }
-            for f, face in enumerate(solid.faces)
-            if solid.plane[f]
-        ],
-        "cylinders": [
-            {
-                "name": each.name,
-                "point": each.surface.point.tolist(),
-                "axis": each.surface.axis.tolist(),
-                "diameter": 2 * each.surface.radius,
-                "hole": each.surface.hollow,
-                "length": each.surface.ends[1] - each.surface.ends[0],
-                "turn": each.turn_deg,
-                "facets": len(each.faces),
-                "residual": each.residual,
-                "largest": each.largest,
-            }
-            for each in facets.values()
-        ],
+        "faces": [_face(scene, f) for f in range(len(solid.faces)) if solid.plane[f]],
+        "cylinders": list(map(_cylinder, facets.values())),
         "surfaces": [_surface(wall, facets.get(wall.name)) for wall in scene.all_walls.curved],
         "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
-    }
+    })  # fmt: skip
+
+
+def _edge(solid: Solid, edge: Edge) -> dict[str, Any]:
+    length = np.linalg.norm(np.subtract(*solid.vertices[list(edge.ends)]))
+    ends = [solid.vertex_names[end] for end in edge.ends]
+    return {"name": edge.name, "ends": ends, "length": length, "convex": edge.convex}
+
+
+def _face(scene: Scene, f: int) -> dict[str, Any]:
+    solid = scene.solid
+    at = solid.vertices[list(solid.faces[f])].mean(0)
+    return {"name": solid.face_names[f], "at": at, "normal": solid.normals[f], "material": _material(scene, f)}
+
+
+def _cylinder(each: Recognised) -> dict[str, Any]:
+    """A cylinder that facets stand for."""
+    surface = each.surface
+    return {
+        "name": each.name, "point": surface.point, "axis": surface.axis, "diameter": 2 * surface.radius,
+        "hole": surface.hollow, "length": surface.ends[1] - surface.ends[0], "turn": each.turn_deg,
+        "facets": len(each.faces), "residual": each.residual, "largest": each.largest,
+    }  # fmt: skip
 
 
 def report(scene: Scene) -> Group:
     """The same as tables."""
-    known, unit, camera = facts(scene), scene.units, scene.camera
+    unit, camera = scene.units, scene.camera
     size = " x ".join(f"{x:.4g}" for x in np.ptp(scene.solid.vertices, axis=0))
     view = " x ".join(f"{x:.4g}" for x in camera.field_of_view)
     parts = [
@@ -82,40 +70,54 @@ def report(scene: Scene) -> Group:
             f"Object {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
         )
     ]
-    corners = _table(f"\nVertices, {unit}", "name", "x", "y", "z")
-    for vertex in known["vertices"]:
-        corners.add_row(vertex["name"], *map(_number, vertex["at"]))
-    edges = _table(f"\nEdges, {unit}", "name", "from", "to", "length", "")
-    for edge in known["edges"]:
-        edges.add_row(edge["name"], *edge["ends"], _number(edge["length"]), "" if edge["convex"] else "inner")
-    circles = _table(f"\nCircles, {unit}", "name", "x", "y", "z", "diameter", "")
-    for circle in known["circles"]:
-        row = circle["name"], *map(_number, circle["centre"]), _number(circle["diameter"])
-        circles.add_row(*row, "hole" if circle["hole"] else "outer")
-    walls = _table(f"\nCylinders among the facets, {unit}", "name", "x", "y", "z", "axis", "diameter", "residual", "")
-    for wall in known["cylinders"]:
-        axis = " ".join(f"{x:z.2f}" for x in wall["axis"])
-        row = wall["name"], *map(_number, wall["point"]), axis, _number(wall["diameter"])
-        walls.add_row(*row, f"{wall['residual']:.1e}", "hole" if wall["hole"] else "outer")
-    curved = _table(
-        f"\nCurved surfaces to measure, {unit}", "name", "kind", "x", "y", "z", "axis", "radius", "residual"
-    )
-    for each in known["surfaces"]:
-        axis = " ".join(f"{x:z.2f}" for x in each["axis"] or ())
-        residual = "" if each["residual"] is None else f"{each['residual']:.1e}"
-        curved.add_row(
-            each["name"], each["kind"], *map(_number, each["centre"]), axis, _number(each["radius"]), residual
-        )
-    faces = _table(f"\nPlane faces, by their middles, {unit}", "name", "x", "y", "z", "normal", "material")
-    for face in known["faces"]:
-        normal = " ".join(f"{x:z.2f}" for x in face["normal"])
-        faces.add_row(face["name"], *map(_number, face["at"]), normal, face["material"] or "")
-    lights = _table(f"\nLights, {unit}", "kind", "mount", "distance", "intensity", "half size")
-    for light in scene.lights:
-        numbers = light.distance, light.intensity, light.half_size
-        lights.add_row(light.kind, light.mount, *(f"{value:.4g}" for value in numbers))
-    tables = (t for t in (corners, edges, circles, walls, curved, faces, lights) if t.row_count)
-    return Group(*parts, *tables, Text(_smooth(scene)))
+    found = (table(f"\n{title}, {unit}", *columns, rows=rows, words=_WORDS) for title, columns, rows in _tables(scene))
+    return Group(*parts, *(made for made in found if made.row_count), Text(_smooth(scene)))
+
+
+_WORDS = ("name", "kind", "mount", "")
+
+
+def _tables(scene: Scene) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """Title, columns and rows of each table."""
+    known = facts(scene)
+    yield "Vertices", ("name", *"xyz"), [(each["name"], *_place(each["at"])) for each in known["vertices"]]
+    yield "Edges", ("name", "from", "to", "length", ""), [
+        (each["name"], *each["ends"], _number(each["length"]), "" if each["convex"] else "inner")
+        for each in known["edges"]
+    ]  # fmt: skip
+    yield "Circles", ("name", *"xyz", "diameter", ""), [
+        (each["name"], *_place(each["centre"]), _number(each["diameter"]), _side(each)) for each in known["circles"]
+    ]  # fmt: skip
+    yield "Cylinders among the facets", ("name", *"xyz", "axis", "diameter", "residual", ""), [
+        (each["name"], *_place(each["point"]), _direction(each["axis"]), _number(each["diameter"]),
+         f"{each['residual']:.1e}", _side(each))
+        for each in known["cylinders"]
+    ]  # fmt: skip
+    yield "Curved surfaces to measure", ("name", "kind", *"xyz", "axis", "radius", "residual"), [
+        (each["name"], each["kind"], *_place(each["centre"]), _direction(each["axis"]), _number(each["radius"]),
+         "" if each["residual"] is None else f"{each['residual']:.1e}")
+        for each in known["surfaces"]
+    ]  # fmt: skip
+    yield "Plane faces, by their middles", ("name", *"xyz", "normal", "material"), [
+        (each["name"], *_place(each["at"]), _direction(each["normal"]), each["material"] or "")
+        for each in known["faces"]
+    ]  # fmt: skip
+    yield "Lights", ("kind", "mount", "distance", "intensity", "half size"), [
+        (light.kind, light.mount, *(f"{value:.4g}" for value in (light.distance, light.intensity, light.half_size)))
+        for light in scene.lights
+    ]  # fmt: skip
+
+
+def _place(at: list[float]) -> tuple[str, ...]:
+    return tuple(map(_number, at))
+
+
+def _direction(axis: list[float] | None) -> str:
+    return " ".join(f"{x:z.2f}" for x in axis or ())
+
+
+def _side(circle: dict[str, Any]) -> str:
+    return "hole" if circle["hole"] else "outer"
 
 
 def _surface(wall: Curved, recognised: Recognised | None) -> dict[str, Any]:
@@ -125,8 +127,8 @@ def _surface(wall: Curved, recognised: Recognised | None) -> dict[str, Any]:
     return {
         "name": wall.name,
         "kind": surface.kind,
-        "centre": wall.centre.tolist(),
-        "axis": None if axis is None else axis.tolist(),
+        "centre": wall.centre,
+        "axis": axis,
         "radius": wall.radius,
         "half_angle": getattr(surface, "half_angle_deg", None),
         "length": None if ends is None else ends[1] - ends[0],
@@ -155,10 +157,3 @@ def _smooth(scene: Scene) -> str:
 
 def _number(value: float) -> str:
     return f"{value + 0.0:.6g}" if abs(value) > 1e-9 else "0"
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), title_style="bold")
-    for name in columns:
-        table.add_column(name, justify="left" if name in ("name", "kind", "mount", "") else "right", no_wrap=True)
-    return table

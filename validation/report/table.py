@@ -12,7 +12,20 @@ from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report import guide
 from validation.report.cells import table as _table
-from validation.report.run_cells import errors, failed, far, names, number, ratio, shift, small, small_sigma
+from validation.report.run_cells import (
+    failed,
+    far,
+    is_printed,
+    names,
+    number,
+    of_errors,
+    of_measurand,
+    of_paper,
+    of_variances,
+    other_methods,
+    ratio,
+    small_sigma,
+)
 
 
 def report(found: Validation, explained: bool = False) -> Group:
@@ -55,8 +68,7 @@ def _what(found: Validation) -> str:
 def _variances(found: Validation) -> list[Table | Text]:
     rows, which = far(found)
     headings, cells = names(found, rows)
-    main, others = rows[0].main.method, list(dict.fromkeys(judged.method for row in rows for judged in row.classic))
-    printed = any(row.paper_ice or row.paper_real for row in found.rows)
+    main, others, printed = rows[0].main.method, other_methods(rows), is_printed(found)
     paper = ["paper\nICE", "ours\nICE", "ours/\npaper", "paper real\n12.0", "\n10.0"] if printed else []
     table = _table(
         f"\n{'Table 3: variance' if printed else 'Variance'} of {_what(found)}", *headings, *paper,
@@ -64,19 +76,15 @@ def _variances(found: Validation) -> list[Table | Text]:
         "Cramer-Rao\nbound",
     )  # fmt: skip
     for row in rows:
-        classic = {judged.method: judged.empirical for judged in row.classic}
-        table.add_row(
-            *cells[row.index], *(_paper(row) if printed else []), small(row.calibrated), small(row.main.propagated),
-            small(row.main.empirical), *(small(classic.get(name)) for name in others), small(row.bound),
-        )  # fmt: skip
+        table.add_row(*cells[row.index], *(_paper(row) if printed else []), *of_variances(row, others))
     images = max(row.main.n for row in rows)
     return [table, _lines([*guide.paper_terms(found), *guide.variance_terms([main, *others], images), which])]
 
 
 def _paper(row: Row) -> list[str]:
     """What the paper printed, and our number for it."""
-    against = number(row.paper / row.paper_ice if row.paper_ice else None)
-    return [number(row.paper_ice), number(row.paper), against, *map(number, row.paper_real or (None, None))]
+    theirs, ours, *real = of_paper(row)
+    return [theirs, ours, number(row.paper / row.paper_ice if row.paper_ice else None), *real]
 
 
 _PARTS = (
@@ -88,7 +96,7 @@ _PARTS = (
 def _ratios(found: Validation) -> list[Table | Text]:
     rows, which = far(found)
     headings, cells = names(found, rows)
-    main, others = rows[0].main.method, list(dict.fromkeys(j.method for row in rows for j in row.classic))
+    main, others = rows[0].main.method, other_methods(rows)
     uneven = any(row.texture is not None for row in rows)
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
@@ -99,8 +107,7 @@ def _ratios(found: Validation) -> list[Table | Text]:
         judged = {j.method: j for j in (row.main, *row.classic)}
         each = [ratio(judged[name]) if name in judged else "-" for name in (main, *others)]
         parts = [small_sigma(row.texture)] * uneven
-        shifts = shift(row.main.predicted_bias), *errors(row.main)
-        table.add_row(*cells[row.index], *each, str(row.main.n), failed(row), *parts, *shifts, row.main.status)
+        table.add_row(*cells[row.index], *each, str(row.main.n), failed(row), *parts, *of_errors(row))
     terms = guide.ratio_terms(main, 1 + len(others)) + legend(row.main.status for row in rows)
     return [table, _lines([*terms, *(_PARTS if uneven else ()), which])]
 
@@ -116,27 +123,18 @@ def _measurands(found: Validation) -> list[Table | Text]:
     )  # fmt: skip
     for row in rows:
         for each in row.measurands:
-            sigmas = (small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical))
-            bias = "-" if each.bias is None else f"{each.bias:+.2g}"
-            about = each.name, f"{each.value:.6g}", each.unit
-            table.add_row(*cells[row.index], *about, *sigmas, ratio(each), bias, each.status)
+            table.add_row(*cells[row.index], *of_measurand(each))
     statuses = (each.status for row in rows for each in row.measurands)
     return [table, _lines([*guide.unit_terms(statuses, _several(found)), which])]
 
 
 def _search(found: Validation) -> Table:
-    table = _table(
-        "\nTable 1 of the paper (its search), same free scale", "sensor", "light", "paper ICE", "ours ICE", "ours/paper"
-    )
-    for _, sensor, light, theirs, ours in found.search:
-        table.add_row(
-            shown(sensor),
-            shown(light),
-            number(theirs, 4),
-            number(ours, 4),
-            number(ours / theirs if theirs else None),
-        )
-    return table
+    columns = ("sensor", "light", "paper ICE", "ours ICE", "ours/paper")
+    rows = [
+        (shown(sensor), shown(light), number(theirs, 4), number(ours, 4), number(ours / theirs if theirs else None))
+        for _, sensor, light, theirs, ours in found.search
+    ]
+    return _table("\nTable 1 of the paper (its search), same free scale", *columns, rows=rows)
 
 
 _PAIRS = {
@@ -151,8 +149,7 @@ _PAIRS = {
 
 def _correlations(found: Validation) -> list[Table | Text]:
     claimed = found.correlation.get("claimed_by_paper")
-    table = _table("\nCorrelation of variances", "", "Pearson", "Spearman", "rows")
-    table.columns[0].justify = "left"
+    table = _table("\nCorrelation of variances", "", "Pearson", "Spearman", "rows", words=("",))
     for key, words in _PAIRS.items():
         pair = found.correlation.get(key)
         if pair:

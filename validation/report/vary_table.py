@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 from rich.console import Group
 from rich.table import Table
@@ -12,6 +11,7 @@ from rich.text import Text
 from planner import Chosen, Plan, Varied
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
+from validation.strict_json import plain
 from validation.vary_check import Scatter, VaryCheck
 
 _HELD = {
@@ -73,8 +73,8 @@ def facts(varied: Varied | None, checked: VaryCheck | None) -> dict | None:
     """For JSON; None without."""
     if varied is None:
         return None
-    return {
-        "vary": list(varied.vary),
+    return plain({
+        "vary": varied.vary,
         "hold": varied.hold,
         "gain": varied.gain,
         "gain_same_poses": varied.gain_same_poses,
@@ -84,7 +84,7 @@ def facts(varied: Varied | None, checked: VaryCheck | None) -> dict | None:
         "evaluated": varied.evaluated,
         "guarantee": varied.guarantee,
         "check": None if checked is None else _check(checked),
-    }
+    })  # fmt: skip
 
 
 def _fact(chosen: Chosen) -> dict:
@@ -104,24 +104,16 @@ def _check(checked: VaryCheck) -> dict:
         "fixed": _row(checked.fixed),
         "best": _row(checked.best),
         "predicted_gain": checked.predicted_gain,
-        "gain": _finite(checked.gain),
-        "gain_interval": [_finite(end) for end in checked.interval],
-        "p_value": _finite(checked.p_value),
+        "gain": checked.gain,
+        "gain_interval": checked.interval,
+        "p_value": checked.p_value,
         "verdict": checked.verdict,
     }
 
 
 def _row(row: Scatter) -> dict:
-    values = {name: _finite(getattr(row, name)) for name in ("predicted", "propagated", "measured")}
-    interval = [_finite(end) for end in row.interval]
-    return {
-        "measurand": row.measurand, **values, "interval": interval, "n": row.n, "failed": row.failed,
-        "status": row.status,
-    }  # fmt: skip
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    names = ("measurand", "predicted", "propagated", "measured", "interval", "n", "failed", "status")
+    return {name: getattr(row, name) for name in names}
 
 
 def _angle(value: float | None) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 import planner
+from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
+from validation.report.cells import sigma as _sigma
 from validation.report.cells import table as _table
 from validation.views_check import CheckedQuantity, ViewsCheck
 
@@ -129,11 +129,3 @@ def _interval(ratio: float | None, interval: tuple[float, float] | None) -> str:
         return "-"
     out = "" if interval[0] <= 1 <= interval[1] else " *"
     return f"{ratio:.3f} [{interval[0]:.3f}, {interval[1]:.3f}]{out}"
-
-
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None or not math.isfinite(value) else format(value, form)
-
-
-def _sigma(variance: float) -> str:
-    return f"{math.sqrt(variance):.3g}" if math.isfinite(variance) else "-"
