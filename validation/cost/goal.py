@@ -114,7 +114,7 @@ class Goal:
 
     accuracy: float | None = None
     budget: float | None = None
-    started: float = field(default_factory=time.perf_counter)
+    started: float = field(default_factory=lambda: time.perf_counter())
 
     def __post_init__(self) -> None:
         if self.accuracy is not None:

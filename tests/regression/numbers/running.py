@@ -34,6 +34,7 @@ from tests.regression.stored import CLOSED, RENDERED, SEARCHED
 from validation import boards, effects_check
 from validation.batch import cluster, pool, work
 from validation.batch.campaign import Case
+from validation.batch.options import RunOptions
 from validation.batch.work import Packed, Rendering
 from validation.cli import bar, commands, photograph, recorded
 from validation.cost import effects, goal, size, sweep, table, trial, watch
@@ -63,7 +64,8 @@ def without_seconds(found, *more):
 def _tried():
     said = []
     with mock.patch.object(trial, "SAMPLES", (4, 9)), mock.patch.object(trial, "_IMAGES", 6):
-        found = trial.trial(campaign(), 5, 3, 2, 0.5, lambda *about: said.append(about), Rendering(_QUICK), Watch(0.0))
+        options = RunOptions(seed=5, workers=3, rendering=Rendering(_QUICK))
+        found = trial.trial(campaign(), options, 2, 0.5, lambda *about: said.append(about), Watch(0.0))
     rendered = tuple(without_seconds(each) for each in found.rendered)
     return replace(found, rendered=rendered, seconds=0.0, model=0.0, image=0.0, start=0.0, setting=0.0), said
 
@@ -92,7 +94,9 @@ def _trial():
 def _one_tried():
     """A setting of a trial, step by step."""
     with mock.patch.object(trial, "_IMAGES", 20):
-        one = trial._Tried(campaign().case(1), "scalar_rgb", 3, Rendering(_QUICK), lambda: None)
+        one = trial._Tried(
+            campaign().case(1), "scalar_rgb", RunOptions(seed=3, rendering=Rendering(_QUICK)), lambda: None
+        )
         return {
             "linear": one.linearity(),
             "phase": one.phase(),
@@ -172,30 +176,28 @@ def _reached():
     """How a run with a goal is begun: what it asks the trial and the run for."""
     told, model = [], cost_model()
 
-    def tried(*about, **how):
-        told.append(["trial", about[1:], sorted(how), how["how"].effects, how["how"].tolerance])
+    def tried(_, options, settings, fine):
+        told.append(["trial", settings, fine, options.seed, options.workers, options.rendering])
         return model
 
-    def ran(_, *about, **how):
-        told.append(
-            ["run", about[:2], about[3:5], type(how["more"]).__name__, how["quality"], how["effects"], how["dask"]]
-        )
+    def ran(options, _, first, progress, more):
+        told.append(["run", first, type(more).__name__, options])
         return SimpleNamespace(rows=[])
 
-    say = []
-    with mock.patch.object(goal, "trial", tried), mock.patch.object(goal, "run", ran), ticking(0.25):
-        for how in (
-            {"accuracy": 0.08},
-            {"accuracy": 0.15},
-            {"accuracy": 0.149},
-            {"budget": 30.0},
-            {"budget": 140.0, "effects": "all"},
-            {"accuracy": 2.0},
-            {"accuracy": 0.001},
-            {"budget": 2.0, "tolerance": Tolerance(0.01, 0.1)},
-            {"budget": 90.0, "started": 95.0, "seed": 11, "workers": 2, "fresh": True},
+    say, loose = [], Rendering(tolerance=Tolerance(0.01, 0.1))
+    with mock.patch.object(goal, "trial", tried), mock.patch.object(goal, "run_by", ran), ticking(0.25):
+        for aim, options in (
+            ({"accuracy": 0.08}, RunOptions()),
+            ({"accuracy": 0.15}, RunOptions()),
+            ({"accuracy": 0.149}, RunOptions()),
+            ({"budget": 30.0}, RunOptions()),
+            ({"budget": 140.0}, RunOptions(rendering=Rendering(effects="all"))),
+            ({"accuracy": 2.0}, RunOptions()),
+            ({"accuracy": 0.001}, RunOptions()),
+            ({"budget": 2.0}, RunOptions(rendering=loose)),
+            ({"budget": 90.0, "started": 95.0}, RunOptions(seed=11, workers=2, fresh=True)),
         ):
-            found = without_error(lambda h=how: goal.reach(campaign(), say=say.append, **h)[1])
+            found = without_error(lambda a=aim, o=options: goal.reach(campaign(), goal.Goal(**a), o, say=say.append)[1])
             told.append(found if isinstance(found, str) else [found.asked, found.unit, found.choice, found.seconds])
     return {"told": told, "said": say}
 
