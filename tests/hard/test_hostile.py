@@ -672,7 +672,9 @@ def test_progress_when_piped(monkeypatch, capsys):
     assert capsys.readouterr().err.splitlines() == [f"night: {n} of 30 images" for n in (10, 20, 30)]
     monkeypatch.setattr(verbosity, "_quiet", True)
     with common.progress("night") as shown:
-        assert shown is None
+        now[0] += 60
+        shown("images", 30, 30)
+    assert capsys.readouterr().err == ""
 
 
 def test_quiet_and_verbose_may_stand_anywhere(tiny, tmp_path):

@@ -34,7 +34,7 @@ def calibrate_command(
     from validation.report import calibration_table
 
     with progress(f"{loaded.name}: locators", unit="levels") as shown:
-        found = calibrate(loaded, images, seed, shown or (lambda *_: None))
+        found = calibrate(loaded, images, seed, shown)
     if output is not None:
         from validation.report import calibration_figure  # matplotlib takes half a second to load
 

@@ -119,13 +119,13 @@ def say(facts: dict, as_json: bool, text: str) -> None:
 
 
 @contextmanager
-def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterator[Report | None]:
+def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterator[Report]:
     """Progress on standard error: a bar with rate and time left if that is a terminal, else a line every 10 s.
 
     ``at_once`` says already in the first second that there is work, and then a line every 3 s.
     """
     if verbosity.quiet():
-        yield None
+        yield lambda *_: None
         return
     errors = console(stderr=True)
     if not errors.is_terminal:

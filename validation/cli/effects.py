@@ -45,7 +45,7 @@ def effects_command(
     rows = []
     if check_them:
         with progress(f"{loaded.name}: effects") as shown:
-            rows = check(loaded, limits, progress=shown or (lambda *_: None))
+            rows = check(loaded, limits, progress=shown)
     facts = {
         "scene": loaded.name,
         "tolerance": {"bias_px": limits.bias_px, "variance": limits.variance},

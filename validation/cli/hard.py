@@ -36,8 +36,7 @@ def hard_command(
     with progress("hard cases", "cases") as report:
         for case in wanted:
             rows.append(hard.run(case))
-            if report:
-                report("cases", len(rows), len(wanted))
+            report("cases", len(rows), len(wanted))
     if precision is not None:
         from validation.report.precision_figure import draw
 

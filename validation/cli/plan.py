@@ -208,7 +208,7 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
 
     began = time.perf_counter()
     with progress(f"{scene.name}: searching", "sensors") as shown:
-        found = planner.plan(scene, objective, **how, report=shown or (lambda *_: None))
+        found = planner.plan(scene, objective, **how, report=shown)
     return found, time.perf_counter() - began
 
 
@@ -216,14 +216,14 @@ def _check(found: planner.Plan, count: int) -> PlanCheck:
     from validation.plan_check import check_plan
 
     with progress(f"{found.scene.name}: rendering the best", "settings") as shown:
-        return check_plan(found, count, report=shown or (lambda *_: None))
+        return check_plan(found, count, report=shown)
 
 
 def _check_varied(found: planner.Plan) -> VaryCheck:
     from validation.vary_check import check_varied
 
     with progress(f"{found.scene.name}: measuring both choices", "plans") as shown:
-        return check_varied(found, report=shown or (lambda *_: None))
+        return check_varied(found, report=shown)
 
 
 def _range(option: str, text: str | None) -> tuple[float, float]:

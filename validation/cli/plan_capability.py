@@ -21,7 +21,7 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
     began = time.perf_counter()
     step = how.pop("step_deg") or STEP_DEG
     with progress(f"{scene.name}: searching", "steps") as shown:
-        found = plan_capability(scene, step_deg=step, **how, report=shown or (lambda *_: None))
+        found = plan_capability(scene, step_deg=step, **how, report=shown)
     seconds = time.perf_counter() - began
     if as_json:
         say(facts(scene, found, step, seconds), True, "")

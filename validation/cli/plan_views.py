@@ -39,7 +39,7 @@ def run(
 
     began = time.perf_counter()
     with progress(f"{scene.name}: searching", "steps") as shown:
-        found = planner.plan_views(scene, count, objective, **how, report=shown or (lambda *_: None))
+        found = planner.plan_views(scene, count, objective, **how, report=shown)
     seconds = time.perf_counter() - began
     check = _check(found) if checked else None
     pictures = _pictures(found, out) if out else []
@@ -60,7 +60,7 @@ def _check(found: planner.Views) -> ViewsCheck:
     from validation.views_check import check_views
 
     with progress(f"{found.scene.name}: rendering", "pictures") as shown:
-        return check_views(found, report=shown or (lambda *_: None))
+        return check_views(found, report=shown)
 
 
 def _pictures(found: planner.Views, out: Path) -> list[Path]:

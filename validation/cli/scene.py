@@ -31,7 +31,7 @@ def new_command(part: Part, output: Output = None, units: Units = "mm", as_json:
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
 
-        made = written(part, path, units, shown or (lambda *_: None))
+        made = written(part, path, units, shown)
     facts = {"file": str(path), "edges": len(made.solid.sharp), "circles": len(made.solid.circles)}
     text = (
         f"{path}: {facts['edges']} edges, {facts['circles']} circles; ice show {path} lists them, ice plan {path} plans"
