@@ -293,7 +293,7 @@ def _or_one_light(best: Searched, taken: RayTraced, refined: bool) -> tuple[Sear
     if alone is None:
         return problem, taken, None
     single = replace(problem, scene=with_shares(problem.scene, alone.shares))
-    if refined:
+    if refined and best.grid.free:
         end = refine(single, (alone.sensor, alone.lights), best.grid.step_deg)
         alone = Mixture(end.value, alone.shares, end.sensor, end.lights)
     if alone.value < taken.value:

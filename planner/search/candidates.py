@@ -62,7 +62,7 @@ class Searched:
     def of(cls, problem: SearchProblem, grid: Grid, search: str, start: Any, shares: str, report: Report) -> Searched:
         """Search all poses of a grid, and the shares of two lights where asked."""
         scene, limits = problem.scene, problem.constraints
-        if len(scene.lights) > 1 and grid.free:
+        if len(scene.lights) > 1 and (grid.free or (scene.free and not grid.held[1])):
             shared = best_lights(problem, grid, shares, report)
             problem, grid = replace(problem, scene=shared.scene), replace(grid, lights=shared.lights)
             at = shared.found.sensor

@@ -87,6 +87,18 @@ def test_lights_by_turns_with_a_circle():
     assert tried.min() >= found.grid_variance * (1 - 1e-6)  # margin: a minimum, by its kind
 
 
+@pytest.mark.parametrize("shares", ["best", "given"])
+def test_a_sensor_that_is_held_keeps_its_place_and_gets_the_best_lights(scene, shares):
+    """Held where the free plan puts it, and elsewhere, with and without a descent below the grid."""
+    free = planner.plan(scene, step_deg=60, shares=shares, refined=False)
+    held = planner.plan(scene, step_deg=60, shares=shares, sensor=free.sensor, refined=False)
+    assert (held.sensor, held.light, held.shares) == (free.sensor, free.light, free.shares)
+    assert held.variance == pytest.approx(free.variance, rel=1e-9)
+    other = planner.plan(scene, step_deg=60, shares=shares, sensor=(58.3, 275.1))
+    assert other.sensor == (58.3, 275.1)
+    assert np.isfinite(other.variance)
+
+
 def test_what_cannot_be_planned(scene):
     with pytest.raises(InvalidInput, match="lights must be one that is free, for several pictures, got 2"):
         planner.plan_views(scene, 2)
