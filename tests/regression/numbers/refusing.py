@@ -97,7 +97,6 @@ _TRIED = {
         "unknown": (1,),
         "camera.unknown": (1,),
         "uncertainty": (
-            {"covariance": "none.json"},
             {"k": 0},
             {"rounding": -1},
             {"rounding": 0.01},
