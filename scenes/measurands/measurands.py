@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from scenes.measurands.features import AnyFeature, Centre, Corner, Feature, Side, Wall, place_of
 from scenes.measurands.kinds import MEASURANDS
-from scenes.model import Model, Title
+from scenes.model import Model, Name, Title
 from scenes.parts.solid import Solid
 from scenes.ranges import Coordinate, Positive, Spread
 from scenes.registry import NameOf
@@ -176,12 +176,14 @@ class Locator(Model):
 
     ``scale_px`` is the standard deviation of the smoothing Gaussian, ``window_px`` how far to each side
     of the expected edge is searched, ``thresholds`` the gradient thresholds (grey levels a pixel) of the
-    classic edge detector; the paper used 12 and 10.
+    classic edge detector; the paper used 12 and 10. ``estimators`` are those by which ``ice validate`` measures: its
+    verdict is about the first, the others are shown beside it; ``canny`` stands for one with each threshold.
     """
 
     scale_px: Annotated[float, Field(ge=0.8, le=10)] = 1.0
     window_px: Annotated[float, Field(ge=1, le=50)] = 3.0
     thresholds: tuple[Positive, ...] = (12.0, 10.0)
+    estimators: Annotated[tuple[Name, ...], Field(min_length=1, max_length=20)] = ("gradient", "canny")
 
 
 def check_quantity(solid: Solid, key: str, quantity: Quantity) -> None:

@@ -7,8 +7,10 @@ import pytest
 
 import scenes
 from scenes import InvalidInput
+from tests.oracle import block_image
 from validation.batch import campaign
 from validation.batch.campaign import Campaign, Grid
+from validation.batch.work import methods, render_setting
 
 
 @pytest.fixture
@@ -131,3 +133,35 @@ def test_samples_are_the_scenes_with_some_of_their_poses(task1):
     assert whole == task1
     (some,) = Campaign.of(task1).samples(4)
     assert [setting.sensor for setting in some.settings] == [task1.settings[i].sensor for i in (0, 5, 10, 15)]
+
+
+def test_a_campaign_is_measured_by_the_estimators_that_are_asked_for(task1):
+    """In their order, the classic detector once a threshold; only of the classic ones a bias is predicted."""
+    asked = Campaign.of(task1).measured_by(("arrangement", "canny"))
+    assert [method.name for method in methods(asked.scenes[0])] == ["arrangement", "canny@12", "canny@10"]
+    assert [method.name for method in methods(task1)] == ["gradient", "canny@12", "canny@10"]
+    known = {
+        name: render_setting(Campaign.of(task1).measured_by((name,)).case(0), "scalar_rgb", image=task1_image(task1))
+        for name in ("gradient", "arrangement")
+    }
+    assert known["gradient"].predicted["predicted_bias"] != 0
+    assert known["arrangement"].predicted["predicted_bias"] == 0
+    assert known["arrangement"].predicted["measurands"][0]["predicted_bias"] == 0
+    assert next(iter(known["arrangement"].propagated)) == "arrangement"
+
+
+def task1_image(task1):
+    """Of its first setting, by the closed form."""
+    return block_image(task1, tuple(task1.settings[0].sensor), tuple(task1.settings[0].light))
+
+
+@pytest.mark.parametrize("names", [("gradient", "gradient"), ("none",), ("gradient", "none")])
+def test_estimators_that_are_none_are_refused(task1, names):
+    with pytest.raises(InvalidInput, match=r"locator\.estimators must be different ones of .*gradient.*, got "):
+        methods(Campaign.of(task1).measured_by(names).scenes[0])
+
+
+def test_the_detector_alone_needs_a_threshold(task1):
+    bare = task1.with_(locator={"thresholds": [], "estimators": ["canny"]})
+    with pytest.raises(InvalidInput, match=r"locator\.thresholds must be given where canny is the only estimator"):
+        methods(bare)

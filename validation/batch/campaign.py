@@ -112,6 +112,13 @@ class Campaign(Model):
         """The campaign that is one scene with its own settings."""
         return scene if isinstance(scene, Campaign) else cls(name=scene.name, title=scene.title, scenes=(scene,))
 
+    def measured_by(self, estimators: tuple[str, ...]) -> Campaign:
+        """The same, measured by these estimators (`Locator.estimators`)."""
+        scenes = tuple(
+            scene.with_(locator=scene.locator.model_copy(update={"estimators": estimators})) for scene in self.scenes
+        )
+        return self.model_copy(update={"scenes": scenes})
+
     def __len__(self) -> int:
         return self._ends[-1]
 

@@ -26,13 +26,14 @@ def column(method: str, number: int) -> str:
     return f"{method}:{number}"
 
 
-def predicted(forecasts: dict[str, planner.Prediction]) -> list[dict[str, Any]]:
-    """What the variance models say of each measurand, by model; variances in the object."""
+def predicted(forecasts: dict[str, planner.Prediction], biased: str) -> list[dict[str, Any]]:
+    """What the variance models say of each measurand, by model, and ``biased`` of its bias; in the object."""
     told = []
     for k, each in enumerate(forecasts["calibrated"].measurands):
+        bias = forecasts[biased].measurands[k].bias_object
         variances = {model: forecasts[model].measurands[k].variance_object for model in FIELDS}
         about = {"name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object}
-        told.append({**about, "predicted_bias": each.bias_object, **texture(each.texture_variance_object), **variances})
+        told.append({**about, "predicted_bias": bias, **texture(each.texture_variance_object), **variances})
     return told
 
 

@@ -24,7 +24,7 @@ from scenes import InvalidInput, Jitter, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
 from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
-from validation.remeasured import GRADIENT, Method, Values, batches, remeasured
+from validation.remeasured import Method, Values, batches, remeasured
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time, and fewer of more than ...
@@ -34,8 +34,26 @@ _RENDERER = threading.Lock()  # a Dask worker may have several threads, and Mits
 
 
 def methods(scene: Scene) -> tuple[Method, ...]:
-    """All methods that a run compares; the first is the one its verdict is about."""
-    return (GRADIENT, *(Method("canny", threshold) for threshold in scene.locator.thresholds))
+    """All methods that a run compares; the first is the one its verdict is about.
+
+    Raises
+    ------
+    InvalidInput
+        If a name is no estimator's or comes twice, or ``canny`` is alone and has no threshold.
+    """
+    names = scene.locator.estimators
+    for i, name in enumerate(names):
+        if name in names[:i] or name not in measure.ESTIMATORS:
+            known = ", ".join(measure.ESTIMATORS)
+            raise InvalidInput(f"locator.estimators must be different ones of {known}, got {', '.join(names)}")
+    found = [_methods(name, scene.locator.thresholds) for name in names]
+    if not any(found):
+        raise InvalidInput("locator.thresholds must be given where canny is the only estimator, got none")
+    return tuple(method for some in found for method in some)
+
+
+def _methods(name: str, thresholds: tuple[float, ...]) -> list[Method]:
+    return [Method(name, threshold) for threshold in thresholds] if name == "canny" else [Method(name)]
 
 
 class Packed(NamedTuple):
@@ -196,9 +214,10 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     scene, picture = case.scene, case.picture
     predicted = {model: planner.predict(picture, model=model) for model in ("paper", "calibrated", "bound")}
     numbers = {model: found.variance_image for model, found in predicted.items()}
-    numbers |= {"value_px": predicted["calibrated"].value_image, "predicted_bias": predicted["calibrated"].bias_image}
+    biased = "calibrated" if measure.ESTIMATORS[methods(scene)[0].locator].bias_predicted else "bound"
+    numbers |= {"value_px": predicted["calibrated"].value_image, "predicted_bias": predicted[biased].bias_image}
     numbers |= measurands.texture(predicted["calibrated"].measurands[0].texture_variance_image)
-    numbers["measurands"] = measurands.predicted(predicted)
+    numbers["measurands"] = measurands.predicted(predicted, biased)
     clock.lap("predict")
     photographed = image is not None
     if not photographed:

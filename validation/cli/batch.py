@@ -60,6 +60,12 @@ Photos = Annotated[
 ExactPoses = Annotated[
     bool, typer.Option("--exact-poses", help="With --photos: poses are exactly those said, so judge mean errors, too.")
 ]
+Estimators = Annotated[
+    str | None,
+    typer.Option(
+        "--estimators", metavar="LIST", help="By which is measured, with commas between; the first is judged."
+    ),
+]
 Explain = Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")]
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
@@ -80,6 +86,7 @@ def validate_command(
     variance: LeaveOutVariance = None,
     photos: Photos = None,
     exact_poses: ExactPoses = False,
+    estimators: Estimators = None,
     explain: Explain = False,
     log_json: LogJson = False,
     as_json: Json = False,
@@ -97,6 +104,7 @@ def validate_command(
     check_number("workers", workers, 1, MOST_WORKERS)
     check_seed(seed)
     loaded = campaign.load(scene)
+    loaded = loaded if estimators is None else _measured_by(loaded, estimators)
     out = out or Path("runs") / loaded.name
     check_directory("--out", out)
     from validation.batch.job import run_by
@@ -123,6 +131,16 @@ def validate_command(
         one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
         _print_tables(found, reached, out, one, explain)
     raise typer.Exit(0 if found.verdict.agrees else 1)
+
+
+def _measured_by(loaded: campaign.Campaign, estimators: str) -> campaign.Campaign:
+    """By estimators of a list with commas between, each of which there must be."""
+    from validation.batch.work import methods
+
+    loaded = loaded.measured_by(tuple(name.strip() for name in estimators.split(",")))
+    for scene in loaded.scenes:
+        methods(scene)
+    return loaded
 
 
 def _photographs(
