@@ -11,7 +11,7 @@ from scenes import InvalidInput
 from tests.sequential import simulate
 from validation.batch.campaign import Campaign
 from validation.batch.stages import Stages
-from validation.cost import goal, interval
+from validation.cost import goal, interval, rays
 from validation.cost.model import CostModel, Rendered, combined, qualities
 from validation.cost.parameter import slope
 from validation.cost.points import points_parameter
@@ -148,3 +148,14 @@ def test_slope_of_points_agrees_with_theory_and_gauss_beats_them():
 
 def test_quality_names():
     assert {quality.supersample for quality in qualities(1, 4)} == {Quality().supersample}
+
+
+def test_scatter_over_images_is_of_samples_that_have_their_own_mean():
+    """Two settings of three images: sums of squares over two, corners' mean over both coordinates, noise beside."""
+    corners = [np.array([[10.0, 20.0], [30.0, 41.0]]) + step * np.array([[1, 0], [0, 2]]) for step in (-1, 0, 1)]
+    first = [(place, value, 0.5) for place, value in zip(corners, (7.0, 9.0, 11.0), strict=True)]
+    second = [(corners[0], value, 0.25) for value in (3.0, 3.0, 6.0)]
+    found = rays._scatter(list(zip(first, second, strict=True)))
+    corner2 = np.mean([(1 + 4) / 4, 0.0])
+    distance2, relative2 = np.mean([4.0, 3.0]), np.mean([4.0 / 0.5, 3.0 / 0.25])
+    assert found == pytest.approx([corner2**0.5, distance2**0.5, relative2**0.5], rel=1e-12)

@@ -68,6 +68,7 @@ def axis(axis):
         "words": [text.get_text() for text in texts], "scales": [axis.get_xscale(), axis.get_yscale()],
         "ends": [*axis.get_xlim(), *axis.get_ylim()] if axis.name == "rectilinear" else [],
         "ticks": [label.get_text() for label in (*axis.get_xticklabels(), *axis.get_yticklabels())],
+        **({"view": [axis.elev, axis.azim, axis.roll]} if hasattr(axis, "elev") else {}),
     }  # fmt: skip
 
 
