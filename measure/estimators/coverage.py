@@ -8,7 +8,6 @@ from scipy.special import ndtr
 _X, _W = np.polynomial.legendre.leggauss(4)
 NODES = np.stack(np.meshgrid(_X / 2, _X / 2), -1).reshape(-1, 2)  # within a pixel, px
 NODE_WEIGHTS = np.outer(_W, _W).ravel() / 4
-_FAR = 7.0  # standard deviations beyond which a half-plane is complete
 
 
 def half_plane(u: np.ndarray) -> np.ndarray:

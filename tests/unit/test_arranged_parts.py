@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from measure.features import contrasts
-from measure.features.arranged import _is_beyond
+from measure.features.arranged import _area, _inverted, _is_beyond
 from measure.features.contrasts import _contrast
 from measure.features.locating import _rivals
 from scenes import Noise
@@ -99,3 +99,40 @@ def test_edges_within_the_image(start, stop, shown):
         vertices=np.array([start, stop], float), required=np.array([[0, 1]]), recorded=lambda places: places
     )
     assert contrasts._shown(SimpleNamespace(arrangement=arrangement, shape=(20, 40))).tolist() == [shown]
+
+
+def beside_an_edge(vertices):
+    """A tool for a triangle, region 1, and a quadrilateral, region 2, that share piece 1, the only one of an edge.
+
+    Region 3, beside none, is the triangle the other way round.
+    """
+    pieces = np.array([[0, 1], [1, 2], [2, 0], [2, 1], [1, 3], [3, 4], [4, 2], [1, 0], [2, 1], [0, 2]])
+    sides = np.array([[1, 0], [1, 2], [1, 0], [0, 0], [2, 0], [2, 0], [2, 0], [3, 0], [3, 0], [3, 0]])
+    edges = np.array([-1, 5, -1, -1, -1, -1, -1, -1, -1, -1])
+    arrangement = SimpleNamespace(pieces=pieces, sides=sides, edges=edges)
+    return SimpleNamespace(arrangement=arrangement), np.array(vertices, float)
+
+
+PLACES = [[0, 0], [5, 1], [2, 7], [9, 3], [6, 8]]
+
+
+def test_areas_are_those_of_the_shoelace_formula():
+    """Triangle and quadrilateral share a piece: the second counts it the other way round."""
+    tool, vertices = beside_an_edge([PLACES, np.array(PLACES) * [1, -2]])
+    for region, corners in ((1, [0, 1, 2]), (2, [2, 1, 3, 4])):
+        x, y = np.array(PLACES, float)[corners].T
+        area = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) / 2
+        assert area == pytest.approx({1: 16.5, 2: 26.5}[region])
+        assert _area(tool.arrangement, region, vertices) == pytest.approx([area, -2 * area])
+
+
+@pytest.mark.parametrize(
+    ("vertex", "place", "inverted"),
+    [(0, [0, 0], False), (0, [6, 6], True), (4, [6, 8], False), (4, [2.8, -20.4], True), (3, [-60, 3], True)],
+)
+def test_a_face_turned_inside_out_is_seen(vertex, place, inverted):
+    """Whichever of the two faces beside the required edge it is, in whichever image."""
+    turned = [list(each) for each in PLACES]
+    turned[vertex] = place
+    tool, vertices = beside_an_edge([PLACES, turned, PLACES])
+    assert _inverted(tool, vertices).tolist() == [False, inverted, False]

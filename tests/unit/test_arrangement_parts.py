@@ -74,6 +74,21 @@ def test_second_derivative(tool):
     assert np.abs(point.fisher[:first, :first] - numeric).max() > 1e-2 * size
 
 
+def test_drawn_images_tell_as_much_as_the_columns_say(tool, fit, rng):
+    """Columns that tell of one combination alone: linear answers along it, of its size, each draw with its opposite."""
+    expansion = tool.centre(fit).expansion
+    along = rng.normal(size=len(expansion.gram))
+    thin = replace(expansion, gram=0.04 * np.outer(along, along))
+    linear = thin.drawn(400).linear
+    ahead, behind = (expansion._columns(sign * 1e-4 * np.eye(len(expansion.inverse))) @ along for sign in (1, -1))
+    slopes = (ahead - behind) / 2e-4
+    answer = 0.2 * slopes @ expansion.inverse
+    draws = linear @ answer / (answer @ answer)
+    assert linear == pytest.approx(draws[:, None] * answer, abs=1e-6 * np.abs(answer).max())
+    assert draws[:200] == pytest.approx(-draws[200:])
+    assert np.square(draws).mean() == pytest.approx(1, abs=0.4)  # margin: chance of 200: 4 sqrt(2 / 200)
+
+
 @pytest.mark.parametrize(("before", "after"), [(0.0, 0.0), (5e-4, 0.0), (1e-3, 0.0), (0.2, 0.02)])
 def test_damping_fades_where_steps_succeed(before, after):
     """Of the parabola (x - 1)^2; a step is damped so much that 1 + damping times it ends at 1."""
