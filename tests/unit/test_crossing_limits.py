@@ -1,7 +1,8 @@
-"""How far zero crossings are sought: beside an edge in half steps of Newton's method, beside a limb."""
+"""Where zero crossings are sought, and how far: beside an edge in half steps of Newton's method, beside a limb."""
 
 import numpy as np
 import pytest
+from scipy import sparse
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -11,6 +12,7 @@ from imaging.contours.shading import Profile
 from imaging.features.limb_locator import limb_crossing
 from imaging.features.locator import edge_blur
 from imaging.models.bias import _zero
+from measure.estimators.crossing import STEP, CrossingLocator
 
 
 def steps(*apart: float) -> Boundaries:
@@ -56,3 +58,24 @@ def test_a_limb_s_crossing_beside_an_uneven_profile(coefficients):
     signs = np.sign([second(place) for place in places])
     assert (signs == signs[0]).all()  # none is nearer that way
     assert brentq(second, found - 0.05, found + 0.05, xtol=1e-12) == pytest.approx(found, abs=1e-8)
+
+
+def test_a_profile_that_crosses_nowhere_is_told_from_one_that_does():
+    """Cubics along three positions, told by themselves: place, slope as contrast, and what is 0 where there is none."""
+    offsets = -3.0 + STEP * np.arange(9)
+    roots, slopes = [-1.3, 0.4, 0.0], [-2.0, -0.7, 0.0]
+    profiles = [
+        k * (offsets - r) * (1 + 0.1 * (offsets - r) + 0.03 * (offsets - r) ** 2) for r, k in zip(roots, slopes)
+    ]
+    profiles[2] = 5.0 + offsets**2
+    image = np.concatenate(profiles)[None, None]
+    empty = np.zeros((3, 0)), np.zeros((0, 27))
+    tool = CrossingLocator(
+        np.array([0.0, 1.0, 3.0]), offsets, np.arange(27), sparse.eye_array(27).tocsr(), np.array([4.0, 5.0, 6.0]),
+        np.array([1.0, 1.5, 2.0]), *empty,
+    )  # fmt: skip
+    each = tool.locate_each(image)
+    assert each.valid.tolist() == [[True, True, False]]
+    assert each.offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)
+    assert each.contrast[0] == pytest.approx([4 * 2.0, 5 * 0.7, 0.0], rel=1e-9)
+    assert tool.locate(image).offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)
