@@ -65,7 +65,8 @@ def test_a_profile_that_crosses_nowhere_is_told_from_one_that_does():
     offsets = -3.0 + STEP * np.arange(9)
     roots, slopes = [-1.3, 0.4, 0.0], [-2.0, -0.7, 0.0]
     profiles = [
-        k * (offsets - r) * (1 + 0.1 * (offsets - r) + 0.03 * (offsets - r) ** 2) for r, k in zip(roots, slopes)
+        k * (offsets - r) * (1 + 0.1 * (offsets - r) + 0.03 * (offsets - r) ** 2)
+        for r, k in zip(roots, slopes, strict=False)
     ]
     profiles[2] = 5.0 + offsets**2
     image = np.concatenate(profiles)[None, None]
