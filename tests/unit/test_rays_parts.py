@@ -1,5 +1,9 @@
 """Random numbers of the rays, and how many are traced at once, without a compiled variant."""
 
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from scipy.stats import kstest
@@ -42,3 +46,64 @@ def test_strata():
     assert (np.sort(found, 1) == np.arange(16)).all()
     assert len({tuple(row) for row in found.tolist()}) == 64
     assert kstest((found[:, 0] + 0.5) / 16, "uniform").pvalue > 1e-3
+
+
+class Place(NamedTuple):
+    """Two numbers of each ray."""
+
+    x: np.ndarray
+    y: np.ndarray
+
+
+class Lens:
+    """A sensor that keeps where its rays are asked for; each weighs 2 and brings what the next fine pixel does."""
+
+    def sample_ray(self, time, wavelength, place, aperture):
+        self.place, self.aperture = place, aperture
+        return "ray", [2.0]
+
+
+class Traced(Rays):
+    """Whose rays bring their own number."""
+
+    def _follow(self, scene, ray, point):
+        return point.astype(float)
+
+
+@pytest.fixture
+def numpy_for_drjit(monkeypatch):
+    """NumPy in the place of a compiled variant's arrays."""
+    module = ModuleType("drjit")
+    module.arange = lambda kind, count: np.arange(count)
+    module.gather = lambda kind, values, index: values[index]
+    module.block_sum = lambda values, size: values.reshape(-1, size).sum(1)
+    monkeypatch.setitem(sys.modules, "drjit", module)
+    seeded = {}
+
+    def seed(number, count):
+        seeded["seed"], seeded["count"] = number, count
+
+    def jitter():
+        return Place(np.full(seeded["count"], 0.25), np.full(seeded["count"], 0.75))
+
+    sampler = SimpleNamespace(seed=seed, next_2d=jitter)
+    mitsuba = SimpleNamespace(UInt32=np.asarray, Float=np.asarray, Point2f=Place, load_dict=lambda _: sampler)
+    return SimpleNamespace(mitsuba=mitsuba, seeded=seeded)
+
+
+def test_each_fine_pixel_is_crossed_in_all_its_strata(numpy_for_drjit):
+    """Of a crop of 5 rows and 8 columns; a pixel has 2 x 2 fine ones, each with a block of 16 points of the table."""
+    rays, lens = Traced(numpy_for_drjit.mitsuba, 2, 9, 0, 11), Lens()
+    rows, columns = np.array([0, 3, 4]), np.array([7, 2, 5])
+    found = rays._part(SimpleNamespace(sensors=lambda: [lens]), rows, columns, (5, 8), 4, 40)
+    cells = np.array([1, 2, 1])  # of their pixels: row and column are even or odd
+    points = (16 * cells[:, None] + np.arange(4)).ravel()
+    assert found == pytest.approx(2 * (16 * cells + 1.5))
+    assert numpy_for_drjit.seeded == {"seed": 11 + 1 + 40, "count": 12}
+    strata = rays._strata(4).reshape(4, 4)[cells]
+    x = (columns[:, None] + (strata % 2 + 0.25) / 2) / 8
+    y = (rows[:, None] + (strata // 2 + 0.75) / 2) / 5
+    assert lens.place.x == pytest.approx(x.ravel())
+    assert lens.place.y == pytest.approx(y.ravel())
+    assert (np.array(lens.aperture) == rays._table[:2, points]).all()
+    assert (np.array(rays._pair(points, 6)) == rays._table[6:8, points]).all()

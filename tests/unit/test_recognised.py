@@ -35,6 +35,16 @@ def test_a_rod(sections):
     assert not surface.hollow
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_a_rod_of_any_size_is_none_s_wall(size):
+    mesh = trimesh.creation.cylinder(2.0 * size, 5.0 * size, sections=24)
+    tube = trimesh.creation.annulus(1.0 * size, 2.0 * size, 5.0 * size, sections=24)
+    assert [each.surface.hollow for each in cylinders(solid(mesh))] == [False]
+    assert {round(each.surface.radius / size): each.surface.hollow for each in cylinders(solid(tube))} == {
+        1: True, 2: False,
+    }  # fmt: skip
+
+
 def test_single_precision_leaves_its_residual():
     mesh, _ = turned(trimesh.creation.cylinder(2.0, 5.0, sections=64), 1)
     mesh = trimesh.load_mesh(trimesh.util.wrap_as_stream(mesh.export(file_type="stl")), file_type="stl")

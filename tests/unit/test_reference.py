@@ -60,3 +60,15 @@ def test_bundled_scenes_keep_the_schema(name):
     document = tomllib.loads((BUNDLED / f"{name}.toml").read_text())
     assert list(unknown(document, whole, whole)) == []
     assert list(unknown({**document, "camera": {"zoom": 2}}, whole, whole))
+
+
+def test_limits_are_those_of_a_value_or_of_a_list_s_first():
+    """Of alternatives each; what is said twice is said once."""
+    number = {"minimum": 1, "maximum": 2.5}
+    assert reference._limits(number) == ">= 1, <= 2.5"
+    assert reference._limits({"prefixItems": [number, {"minimum": 7}]}) == ">= 1, <= 2.5"
+    assert reference._limits({"items": {"exclusiveMinimum": 0}}) == "> 0"
+    several = {"anyOf": [{"maximum": 4}, {"prefixItems": [{"exclusiveMaximum": 5}, {"maximum": 6}]}, {"maximum": 4}]}
+    assert reference._limits(several) == "<= 4, < 5"
+    assert reference._limits({"maxLength": 9}) == "at most 9 characters"
+    assert reference._limits({}) == ""

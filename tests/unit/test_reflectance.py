@@ -71,6 +71,15 @@ def test_fresnel(n, k, degrees):
     assert np.allclose(fresnel(cosine, n, k), [float(x) for x in exact], rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.parametrize("n", [1e-3, 1e-100, 1e-200])
+def test_fresnel_of_next_to_no_index(n):
+    """Straight on the amplitudes are opposite whatever the index, also where its square is no number any more."""
+    parallel, perpendicular = textbook.amplitudes(1.0, n, 0.0)
+    exact = abs(parallel) ** 2, abs(perpendicular) ** 2, (parallel * mp.conj(perpendicular)).real
+    assert np.allclose(fresnel(1.0, n, 0.0), [float(x) for x in exact], rtol=1e-11)
+    assert exact[2] < 0
+
+
 def test_fresnel_as_printed_is_wrong():
     """Negative control: with the printed sin^2 cos^2 in rho_parallel, Brewster's angle does not extinguish."""
     angle = np.arctan(1.5)

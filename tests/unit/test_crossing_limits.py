@@ -1,0 +1,82 @@
+"""Where zero crossings are sought, and how far: beside an edge in half steps of Newton's method, beside a limb."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from imaging.blurred.boundaries import Boundaries
+from imaging.blurred.segment import Segments
+from imaging.contours.shading import Profile
+from imaging.features.limb_locator import limb_crossing
+from imaging.features.locator import edge_blur
+from imaging.models.bias import _zero
+from measure.estimators.crossing import STEP, CrossingLocator
+
+
+def steps(*apart: float) -> Boundaries:
+    """An endless unit step beside each place, px away along its own normal."""
+    count = len(apart)
+    one, none = np.ones(count), np.zeros(count)
+    parts = Segments(-99 * one, 99 * one, np.array(apart), one, none, one, none, none)
+    sides = np.tile([0.0, 1.0], (count, 1))
+    return Boundaries(np.arange(count), np.ones(count, bool), parts, sides, np.zeros((count, 2)), np.zeros(count, bool))
+
+
+def test_a_crossing_is_sought_five_half_px_away():
+    """Of lone steps, each found where it is, a wide blur telling from afar; beyond 2.5 px nothing is reached."""
+    near = steps(0.3, -0.7, 1.9, -3.2, 3.4)
+    with np.errstate(invalid="ignore"):  # of places that are settled
+        moved, slope = _zero(near, np.full(5, 6.0), None)
+    assert moved == pytest.approx([0.3, -0.7, 1.9, -2.5, 2.5], abs=1e-6)
+    assert slope[:3] == pytest.approx(-1 / (np.sqrt(2 * np.pi) * 6.0**3), rel=1e-3)  # at the last step but one
+
+
+# coefficients of sqrt(d)^j inside the limb, grey levels, where steps of more than half a width lead astray
+UNEVEN = [[71.9, -88.0, 13.9, 3.8], [28.8, -39.8, 9.3, 4.1], [-82.6, 104.9, -10.7, -13.1]]
+
+
+@pytest.mark.parametrize("coefficients", UNEVEN)
+def test_a_limb_s_crossing_beside_an_uneven_profile(coefficients):
+    """The second derivative of the smoothed profile by quadrature over the distance's root, and its root next to 0."""
+    blur, scale = 0.6, 1.0
+    width = np.hypot(edge_blur(blur), scale)
+
+    def second(place: float) -> float:
+        """At a place outwards, in units of the smoothed edge's width; d = r^2 inside."""
+
+        def part(r: float) -> float:
+            x = place + r**2
+            return float(np.polyval(coefficients[::-1], r * np.sqrt(width)) * (x**2 - 1) * np.exp(-(x**2) / 2) * 2 * r)
+
+        return quad(part, 0, 3.5, epsabs=1e-11, epsrel=1e-11)[0]
+
+    found = limb_crossing(Profile(np.array([coefficients]), np.zeros(1)), 0.0, blur, scale).shift[0] / width
+    assert 0.3 < abs(found) < 1  # margin: more than a half step away
+    places = np.linspace(0, found, 30)[:-1]
+    signs = np.sign([second(place) for place in places])
+    assert (signs == signs[0]).all()  # none is nearer that way
+    assert brentq(second, found - 0.05, found + 0.05, xtol=1e-12) == pytest.approx(found, abs=1e-8)
+
+
+def test_a_profile_that_crosses_nowhere_is_told_from_one_that_does():
+    """Cubics along three positions, told by themselves: place, slope as contrast, and what is 0 where there is none."""
+    offsets = -3.0 + STEP * np.arange(9)
+    roots, slopes = [-1.3, 0.4, 0.0], [-2.0, -0.7, 0.0]
+    profiles = [
+        k * (offsets - r) * (1 + 0.1 * (offsets - r) + 0.03 * (offsets - r) ** 2)
+        for r, k in zip(roots, slopes, strict=False)
+    ]
+    profiles[2] = 5.0 + offsets**2
+    image = np.concatenate(profiles)[None, None]
+    empty = np.zeros((3, 0)), np.zeros((0, 27))
+    tool = CrossingLocator(
+        np.array([0.0, 1.0, 3.0]), offsets, np.arange(27), sparse.eye_array(27).tocsr(), np.array([4.0, 5.0, 6.0]),
+        np.array([1.0, 1.5, 2.0]), *empty,
+    )  # fmt: skip
+    each = tool.locate_each(image)
+    assert each.valid.tolist() == [[True, True, False]]
+    assert each.offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)
+    assert each.contrast[0] == pytest.approx([4 * 2.0, 5 * 0.7, 0.0], rel=1e-9)
+    assert tool.locate(image).offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)

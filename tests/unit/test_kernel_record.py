@@ -1,0 +1,236 @@
+"""What is recorded of OpenCASCADE's shapes, by a stand-in for it: no kernel is needed."""
+
+import io
+import json
+import math
+import sys
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from scenes.parts import step_kernel
+from scenes.parts.step_kernel import Unusable
+
+
+class Shape:
+    """A face, edge or solid of a stand-in: all have one hash, and those of one name are the same."""
+
+    def __init__(self, name, parts=(), turned=False, **facts):
+        self.name, self.parts, self.turned = name, parts, turned
+        self.__dict__.update(facts)
+
+    def __hash__(self):
+        return 7
+
+    def __eq__(self, other):
+        return self is other
+
+    def IsSame(self, other):  # noqa: N802
+        return self.name == other.name
+
+    def Orientation(self):  # noqa: N802
+        return "reversed" if self.turned else "forward"
+
+
+class Explorer:
+    """Goes through the parts of one kind."""
+
+    def __init__(self, shape, kind):
+        self.left = [part for part in shape.parts if part.kind == kind]
+
+    def More(self):  # noqa: N802
+        return bool(self.left)
+
+    def Current(self):  # noqa: N802
+        return self.left[0]
+
+    def Next(self):  # noqa: N802
+        self.left = self.left[1:]
+
+
+def vector(x, y, z):
+    moved = lambda turn: vector(x + turn[0], y + turn[1], z + turn[2])  # noqa: E731
+    return SimpleNamespace(X=lambda: x, Y=lambda: y, Z=lambda: z, Transformed=moved)
+
+
+def curve(kind, **numbers):
+    """The adaptor of an edge's curve, from parameter 0.5 to 2: there its point is (t, 2 t, 3 t)."""
+    position = SimpleNamespace(Location=lambda: vector(1, 2, 3), Direction=lambda: vector(0, 0.6, 0.8))
+    shape = SimpleNamespace(Position=lambda: position, **{name: (lambda v=v: v) for name, v in numbers.items()})
+    return SimpleNamespace(
+        GetType=lambda: f"GeomAbs_CurveType.GeomAbs_{kind}", FirstParameter=lambda: 0.5, LastParameter=lambda: 2.0,
+        Value=lambda t: vector(t, 2 * t, 3 * t), **{kind: lambda: shape},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def kernel(monkeypatch):
+    """OpenCASCADE's names as far as they are used; ``said`` is what the test lets it read."""
+    said = SimpleNamespace(status=1, roots=1, shapes=1, whole=None, names={}, mesh=None, moved=(0, 0, 0), cut=None)
+    entity = lambda face, _: said.names.get(face.name)  # noqa: E731
+
+    class Reader:
+        ReadStream = staticmethod(lambda name, data: said.status if data.read() == b"data" else 0)
+        TransferRoots = staticmethod(lambda: said.roots)
+        NbShapes = staticmethod(lambda: said.shapes)
+        OneShape = staticmethod(lambda: said.whole)
+        WS = staticmethod(lambda: SimpleNamespace(TransferReader=lambda: SimpleNamespace(EntityFromShapeResult=entity)))
+
+    def cut(*given):
+        said.cut = given
+
+    cast = SimpleNamespace(Face=lambda s: s, Edge=lambda s: s, Solid=lambda s: s)
+    kinds = SimpleNamespace(TopAbs_FACE="face", TopAbs_EDGE="edge", TopAbs_SOLID="solid")
+    names = {
+        "OCP": {},
+        "OCP.BRepMesh": {"BRepMesh_IncrementalMesh": cut},
+        "OCP.STEPControl": {"STEPControl_Reader": Reader},
+        "OCP.TopAbs": {
+            "TopAbs_ShapeEnum": kinds, "TopAbs_Orientation": SimpleNamespace(TopAbs_REVERSED="reversed"),
+        },
+        "OCP.TopExp": {"TopExp_Explorer": Explorer},
+        "OCP.TopoDS": {"TopoDS": cast},
+        "OCP.BRep": {"BRep_Tool": SimpleNamespace(Triangulation_s=lambda face, location: said.mesh)},
+        "OCP.TopLoc": {"TopLoc_Location": lambda: SimpleNamespace(Transformation=lambda: said.moved)},
+        "OCP.BRepAdaptor": {
+            "BRepAdaptor_Surface": lambda face: face.surface, "BRepAdaptor_Curve": lambda edge: edge.curve,
+        },
+    }  # fmt: skip
+    for name, facts in names.items():
+        module = ModuleType(name)
+        module.__dict__.update(facts)
+        monkeypatch.setitem(sys.modules, name, module)
+        if "." in name:
+            setattr(sys.modules["OCP"], name.split(".")[1], module)
+    return said
+
+
+def plain(name, parts=(), kind="Other"):
+    """A face on a surface of a kind that tells no numbers."""
+    adaptor = SimpleNamespace(GetType=lambda: f"GeomAbs_SurfaceType.GeomAbs_{kind}")
+    return Shape(name, parts, kind="face", surface=adaptor)
+
+
+def body(*faces, solid=True):
+    return Shape("body", [*faces, *([Shape("solid", kind="solid")] if solid else [])])
+
+
+def triangles(count=1):
+    """Nodes (10 i, i, 0) and triangles of those that follow each other."""
+    corner = lambda i: SimpleNamespace(Value=lambda k: i + k - 1)  # noqa: E731
+    return SimpleNamespace(
+        NbNodes=lambda: count + 2, Node=lambda i: vector(10 * i, i, 0), NbTriangles=lambda: count, Triangle=corner
+    )
+
+
+def test_parts_are_told_apart_by_what_they_are_not_by_their_hash(kernel):
+    """In the file's order, each once, of one kind."""
+    faces = [plain("b"), plain("a"), plain("b"), plain("c")]
+    found = step_kernel._parts(Shape("all", [*faces, Shape("e", kind="edge")]), "TopAbs_FACE", "Face")
+    assert [face.name for face in found] == ["b", "a", "c"]
+
+
+def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel):
+    edges = {name: Shape(name, kind="edge", curve=curve("Line")) for name in "uvwx"}
+    again = Shape("v", kind="edge", curve=curve("Line"))
+    faces = [
+        plain("f", [edges["u"], edges["v"]]),
+        plain("g", [edges["w"]]),
+        plain("h", [again, edges["u"], edges["x"]]),
+    ]
+    found = step_kernel._edges(None, [*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
+    assert [edge["faces"] for edge in found] == [[0, 2, 3], [0, 2], [1, 3], [2, 3]]
+    assert step_kernel._edges(None, [plain("f", [edges["u"], edges["u"]])]) == []
+
+
+def test_curves_are_recorded_as_they_are(kernel):
+    """Ends at the first and the last parameter; numbers of circles and ellipses alone."""
+    ends, place = {"ends": [[0.5, 1.0, 1.5], [2.0, 4.0, 6.0]]}, {"point": [1, 2, 3], "axis": [0, 0.6, 0.8]}
+    of = lambda kind, **numbers: step_kernel._curve(SimpleNamespace(curve=curve(kind, **numbers)))  # noqa: E731
+    assert of("Line") == {"kind": "line"} | ends
+    assert of("Circle", Radius=4.0) == {"kind": "circle", "radius": 4.0, "turn": 1.5} | place | ends
+    assert of("Ellipse", MajorRadius=5.0, MinorRadius=3.0) == {"kind": "ellipse", "radii": [5.0, 3.0]} | place | ends
+    assert of("BSplineCurve") == {"kind": "other"} | ends
+
+
+def test_triangles_are_counter_clockwise_from_outside(kernel):
+    """Indices begin at 1 in the kernel; where it stands is added; the other way round on a reversed face."""
+    kernel.mesh, kernel.moved = triangles(2), (0.5, 0.25, -3)
+    found = step_kernel._triangles(plain("f"))
+    assert found["nodes"] == [[10.5, 1.25, -3], [20.5, 2.25, -3], [30.5, 3.25, -3], [40.5, 4.25, -3]]
+    assert found["triangles"] == [[0, 1, 2], [1, 2, 3]]
+    assert step_kernel._triangles(Shape("f", turned=True))["triangles"] == [[0, 2, 1], [1, 3, 2]]
+    kernel.mesh = None
+    with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
+        step_kernel._triangles(plain("f"))
+
+
+@pytest.mark.parametrize(
+    ("faces", "most", "pieces"), [(2, 2000, 96), (2, 83, 81), (2, 25, 23), (2, 14, 12), (2, 3, 12), (3, 83, 40)]
+)
+def test_pieces_of_a_turn(kernel, faces, most, pieces):
+    """As many as are wanted, as the faces' number allows for each curved one, and at least 12; one plane is none."""
+    kernel.mesh = triangles()
+    plane = SimpleNamespace(
+        Axis=lambda: SimpleNamespace(Direction=lambda: vector(0, 0, 1)),
+        Position=lambda: SimpleNamespace(Direct=lambda: True), Location=lambda: vector(0, 0, 0),
+    )  # fmt: skip
+    flat = plain("plane", kind="Plane")
+    flat.surface.Plane = lambda: plane
+    kernel.whole = body(flat, *(plain(f"f{i}") for i in range(faces - 1)))
+    kernel.names = {"f0": SimpleNamespace(Name=lambda: SimpleNamespace(ToCString=lambda: "bore"))}
+    kernel.names["plane"] = SimpleNamespace(Name=lambda: None)
+    found = step_kernel.record(b"data", 96, most)
+    assert (found["segments"], found["unit"], found["format"]) == (pieces, "mm", step_kernel.FORMAT)
+    assert kernel.cut[0] is kernel.whole
+    assert kernel.cut[3] == pytest.approx(2 * (2 * math.pi / pieces))  # an angle of two pieces
+    assert [face["name"] for face in found["faces"]] == ["", "bore", ""][:faces]
+    assert [face["kind"] for face in found["faces"]] == ["plane", "other", "other"][:faces]
+    assert found["faces"][0]["triangles"] == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"status": 0}, "a readable STEP file, got something else"),
+        ({"roots": 0}, "of a solid body, got none"),
+        ({"shapes": 0}, "of a solid body, got none"),
+        ({"whole": body(plain("f"), solid=False)}, "of a solid body, got none"),
+        ({"whole": body()}, "of a solid body, got none"),
+        ({"whole": body(*map(plain, "fgh"))}, "of at most 2 faces, got 3"),
+    ],
+)
+def test_what_is_no_body_is_refused(kernel, change, match):
+    kernel.mesh, kernel.whole = triangles(), body(plain("f"), plain("g"))
+    assert step_kernel.record(b"data", 96, 2)["segments"] == 12
+    kernel.__dict__.update(change)
+    with pytest.raises(Unusable, match=match):
+        step_kernel.record(b"data", 96, 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "said"),
+    [
+        ({}, 0, ""),
+        ({"status": 0}, 2, "a readable STEP file, got something else\n"),
+        ({"names": None}, 2, "readable by OpenCASCADE, got a broken one\n"),
+        (None, 3, "missing\n"),
+    ],
+)
+def test_the_process_ends_with_a_record_or_one_line(kernel, monkeypatch, capfd, change, status, said):
+    kernel.mesh, kernel.whole = triangles(), body(plain("f"), plain("g"))
+    if change is None:
+        monkeypatch.setitem(sys.modules, "OCP.BRepMesh", None)
+    else:
+        kernel.__dict__.update(change)
+    monkeypatch.setattr(sys, "argv", ["step_kernel.py", "48", "33"])
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(b"data")))
+    kept = step_kernel.os.dup(1)
+    try:
+        assert step_kernel.main() == status
+    finally:
+        step_kernel.os.dup2(kept, 1)
+        step_kernel.os.close(kept)
+    out, err = capfd.readouterr()
+    assert err == said
+    assert (json.loads(out)["segments"] == 15) if status == 0 else out == ""
