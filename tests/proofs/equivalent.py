@@ -1,7 +1,9 @@
 """Mutants that no test can kill, with the reason of each: they do what the code does."""
 
 import re
+from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
@@ -38,15 +40,24 @@ EQUIVALENT: dict[str, str] = {
         "how many at a time changes no result",
     "planner/search/refinement.py: return float(minimised(errors, objective)[0]), bool(cut_off(errors, scene)[-1])":
         "of one setting: the first is the last",
+    "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
+        "of two flat pixels more than are needed at either side of an end one goes to the other side",
+    "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
+    "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
 }  # fmt: skip
 
 # by operator and what the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
     ("core/NumberReplacer", r"\b(?:fontsize|labelpad|pad|zorder)= "): "how a figure's words are set, not what is shown",
+    ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
+    ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
     ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",
     ("core/ReplaceTrueWithFalse", r"strict=False\)"): "the lengths are equal: the argument only says so",
 }
+
+_WITHIN = r"[^()]|\((?:[^()]|\([^()]*\))*\)"  # brackets in brackets
+_SIZE = re.compile(rf"\bfigsize=\((?:{_WITHIN})*\)")
 
 
 def is_equivalent(operator: str, line: str) -> bool:
@@ -60,5 +71,16 @@ def is_equivalent(operator: str, line: str) -> bool:
     False
     """
     text = line.split(": ", 1)[1]
+    if operator == "core/NumberReplacer" and _is_size(line):
+        return True
     rules = (re.search(rule, text) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
     return line in EQUIVALENT or any(rules)
+
+
+def _is_size(line: str) -> bool:
+    """Whether how large a figure is drawn is all that differs from a line of the code."""
+    file, text = line.split(": ", 1)
+    if not _SIZE.search(text):
+        return False
+    known = (each.strip() for each in (ROOT / file).read_text(encoding="utf-8").splitlines())
+    return _SIZE.sub("", text) in (_SIZE.sub("", each) for each in known if _SIZE.search(each))
