@@ -40,6 +40,13 @@ EQUIVALENT: dict[str, str] = {
         "how many at a time changes no result",
     "planner/search/refinement.py: return float(minimised(errors, objective)[0]), bool(cut_off(errors, scene)[-1])":
         "of one setting: the first is the last",
+    "planner/search/sets.py: weights, bound = np.full(len(told), 1 / len(told)), -1.0":
+        "the bound of the last rounds is above 0",
+    "validation/hard/limb_cases.py: found.append(_refused(\"a plane and 1e-14 of bend\", "
+    "Quadric(1e-14 * np.eye(3), (0, 0, 1), - 0.0), \"tangent\"))": "a case of another plane",
+    "validation/hard/limb_cases.py: found.append(_refused(\"an equation without real points\", "
+    "Quadric(np.eye(3), ( 1, 0, 0), 4.0), \"none\"))": "a case of another equation without real points",
+    "validation/hard/measure_cases.py: shape = ( 139, 160)": "a case of a row less beside all that is drawn",
     "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
@@ -49,7 +56,10 @@ EQUIVALENT: dict[str, str] = {
 # by operator and what the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
-    ("core/NumberReplacer", r"\b(?:fontsize|labelpad|pad|zorder)= "): "how a figure's words are set, not what is shown",
+    (
+        "core/NumberReplacer",
+        r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
+    ): "how a figure's words are set, not what is shown",
     ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
     ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
     ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",

@@ -1,0 +1,167 @@
+"""What commands say of rare things: pictures of drawn stations, a distance, a board, wrapped names, a log's line."""
+
+import logging
+import math
+import statistics
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from validation import budgets
+from validation.cli import measure as measure_cli
+from validation.cli import photograph, verbosity
+from validation.report import camera_table, figures, table, views_figure
+
+
+class Rows:
+    """Two budgets, of 10 +- 0.5 and 20 +- 3."""
+
+    measurands = (
+        SimpleNamespace(name="slot", unit="mm", value=10.0, U=0.5), SimpleNamespace(name="lean", unit="degrees",
+                                                                                   value=20.0, U=3.0),
+    )  # fmt: skip
+
+    def __iter__(self):
+        return iter(self.measurands)
+
+
+def test_pictures_of_drawn_stations(monkeypatch):
+    """A sample's standard deviation of those that were measured, and how many of these hold the true value."""
+    values = np.array([[10.1, 19.0], [10.5, np.nan], [9.4, 26.0], [10.2, 21.0], [np.nan, 23.0]])
+    states = np.array([["ok", "ok"], ["clutter", "short"], ["ok", "ok"], ["ok", "clutter"], ["short", "clutter"]])
+    asked = []
+
+    def pictured(rng, count, estimator, report):
+        asked.append((rng.bit_generator.seed_seq.entropy, count, estimator))
+        return values, states
+
+    monkeypatch.setattr(budgets, "Chain", lambda found: SimpleNamespace(pictured=pictured))
+    told = budgets.pictured(Rows(), 5, 17, "canny")
+    assert asked == [(17, 5, "canny")]
+    slot, lean = told["measurands"]
+    assert (slot["name"], slot["unit"], lean["name"], lean["unit"]) == ("slot", "mm", "lean", "degrees")
+    assert (slot["value"], slot["u"]) == pytest.approx((10.05, statistics.stdev([10.1, 10.5, 9.4, 10.2])))
+    assert (slot["held"], slot["n"], slot["failed"], slot["warned"]) == (0.75, 4, 1, 2)
+    assert (lean["value"], lean["u"]) == pytest.approx((22.25, statistics.stdev([19.0, 26.0, 21.0, 23.0])))
+    assert (lean["held"], lean["n"], lean["failed"], lean["warned"]) == (0.75, 4, 1, 3)
+    first, second = budgets.said_of_pictures(told)
+    assert first == (
+        f"slot: 4 of 5 pictures of drawn stations measured, u = {slot['u']:.3g},"
+        " value +- U holds the true value in 75.0 %"
+    )
+    assert second.startswith("lean: 4 of 5 ")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [("agree", "agrees within 0.05 (JCGM 101, clause 8)"), ("differ", "differs (skewed); state Monte Carlo's interval"),
+     ("open", "undecided (skewed); state Monte Carlo's interval")],
+)  # fmt: skip
+def test_monte_carlo_in_words(verdict, said):
+    row = {"draws": 3000, "u": 0.1234, "interval": [9.5, 10.25], "verdict": verdict, "reason": "skewed",
+           "tolerance": 0.05}  # fmt: skip
+    assert budgets.said_of_draws(row) == f"Monte Carlo (3000 draws) u = 0.123, interval 9.5 to 10.25: {said}"
+
+
+def distance(value=90.25):
+    return SimpleNamespace(
+        value_px=np.float64(value), variance_px2=np.float64(0.09), status=np.str_("ok"), p_value=np.float64(0.031),
+        corners=np.array([[1.0, 2.0], [3.0, 5.0]]), edge_names=("a-b", "c-d"), edge_status=np.array(["ok", "short"]),
+        edge_contrast=np.array([52.4, 31.7]), used=np.array([41, 7]), rejected=np.array([2, 3]),
+    )  # fmt: skip
+
+
+def test_a_distance_edge_by_edge():
+    told = measure_cli._distance_facts(distance())
+    assert told == {
+        "value_px": 90.25, "variance_px2": 0.09, "status": "ok", "p_value": 0.031, "corners": [[1, 2], [3, 5]],
+        "edges": [{"name": "a-b", "status": "ok", "used": 41, "rejected": 2, "contrast": 52.4},
+                  {"name": "c-d", "status": "short", "used": 7, "rejected": 3, "contrast": 31.7}],
+    }  # fmt: skip
+    assert measure_cli._distance_text(distance(), told["edges"]) == (
+        "90.2500 +- 0.3000 px (1 sigma), ok (goodness of fit: p = 0.031)\n"
+        "edges: a-b ok (41 used, contrast 52), c-d short (7 used, contrast 32)"
+    )
+
+
+def test_a_distance_that_is_none():
+    none = measure_cli._distance_facts(distance(math.nan))
+    assert (none["value_px"], none["variance_px2"], none["corners"]) == (None, None, None)
+    assert none["edges"][0]["used"] == 41
+    said = measure_cli._distance_text(distance(math.nan), none["edges"])
+    assert said.startswith("not measured, ok (goodness of fit: p = 0.031)\n")
+    assert measure_cli._fit(math.nan) == ""
+
+
+def board(corners):
+    """2 rows of 3 inner corners, of which the second is not measured: sigmas of 0.01 to 0.06 px in x, half in y."""
+    sigma = np.array([[1.0, 0.5], [np.nan, np.nan], [3, 1.5], [4, 2], [5, 2.5], [6, 3]]) / 100
+    return SimpleNamespace(
+        kind="chessboard", status="ok", noise=1.25, blur_px=0.7, p_value=0.25, corners=corners,
+        covariance=np.diag(sigma.ravel() ** 2), candidate=SimpleNamespace(grid=np.zeros((2, 3, 2))),
+    )  # fmt: skip
+
+
+def test_a_board_in_a_photograph():
+    """Columns first; the median is of 0.5, 1, 1.5, 2, 2.5, 3, 3, 4, 5 and 6 hundredths."""
+    assert photograph._text(4, board(np.zeros((6, 2)))) == (
+        "4. chessboard: ok, 3 x 2 inner corners, 5 measured to 0.028 px (median); --json has them; "
+        "noise 1.25 grey levels, blur 0.70 px (goodness of fit: p = 0.25)"
+    )
+    assert photograph._board(board(None)) == "ok, 3 x 2 inner corners"
+
+
+def test_names_are_wrapped():
+    """Three lines: a name is added to the last one where that has room, up to its end."""
+    assert views_figure._wrapped(["abc", "def", "ghi", "jkl", "mn"], 8) == "abc, def\nghi, jkl\nmn"
+    assert views_figure._wrapped(["abc", "def", "ghi", "jkl", "mn"], 7) == "abc\ndef\nghi\njkl, mn"
+    assert views_figure._wrapped(["longer than that", "b"], 4) == "\nlonger than that\nb"
+    assert views_figure._wrapped([]) == "nothing is taken from it"
+
+
+def test_an_intrinsic_has_two_digits_of_its_deviation():
+    """Four decimals where it has none."""
+    found = SimpleNamespace(
+        names=("fx", "cy", "k1", "p1"), values=[1203.45678, 480.0, -0.123456789, 7.0], sd=[0.21, 12.0, 0.00034, 0.0]
+    )
+    rows = list(zip(*(column.cells for column in camera_table.parameters(found).columns), strict=True))
+    assert rows == [
+        ("fx", "1203.46", "0.21", "px"), ("cy", "480", "12", "px"), ("k1", "-0.12346", "0.00034", ""),
+        ("p1", "7.0000", "0", ""),
+    ]  # fmt: skip
+    wide = SimpleNamespace(names=("fy",), values=[1203.45678], sd=[math.inf])
+    assert next(iter(camera_table.parameters(wide).columns[1].cells)) == "1203.4568"
+
+
+@pytest.mark.parametrize(
+    ("value", "label"),
+    [(0.5, "0.5"), (12, "12"), (True, "True"), ("a b/c:d", "a-b-c-d"), ("..x-", "x"), ("m" * 30, "m" * 20)],
+)
+def test_labels_of_files_hold_only_what_is_safe(value, label):
+    assert figures._label(value) == label
+
+
+def test_the_papers_search_is_shown_beside_ours():
+    ours = [("task1", (30.0, 90.0), (15.0, 270.0), 0.5, 0.25), ("x", (1, 2), (3, 4), 0, 0.125)]
+    rows = zip(*(column.cells for column in table._search(SimpleNamespace(search=ours)).columns), strict=True)
+    assert list(rows) == [
+        ("(30, 90)", "(15, 270)", "0.5000", "0.2500", "0.500"), ("(1, 2)", "(3, 4)", "0.0000", "0.1250", "-")
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("workers", "said"), [(1, "1 worker on"), (2, "2 workers on")])
+def test_the_time_of_a_run(workers, said):
+    spent = {"wall": 12.34, "workers": workers, "render": 5.0, "measure": 7.25}
+    found = SimpleNamespace(seconds=spent, variant="scalar_rgb")
+    assert table._time(found).plain == (
+        f"\nTime: 12.3 s with {said} scalar_rgb. Working seconds: render 5.0, measure 7.2."
+    )
+    assert found.seconds["wall"] == 12.34  # as it was
+
+
+def test_an_event_and_its_facts_are_a_line():
+    record = logging.LogRecord("validation", logging.INFO, "", 0, "committed", (), None)
+    assert verbosity._Line().format(record) == "committed"
+    record.facts = {"setting": 3, "images": 64}
+    assert verbosity._Line().format(record) == "committed setting=3 images=64"
