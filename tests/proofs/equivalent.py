@@ -7,7 +7,6 @@ ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
-    "measure/features/layout.py: middle = self.ends.reshape(- 2, 2).mean(0)": "numpy takes any negative size as open",
     "imaging/geometry/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
     "imaging/light/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
     "sensor.headroom(scene.noise):": "a shorter way to the same numbers is not taken",
@@ -47,6 +46,12 @@ EQUIVALENT: dict[str, str] = {
     "validation/hard/limb_cases.py: found.append(_refused(\"an equation without real points\", "
     "Quadric(np.eye(3), ( 1, 0, 0), 4.0), \"none\"))": "a case of another equation without real points",
     "validation/hard/measure_cases.py: shape = ( 139, 160)": "a case of a row less beside all that is drawn",
+    "validation/cost/model.py: least = min(self.total(rendered, 10** 9) for rendered in self.rendered)":
+        "so many images that their scatter is nothing to two digits",
+    "planner/robustness.py: cases=len(worlds) * "
+    "len(_with_pose_errors(end.sensor, end.lights, tolerances)[ -1]),": "as many lights as sensors",
+    "validation/views_check.py: for m, forecast in enumerate(chosen.views[ -1].prediction.measurands):":
+        "name, unit and value in the object are those of every picture",
     "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
@@ -60,6 +65,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         "core/NumberReplacer",
         r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
     ): "how a figure's words are set, not what is shown",
+    ("core/NumberReplacer", r"\breshape\((?:[^()]|\([^()]*\))*- 2[,)]"): "numpy takes any negative size as open",
     ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
     ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
     ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",

@@ -1,11 +1,17 @@
 """The references of the hard cases: a point's place and its camera, against the planner's own projection."""
 
+from pathlib import Path
+from unittest import mock
+
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+import planner
 from imaging.geometry.projection import project_ideal
 from scenes import Pose
-from validation.hard import precise
+from validation.hard import precise, precise_models
+from validation.report import precision_figure
 
 SENSOR, LIGHT = (37.0, 112.0), (21.0, 301.0)
 
@@ -20,3 +26,47 @@ def test_a_point_is_imaged_from_the_cameras_distance(task1):
     assert np.array(found) == pytest.approx(seen, rel=1e-9, abs=1e-9)
     assert [float(x) for x in inputs.distances] == [83.0, 100.0]
     assert Pose(*map(float, inputs.sensor)) == Pose(*SENSOR)
+
+
+def test_the_poses_that_are_held_are_those_of_the_titles():
+    """Of the figure about single precision: one moves, the other is held where its panel says."""
+    asked, drawn = [], []
+
+    def error(scene, sensors, lights):
+        asked.append((sensors, lights))
+        return np.full(len(sensors), 1e-7)
+
+    keep = mock.patch.object(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    with keep, mock.patch.object(precision_figure, "error_of_single", error):
+        precision_figure.draw(Path("x.png"), 30.0)
+    (sensors, held), (still, lights) = asked
+    assert np.unique(held, axis=0).tolist() == [[15.0, 315.0]]
+    assert np.unique(still, axis=0).tolist() == [[30.0, 135.0]]
+    assert sensors.tolist() == lights.tolist() == precision_figure.ViewingSpace(30.0, (0, 90)).poses.tolist()
+    titles = [axes.get_title() for axes in drawn[0].axes[:2]]
+    assert [title.split("\n")[0] for title in titles] == [
+        "sensor moves, light (15, 315)", "light moves, sensor (30, 135)"
+    ]  # fmt: skip
+
+
+def test_contrast_is_low_where_the_planner_says_so(task1):
+    """Below five sigma of an edge's root mean square contrast: the same noise divides the reference's answers."""
+
+    def noisy(sigma):
+        return task1.model_copy(update={"noise": task1.noise.model_copy(update={"sigma": sigma, "bits": None})})
+
+    def is_low(sigma):
+        return planner.predict(noisy(sigma), SENSOR, LIGHT).status == "low_contrast"
+
+    low, high = 0.01, 1000.0
+    assert is_low(high)
+    assert not is_low(low)
+    while high / low > 1.001:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if is_low(middle) else (middle, high)
+    answers = []
+    for sigma in (0.99 * low, 1.01 * high):  # the reference's rule is of 8 nodes here
+        inputs = precise.Inputs.of(noisy(sigma), SENSOR, LIGHT)
+        answers.append(precise_models.calibrated(noisy(sigma), inputs, adaptive=False))
+    assert answers[1] == "low_contrast"
+    assert float(answers[0]) == pytest.approx(planner.predict(noisy(0.99 * low), SENSOR, LIGHT).variance_px2, rel=1e-3)

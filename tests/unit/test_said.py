@@ -8,10 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from scenes import Pose
 from validation import budgets
 from validation.cli import measure as measure_cli
-from validation.cli import photograph, verbosity
-from validation.report import camera_table, figures, table, views_figure
+from validation.cli import photograph, plan, verbosity
+from validation.report import camera_table, figures, guide, table, views_figure
+from validation.statistics import LEVEL
 
 
 class Rows:
@@ -165,3 +167,43 @@ def test_an_event_and_its_facts_are_a_line():
     assert verbosity._Line().format(record) == "committed"
     record.facts = {"setting": 3, "images": 64}
     assert verbosity._Line().format(record) == "committed setting=3 images=64"
+
+
+def test_the_level_of_a_verdict_is_said_in_percent():
+    assert LEVEL == 0.01
+    assert "a false alarm 1 % likely over all rows" in guide.verdict_terms()[0]
+
+
+@pytest.mark.parametrize(("methods", "said"), [(1, "without a value."), (3, 'one number a method ("0 0 0": none).')])
+def test_failures_are_told_by_method(methods, said):
+    assert guide.ratio_terms("gradient", methods)[1].endswith(said)
+    assert guide.ratio_terms("gradient", methods)[3] == "The verdict is about gradient, as are bias and rmse."
+
+
+def test_a_plan_is_checked_by_ten_renders_where_they_are_small():
+    """Up to a million pixels; else it is asked for."""
+    sizes = ((plan._QUICK_PIXELS // 7, 7), (plan._QUICK_PIXELS // 7, 8))
+    cameras = [SimpleNamespace(camera=SimpleNamespace(width=width, height=height)) for width, height in sizes]
+    assert [plan._renders(scene) for scene in cameras] == [10, 0]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_each_picture_of_a_set_is_drawn(monkeypatch, tmp_path, count):
+    """Below one another, titled with what is taken from it."""
+    asked, kept = [], []
+
+    def seen(axis, scene, sensor, light, points):
+        asked.append((sensor, light, points.shape))
+        axis.set_title(f"from {sensor.polar_deg:g}")
+
+    monkeypatch.setattr(views_figure, "draw_seen", seen)
+    monkeypatch.setattr(views_figure, "save", lambda figure, path: kept.append(figure) or path)
+    views = [SimpleNamespace(sensor=Pose(10 + k, 20), light=Pose(30, 40 + k)) for k in range(count)]
+    used = np.array([[True, False, True], [False, False, False]])[:count]
+    last = SimpleNamespace(views=views, combination=SimpleNamespace(used=used))
+    scene = SimpleNamespace(quantities=[SimpleNamespace(name=name) for name in ("slot", "lean", "step")])
+    found = SimpleNamespace(sets=(None, last), scene=scene)
+    assert views_figure.draw(found, tmp_path / "new") == [tmp_path / "new" / "views.png"]
+    assert asked == [(Pose(10 + k, 20), Pose(30, 40 + k), (0, 2)) for k in range(count)]
+    titles = [axis.get_title() for axis in kept[0].axes]
+    assert titles == ["no. 1: from 10\nslot, step", "no. 2: from 11\nnothing is taken from it"][:count]

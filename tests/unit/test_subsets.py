@@ -115,3 +115,19 @@ def test_parts_of_two_pictures_in_closed_form():
     bound, parts = _relaxed(np.array([[9.0, 0.0], [0.0, 4.0]]), "sum")
     assert bound == pytest.approx((1 / 3 + 1 / 2) ** 2, rel=1e-9)
     assert parts == pytest.approx([0.4, 0.6], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_better"),
+    [
+        ((1, 9.0, 9.0), (2, 5.0, 1.0), True), ((2, 5.0, 1.0), (1, 9.0, 9.0), False),
+        ((2, 3.0, 9.0), (2, 5.0, 1.0), True), ((2, 5.0, 1.0), (2, 3.0, 9.0), False),
+        ((0, 5.0, 1.0), (0, 3.0, 9.0), False), ((0, 3.0, 9.0), (0, 5.0, 1.0), True),
+        ((1, 4.0, 6.0), (1, 4.0 * (1 + 1e-10), 7.0), True), ((1, 4.0 * (1 + 1e-10), 6.0), (1, 4.0, 7.0), True),
+        ((1, 4.0, 7.0), (1, 4.0 * (1 + 1e-10), 6.0), False), ((1, 4.0, 6.0), (1, 4.0, 6.0), False),
+        ((1, 4.0, 6.0), (1, 4.0, 6.0 * (1 + 1e-10)), False),
+    ],
+)  # fmt: skip
+def test_a_better_set_loses_less_then_is_less_then_less_in_all(one, other, is_better):
+    """What differs by a part in 1e10 is the same."""
+    assert better(one, other) == is_better
