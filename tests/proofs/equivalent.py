@@ -52,6 +52,7 @@ EQUIVALENT: dict[str, str] = {
     "len(_with_pose_errors(end.sensor, end.lights, tolerances)[ -1]),": "as many lights as sensors",
     "validation/views_check.py: for m, forecast in enumerate(chosen.views[ -1].prediction.measurands):":
         "name, unit and value in the object are those of every picture",
+    "validation/batch/store.py: variance, value, status = rows[ -1]": "of the rows with a key there is one",
     "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
@@ -66,6 +67,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
     ): "how a figure's words are set, not what is shown",
     ("core/NumberReplacer", r"\breshape\((?:[^()]|\([^()]*\))*- 2[,)]"): "numpy takes any negative size as open",
+    ("core/NumberReplacer", r"\blegend_below\(\w+, "): "in how many columns a legend is set",
     ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
     ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
     ("core/NumberReplacer", r"^@lru_cache\(maxsize="): "how many results are kept changes none of them",

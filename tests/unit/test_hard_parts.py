@@ -70,3 +70,19 @@ def test_contrast_is_low_where_the_planner_says_so(task1):
         answers.append(precise_models.calibrated(noisy(sigma), inputs, adaptive=False))
     assert answers[1] == "low_contrast"
     assert float(answers[0]) == pytest.approx(planner.predict(noisy(0.99 * low), SENSOR, LIGHT).variance_px2, rel=1e-3)
+
+
+def test_conditions_in_closed_form():
+    """Sum of |x df/dx| / |f|: the exponents of a product; what is zero has no part in it."""
+    inputs = precise.Inputs(*((precise.mpf(a), precise.mpf(b)) for a, b in ((3, 0), (5, 7), (11, 13))), ((1, 2, 3),))
+
+    def product(at):
+        return at.sensor[0] ** 3 / at.light[1] * at.distances[0] ** 2 * precise.mpf(at.vertices[0][2])
+
+    assert precise.condition(product, inputs) == pytest.approx(3 + 1 + 2 + 1, rel=1e-9)
+    assert precise.condition(lambda at: "not_visible", inputs) == np.inf
+    assert precise.condition(lambda at: precise.mpf(0), inputs) == np.inf
+    numbers = [precise.mpf(2), precise.mpf(0), precise.mpf(3)]
+    assert precise.condition_of(lambda x: x[0] ** 4 / x[2] + x[1], numbers) == pytest.approx(5, rel=1e-9)
+    told = precise.reference(lambda x: x[0] ** 2 * x[1], [1.5, 2.0])
+    assert (told.value, told.condition) == (4.5, pytest.approx(3, rel=1e-9))

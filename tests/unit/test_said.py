@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenes import Pose
-from validation import budgets
+from validation import budgets, effects_check
 from validation.cli import measure as measure_cli
 from validation.cli import photograph, plan, verbosity
 from validation.report import camera_table, figures, guide, table, views_figure
@@ -207,3 +207,64 @@ def test_each_picture_of_a_set_is_drawn(monkeypatch, tmp_path, count):
     assert asked == [(Pose(10 + k, 20), Pose(30, 40 + k), (0, 2)) for k in range(count)]
     titles = [axis.get_title() for axis in kept[0].axes]
     assert titles == ["no. 1: from 10\nslot, step", "no. 2: from 11\nnothing is taken from it"][:count]
+
+
+def test_pictures_of_a_run_that_would_have_one_name_are_numbered():
+    """Sensors that differ by less than is said in a name; poses of the light are panels of one picture."""
+
+    class Campaign:
+        scenes = (1,)
+
+        def __len__(self):
+            return 5
+
+        def case(self, i):
+            sensor = Pose(30 + 1e-9 * (0, 1, 2, 0, 5)[i], 90)
+            return SimpleNamespace(
+                scene=SimpleNamespace(name="s"), setting=SimpleNamespace(sensor=sensor), parameters={}
+            )
+
+    named = figures._panels(Campaign(), SimpleNamespace(has_image=lambda i: i != 4))
+    assert {name: len(cases) for name, cases in named.items()} == {
+        "sensor_30_90": 2, "sensor_30_90__2": 1, "sensor_30_90__3": 1,
+    }  # fmt: skip
+
+
+def test_a_picture_is_cut_8_px_around_the_object(monkeypatch):
+    picture = np.arange(100.0 * 200).reshape(100, 200)
+    for rows, columns, cut in (
+        (slice(20, 30), slice(40, 60), picture[12:38, 32:68]), (slice(3, 30), slice(5, 190), picture[:38, :198])
+    ):  # fmt: skip
+        monkeypatch.setattr(figures, "window", lambda _, part=(rows, columns): part)
+        assert np.array_equal(figures._covered(SimpleNamespace(picture=None), picture), cut)
+
+
+def test_effects_are_compared_over_five_seeds(monkeypatch):
+    """Variance and distance of each; the fastest render's time."""
+    asked, clock = [], iter([0.0, 9.0, 10.0, 12.0, 20.0, 21.5, 30.0, 33.0, 40.0, 44.0])
+
+    def image(scene, sensor, light, quality, effects):
+        asked.append((sensor, light, quality.seed, effects))
+        return quality.seed
+
+    monkeypatch.setattr(effects_check.render, "image", image)
+    monkeypatch.setattr(effects_check.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(effects_check.measure, "propagate", lambda image, scene, sensor: SimpleNamespace(
+        value_px=90.0 + image, variance_px2=0.5 * image))  # fmt: skip
+    runs = effects_check._Runs(None, SimpleNamespace(sensor="s", light="l"), "all", effects_check.render.Quality())
+    assert asked == [("s", "l", seed, "all") for seed in range(5)]
+    assert runs.values.tolist() == [90.0, 91.0, 92.0, 93.0, 94.0]
+    assert runs.variances.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert runs.seconds == 1.5
+
+
+def test_what_an_effect_changes_is_known_to_the_scatter_over_seeds():
+    """Student's t of 0.1 % with four degrees of freedom, 8.610, and single precision beside it."""
+    base = SimpleNamespace(values=np.full(5, 90.0), variances=np.full(5, 2.0), seconds=0.5)
+    off, grown = np.array([0.1, 0.3, 0.2, 0.6, 0.4]), np.array([0.02, 0.01, 0.05, 0.03, 0.04])
+    runs = SimpleNamespace(values=90.0 + off, variances=2.0 * (1 + grown), seconds=0.75)
+    row = effects_check._row(None, "blur", None, base, runs)
+    assert (row.bias_px, row.variance) == pytest.approx((0.32, 0.03))
+    wide = [8.610302 / math.sqrt(5) * statistics.stdev(each) for each in (off, grown)]
+    assert (row.resolution_px, row.resolution_variance) == pytest.approx((wide[0] + 2e-4, wide[1] + 1e-3), rel=1e-6)
+    assert (row.seconds, row.seconds_auto) == (0.75, 0.5)
