@@ -69,6 +69,7 @@ reference: $(VENV)/.installed
 	cp runs/reference/result.json tests/regression/reference.json
 	$(BIN)/python -m tests.regression.test_documents $$(mktemp -d)
 	$(BIN)/python -m tests.regression.test_numbers
+	$(BIN)/python -m tests.unit.test_fields
 
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed

@@ -167,4 +167,4 @@ def f_test(first: float, n: int, second: float, m: int) -> float:
     0.00043
     """
     ratio = first / second
-    return float(min(1.0, 2 * min(stats.f.cdf(ratio, n - 1, m - 1), stats.f.sf(ratio, n - 1, m - 1))))
+    return float(2 * min(stats.f.cdf(ratio, n - 1, m - 1), stats.f.sf(ratio, n - 1, m - 1)))

@@ -86,7 +86,7 @@ class Directions(ABC):
 
     @property
     def _reach(self) -> float:
-        return min(_NEIGHBOUR * self.step_deg, 179.0)
+        return _NEIGHBOUR * self.step_deg
 
     def nearest(self, pose: np.ndarray) -> int:
         """Index of the direction nearest to a pose (polar, azimuth)."""

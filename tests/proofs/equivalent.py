@@ -1,11 +1,12 @@
 """Mutants that no test can kill, with the reason of each: they do what the code does."""
 
 import re
+from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
-    "measure/features/layout.py: middle = self.ends.reshape(- 2, 2).mean(0)": "numpy takes any negative size as open",
     "imaging/geometry/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
     "imaging/light/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
     "sensor.headroom(scene.noise):": "a shorter way to the same numbers is not taken",
@@ -53,12 +54,36 @@ EQUIVALENT: dict[str, str] = {
     'render/mosaic.py: _SENSOR = {"perspective": 19, "thinlens": 200}  # rays that take as long as making a sensor':
         "a time, by which one of several sizes of tiles is chosen that all show the same",
     "imaging/pose_scatter.py: if sigma == -1:": "a shorter way to zeros is not taken",
+    "planner/search/sets.py: weights, bound = np.full(len(told), 1 / len(told)), -1.0":
+        "the bound of the last rounds is above 0",
+    "validation/hard/limb_cases.py: found.append(_refused(\"a plane and 1e-14 of bend\", "
+    "Quadric(1e-14 * np.eye(3), (0, 0, 1), - 0.0), \"tangent\"))": "a case of another plane",
+    "validation/hard/limb_cases.py: found.append(_refused(\"an equation without real points\", "
+    "Quadric(np.eye(3), ( 1, 0, 0), 4.0), \"none\"))": "a case of another equation without real points",
+    "validation/hard/measure_cases.py: shape = ( 139, 160)": "a case of a row less beside all that is drawn",
+    "validation/cost/model.py: least = min(self.total(rendered, 10** 9) for rendered in self.rendered)":
+        "so many images that their scatter is nothing to two digits",
+    "planner/robustness.py: cases=len(worlds) * "
+    "len(_with_pose_errors(end.sensor, end.lights, tolerances)[ -1]),": "as many lights as sensors",
+    "validation/views_check.py: for m, forecast in enumerate(chosen.views[ -1].prediction.measurands):":
+        "name, unit and value in the object are those of every picture",
+    "validation/batch/store.py: variance, value, status = rows[ -1]": "of the rows with a key there is one",
+    "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
+        "of two flat pixels more than are needed at either side of an end one goes to the other side",
+    "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
+    "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
-    ("core/NumberReplacer", r"\b(?:fontsize|labelpad|pad|zorder)= "): "how a figure's words are set, not what is shown",
+    (
+        "core/NumberReplacer",
+        r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
+    ): "how a figure's words are set, not what is shown",
+    ("core/NumberReplacer", r"\blegend_below\(\w+, "): "in how many columns a legend is set",
+    ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
+    ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
     ("core/NumberReplacer", r": @lru_cache\(maxsize="): "how many results are kept changes none of them",
     ("core/ReplaceTrueWithFalse", r"strict=False\)"): "the lengths are equal: the argument only says so",
     (
@@ -69,6 +94,9 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"^imaging/.*: _(?:AT_ONCE|CHUNK|BLOCK) = "): "how many at a time changes no result",
     ("end", r'unpack\(">\w", [^()]*\)\[-1\]'): "of one number the first is the last",
 }
+
+_WITHIN = r"[^()]|\((?:[^()]|\([^()]*\))*\)"  # brackets in brackets
+_SIZE = re.compile(rf"\bfigsize=\((?:{_WITHIN})*\)")
 
 
 def is_equivalent(operator: str, line: str) -> bool:
@@ -87,5 +115,16 @@ def is_equivalent(operator: str, line: str) -> bool:
     >>> is_equivalent("core/NumberReplacer", few), is_equivalent("core/NumberReplacer", other)
     (True, False)
     """
+    if operator == "core/NumberReplacer" and _is_size(line):
+        return True
     rules = (re.search(rule, line) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
     return line in EQUIVALENT or any(rules)
+
+
+def _is_size(line: str) -> bool:
+    """Whether how large a figure is drawn is all that differs from a line of the code."""
+    file, text = line.split(": ", 1)
+    if not _SIZE.search(text):
+        return False
+    known = (each.strip() for each in (ROOT / file).read_text(encoding="utf-8").splitlines())
+    return _SIZE.sub("", text) in (_SIZE.sub("", each) for each in known if _SIZE.search(each))

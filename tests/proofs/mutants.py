@@ -2,11 +2,11 @@
 
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
-examples of its own module and the tests that read the code, then the unit tests and the stored numbers that call the
-changed function and others of the module, the quickest first (``tests.proofs.reach``), then the other test files that
-speak most of the names that the module defines. Killed is what makes one of them fail that passes on clean code, where
-it is run, too, or was when it was noted what it calls. What survives is printed with its line: a test is missing, or
-the mutant is equivalent.
+examples of its own module, the tests that read the code and, where it may have records, those of their fields; then the
+unit tests and the stored numbers that call the changed function and others of the module, the quickest first
+(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what
+makes one of them fail that passes on clean code, where it is run, too, or was when it was noted what it calls. What
+survives is printed with its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from tests.proofs.slips import SLIPS, places, slipped
 ROOT = Path(__file__).parents[2]
 SOURCES = ("scenes", "imaging", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
+FIELDS = ["tests/unit/test_fields.py", "tests/unit/test_reference.py::test_page_and_schema_are_up_to_date"]
 STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py")  # what was said once
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
@@ -62,6 +63,7 @@ _LIMIT_S = 90  # after which these do not end
 _OTHERS_S = 45  # of the files that are asked then
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
+_RECORDS = re.compile(r"^from (?:pydantic|scenes\.(?:model|ranges)) ", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,8 @@ def judged(
     before, times = path.read_text(encoding="utf-8"), path.stat()
     after, line = changed(mutant, root)
     own = [mutant.file] if ">>> " in before else []
-    near = [*own, *READERS, *calling(mutant, int(line.split(":")[1]), tests, root)]
+    fields = FIELDS if _RECORDS.search(before) else []
+    near = [*own, *READERS, *fields, *calling(mutant, int(line.split(":")[1]), tests, root)]
     path.write_text(after, encoding="utf-8")
     try:
         code, by = _tested(near, runner, _LIMIT_S)

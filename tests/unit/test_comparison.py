@@ -59,6 +59,35 @@ def test_only_what_both_have_is_compared(rng):
         comparison.compare(document(rng) | {"scene": "other"}, document(rng))
 
 
+def stored(path, **row):
+    """A result with one setting in a file, read again."""
+    judged = {"method": "a", "n": 5, "failed": 1, "empirical": 0.25, "bias": 0.5} | row
+    setting = {**judged, "sensor": [30.0, 1.0], "light": [20.0, 2.0], "classic": []}
+    (path / "result.json").write_text(json.dumps({"scene": "made", "settings": [setting]}))
+    return comparison.read(path)["settings"][0]
+
+
+@pytest.mark.parametrize("empirical", [0.0, 1e-30, 0.25, None])
+@pytest.mark.parametrize("bias", [-0.5, 0.0])
+def test_a_variance_is_none_or_beside_a_bias(tmp_path, empirical, bias):
+    """0 is one: without noise all images are alike."""
+    assert stored(tmp_path, empirical=empirical, bias=bias)["empirical"] == empirical
+
+
+@pytest.mark.parametrize(
+    "row", [{"empirical": 0.9e-30}, {"bias": None}, {"bias": None, "empirical": 0.0}, {"empirical": -1.0}, {"n": 0}]
+)
+def test_what_cannot_have_been_written_is_refused(tmp_path, row):
+    """Variances that no image has, a variance without a bias, more failures than images."""
+    with pytest.raises(InvalidInput, match=r"must be a run directory or its result.json, got: settings\[0\]"):
+        stored(tmp_path, **row)
+
+
+def test_every_image_may_have_failed(tmp_path):
+    assert stored(tmp_path, n=5, failed=5, empirical=None, bias=None)["failed"] == 5
+    assert stored(tmp_path, empirical=None, bias=None)["bias"] is None
+
+
 def test_f_test_against_simulation(rng):
     """The p-value of a ratio of sample variances is uniform if the variances are equal."""
     a, b = rng.standard_normal((2, 2000, 30))

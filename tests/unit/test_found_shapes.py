@@ -66,7 +66,8 @@ def test_a_board_in_a_tags_cells_is_none(x, y, size, kept):
     ("x", "y", "width", "height", "kept"),
     [
         (30, 40, 8, 6, False), (70, 40, 10, 6, False), (70, 40, 12, 6, True), (0, 40, 9, 6, False),
-        (-2, 40, 9, 6, True), (30, 60, 8, 10, False), (30, 60, 8, 12, True), (30, 10, 8, 12, False), (30, 8, 8, 12, True),
+        (-2, 40, 9, 6, True), (30, 60, 8, 10, False), (30, 60, 8, 12, True), (30, 10, 8, 12, False),
+        (30, 8, 8, 12, True),
     ],
 )  # fmt: skip
 def test_what_lies_in_a_chessboard_or_around_it_by_two_squares(x, y, width, height, kept):

@@ -367,6 +367,12 @@ def test_the_figure_shows_variances_and_their_intervals(run, monkeypatch):
     assert calibrated.get_xdata() == pytest.approx([here.predicted["calibrated"] for here in told])
     bound = next(line for line in crosses if str(line.get_label()).startswith("Cramer"))
     assert bound.get_xdata() == pytest.approx([here.predicted["bound"] for here in told])
+    equal = next(line for line in crosses if str(line.get_label()).startswith("predicted ="))
+    ends = [
+        0.9 * min(here.predicted["bound"] for here in told),
+        1.2 * max(here.sigma["gradient"] ** 2 for here in told),
+    ]
+    assert equal.get_xdata().tolist() == equal.get_ydata().tolist() == pytest.approx(ends)
     figures.plt.close(drawn[0])
 
 

@@ -9,6 +9,7 @@ import pytest
 from planner.search.candidates import DEAREST
 from planner.search.sets import (
     Information,
+    _relaxed,
     better,
     every_set,
     front,
@@ -101,3 +102,32 @@ def test_first_of_all_everything_is_measured():
 
 def test_how_many_sets():
     assert [sets_of(4, count) for count in (1, 2, 3)] == [4, 10, 20]
+
+
+def test_parts_of_two_pictures_in_closed_form():
+    """Minimax: w (4, 1) + (1 - w) (1, 2) is alike for w = 1/4, of 1.75 each; the sum of 1 / (a w) and 1 / (b (1 - w)).
+
+    The third picture is worth nothing beside the two.
+    """
+    bound, parts = _relaxed(np.array([[4.0, 1.0], [1.0, 2.0], [0.5, 0.5]]), "minimax")
+    assert bound == pytest.approx(1 / 1.75, rel=1e-9)
+    assert parts == pytest.approx([0.25, 0.75, 0], abs=1e-9)
+    bound, parts = _relaxed(np.array([[9.0, 0.0], [0.0, 4.0]]), "sum")
+    assert bound == pytest.approx((1 / 3 + 1 / 2) ** 2, rel=1e-9)
+    assert parts == pytest.approx([0.4, 0.6], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_better"),
+    [
+        ((1, 9.0, 9.0), (2, 5.0, 1.0), True), ((2, 5.0, 1.0), (1, 9.0, 9.0), False),
+        ((2, 3.0, 9.0), (2, 5.0, 1.0), True), ((2, 5.0, 1.0), (2, 3.0, 9.0), False),
+        ((0, 5.0, 1.0), (0, 3.0, 9.0), False), ((0, 3.0, 9.0), (0, 5.0, 1.0), True),
+        ((1, 4.0, 6.0), (1, 4.0 * (1 + 1e-10), 7.0), True), ((1, 4.0 * (1 + 1e-10), 6.0), (1, 4.0, 7.0), True),
+        ((1, 4.0, 7.0), (1, 4.0 * (1 + 1e-10), 6.0), False), ((1, 4.0, 6.0), (1, 4.0, 6.0), False),
+        ((1, 4.0, 6.0), (1, 4.0, 6.0 * (1 + 1e-10)), False),
+    ],
+)  # fmt: skip
+def test_a_better_set_loses_less_then_is_less_then_less_in_all(one, other, is_better):
+    """What differs by a part in 1e10 is the same."""
+    assert better(one, other) == is_better

@@ -348,6 +348,16 @@ def test_needed_in_closed_form():
     assert scaled(found, "w", answer.factor).u == pytest.approx(0.03, rel=1e-12)
 
 
+def test_needed_where_only_an_exact_source_does():
+    """U of the others alone is wanted: hardly anything is left, and never less than nothing by rounding."""
+    for k in range(40):
+        inputs = (Input("a", 0, 0.3 + 0.017 * k), Input("b", 0, 0.7), Input("c", 0, 0.11 * (k + 1)))
+        found = budget("y", "", 0.0, inputs, {"a": 1.0, "b": 0.9, "c": 1.3})
+        answer = needed(found, found.without("b").U, "b")
+        assert answer.reachable
+        assert 0 <= answer.u < 1e-6
+
+
 def test_needed_that_cannot_be():
     found = made()
     answer = needed(found, 0.5 * found.without("scale").U, "scale")

@@ -1,13 +1,14 @@
 """Checks that render, costs, the hard catalogue, and what figures show: small pictures, few of them."""
 
 import tempfile
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 from matplotlib.figure import Figure
+from pydantic import BaseModel
 
 import measure
 import planner
@@ -15,6 +16,7 @@ import render
 from measure.calibration import calibrate
 from measure.photo.photograph import photograph
 from render import Quality
+from scenes import Scene
 from scenes.load import BUNDLED
 from tests.commands import ice
 from tests.photographs import rectangle, turned
@@ -150,9 +152,36 @@ def _few_hard():
     return [(row.name, row.measurand, row.verdict, row.reference, row.tolerance, row.condition) for row in rows]
 
 
-def _precise():
-    cases = {each.area: each for each in hard.catalogue()}
-    return [(area, each.name, each.measurand, each.refusals) for area, each in cases.items()]
+def _asked():
+    """Every hard case: what is asked, and the numbers that it is asked of."""
+    return [(each.area, each.name, each.measurand, each.refusals, _inputs(each)) for each in hard.catalogue()]
+
+
+def _inputs(case):
+    """What our answer and the reference are made from, in one row."""
+    found = []
+    for function in (case.ours, case.reference):
+        if isinstance(function, partial):
+            given = (*function.args, *function.keywords.values())
+        else:
+            given = [cell.cell_contents for cell in function.__closure__ or ()]
+        for each in given:
+            found += _flat(each)
+    return np.array([0.0, *found])
+
+
+def _flat(given):
+    """The numbers of scenes, arrays, poses and references; surfaces and functions have none."""
+    if isinstance(given, Scene):
+        parts = (given.camera, given.lights, given.material, given.noise, given.solid.vertices)
+        return [number for part in parts for number in _flat(part)]
+    if isinstance(given, BaseModel):
+        return _flat(list(given.model_dump().values()))
+    if is_dataclass(given) and not isinstance(given, type):
+        return _flat([getattr(given, field.name) for field in fields(given)])
+    if isinstance(given, np.ndarray | list | tuple):
+        return [number for each in given for number in _flat(each)]
+    return [float(given)] if isinstance(given, int | float) and np.isfinite(given) else []
 
 
 def _explored(name):
@@ -220,7 +249,7 @@ def cases():
     for name in ("task1", "plate", "two_lights"):
         found[f"explorer {name}"] = CLOSED, partial(_explored, name)
     return found | {
-        "hard pictures": (SEARCHED, _few_hard), "hard cases": (CLOSED, _precise),
+        "hard pictures": (SEARCHED, _few_hard), "hard cases": (CLOSED, _asked),
         "calibrate": (SEARCHED, calibrated), "new": (SEARCHED, _new), "fitted": (SEARCHED, _fitted),
         "check of a plan": (RENDERED, lambda: _without_seconds(plan_check.check_plan(_plan("task1"), 2, _QUICK))),
         "check of views": (RENDERED, lambda: _without_seconds(views_check.check_views(_views(), 12, 3, _QUICK))),

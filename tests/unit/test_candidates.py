@@ -1,0 +1,65 @@
+"""Which settings a search names beside its best one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from planner.search import candidates
+
+POLES = [(20.0 * k, 7.0) for k in range(1, 9)]  # further apart than candidates have to be
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What a setting is worth when it is looked at closely: the further down the search's list, the less."""
+    monkeypatch.setattr(
+        candidates, "_candidate", lambda _, sensor, light: SimpleNamespace(variance=1 / sensor[0], sensor=sensor)
+    )
+
+
+def searched(*poles):
+    """A search that gives its settings in the order of its own, faster evaluation."""
+    rows = [(float(k), None, np.array(pose), np.array([50.0, 300.0])) for k, pose in enumerate(poles)]
+    made = SimpleNamespace(problem=None)
+    made.rows = lambda count: [(value, made, *pair) for value, _, *pair in rows]
+    return made
+
+
+@pytest.mark.usefixtures("told")
+def test_twice_as_many_are_looked_at_as_are_named():
+    """Of eight the first four, of which the last two are the best."""
+    found = candidates.candidates([searched(*POLES)], 2)
+    assert [tuple(each.sensor) for each in found] == [POLES[3], POLES[2]]
+
+
+@pytest.mark.usefixtures("told")
+def test_settings_that_are_near_count_once():
+    near = [(20.0, 7.0), (33.0, 7.0), (20.0, 40.0), (60.0, 7.0)]  # 13 degrees from the first, 11, and 40
+    found = candidates.candidates([searched(*near)], 4)
+    assert [tuple(each.sensor) for each in found] == [(60.0, 7.0), (20.0, 7.0)]
+
+
+@pytest.mark.usefixtures("told")
+def test_the_least_of_several_searches_are_first():
+    """Those that two searches both list first: the rank within a search decides, not the search."""
+    found = candidates.candidates([searched(*POLES[:4]), searched(*POLES[4:])], 1)
+    assert [tuple(each.sensor) for each in found] == [POLES[4]]
+
+
+@pytest.mark.parametrize("moved", [0, 1])
+def test_a_setting_differs_where_sensor_or_light_does(moved):
+    row = (1.0, None, np.array([30.0, 60.0]), np.array([40.0, 200.0]))
+    for by, differs in ((14.0, False), (16.0, True)):
+        other = [row[2].copy(), row[3].copy()]
+        other[moved][0] += by
+        assert candidates._differ(row, (2.0, None, *other)) == differs
+
+
+def test_directions_are_taken_that_are_far_from_all_before():
+    """Every 10 degrees along a meridian: 15 degrees are left between any two, so that each second one is taken."""
+    angles = np.radians(10.0 * np.arange(9))
+    directions = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], -1)
+    assert candidates._spread(directions, 9) == [0, 2, 4, 6, 8]
+    assert candidates._spread(directions, 3) == [0, 2, 4]
+    assert candidates._spread(directions[[4, 3, 0, 1, 8]], 9) == [0, 2, 4]

@@ -1,0 +1,88 @@
+"""The references of the hard cases: a point's place and its camera, against the planner's own projection."""
+
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import planner
+from imaging.geometry.projection import project_ideal
+from scenes import Pose
+from validation.hard import precise, precise_models
+from validation.report import precision_figure
+
+SENSOR, LIGHT = (37.0, 112.0), (21.0, 301.0)
+
+
+def test_a_point_is_imaged_from_the_cameras_distance(task1):
+    """Not from the light's, which is another one; px from the image's middle."""
+    camera = task1.camera.model_copy(update={"distance": 83.0})
+    inputs = precise.Inputs.of(task1.model_copy(update={"camera": camera}), SENSOR, LIGHT)
+    middle = (np.array([camera.width, camera.height]) - 1) / 2
+    seen = project_ideal(task1.solid.vertices, np.array(SENSOR), camera) - middle
+    found = [[float(x) for x in precise.image_of(v, inputs, precise.mpf(camera.focal_px))] for v in inputs.vertices]
+    assert np.array(found) == pytest.approx(seen, rel=1e-9, abs=1e-9)
+    assert [float(x) for x in inputs.distances] == [83.0, 100.0]
+    assert Pose(*map(float, inputs.sensor)) == Pose(*SENSOR)
+
+
+def test_the_poses_that_are_held_are_those_of_the_titles():
+    """Of the figure about single precision: one moves, the other is held where its panel says."""
+    asked, drawn = [], []
+
+    def error(scene, sensors, lights):
+        asked.append((sensors, lights))
+        return np.full(len(sensors), 1e-7)
+
+    keep = mock.patch.object(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    with keep, mock.patch.object(precision_figure, "error_of_single", error):
+        precision_figure.draw(Path("x.png"), 30.0)
+    (sensors, held), (still, lights) = asked
+    assert np.unique(held, axis=0).tolist() == [[15.0, 315.0]]
+    assert np.unique(still, axis=0).tolist() == [[30.0, 135.0]]
+    assert sensors.tolist() == lights.tolist() == precision_figure.ViewingSpace(30.0, (0, 90)).poses.tolist()
+    titles = [axes.get_title() for axes in drawn[0].axes[:2]]
+    assert [title.split("\n")[0] for title in titles] == [
+        "sensor moves, light (15, 315)", "light moves, sensor (30, 135)"
+    ]  # fmt: skip
+
+
+def test_contrast_is_low_where_the_planner_says_so(task1):
+    """Below five sigma of an edge's root mean square contrast: the same noise divides the reference's answers."""
+
+    def noisy(sigma):
+        return task1.model_copy(update={"noise": task1.noise.model_copy(update={"sigma": sigma, "bits": None})})
+
+    def is_low(sigma):
+        return planner.predict(noisy(sigma), SENSOR, LIGHT).status == "low_contrast"
+
+    low, high = 0.01, 1000.0
+    assert is_low(high)
+    assert not is_low(low)
+    while high / low > 1.001:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if is_low(middle) else (middle, high)
+    answers = []
+    for sigma in (0.99 * low, 1.01 * high):  # the reference's rule is of 8 nodes here
+        inputs = precise.Inputs.of(noisy(sigma), SENSOR, LIGHT)
+        answers.append(precise_models.calibrated(noisy(sigma), inputs, adaptive=False))
+    assert answers[1] == "low_contrast"
+    assert float(answers[0]) == pytest.approx(planner.predict(noisy(0.99 * low), SENSOR, LIGHT).variance_px2, rel=1e-3)
+
+
+def test_conditions_in_closed_form():
+    """Sum of |x df/dx| / |f|: the exponents of a product; what is zero has no part in it."""
+    inputs = precise.Inputs(*((precise.mpf(a), precise.mpf(b)) for a, b in ((3, 0), (5, 7), (11, 13))), ((1, 2, 3),))
+
+    def product(at):
+        return at.sensor[0] ** 3 / at.light[1] * at.distances[0] ** 2 * precise.mpf(at.vertices[0][2])
+
+    assert precise.condition(product, inputs) == pytest.approx(3 + 1 + 2 + 1, rel=1e-9)
+    assert precise.condition(lambda at: "not_visible", inputs) == np.inf
+    assert precise.condition(lambda at: precise.mpf(0), inputs) == np.inf
+    numbers = [precise.mpf(2), precise.mpf(0), precise.mpf(3)]
+    assert precise.condition_of(lambda x: x[0] ** 4 / x[2] + x[1], numbers) == pytest.approx(5, rel=1e-9)
+    told = precise.reference(lambda x: x[0] ** 2 * x[1], [1.5, 2.0])
+    assert (told.value, told.condition) == (4.5, pytest.approx(3, rel=1e-9))

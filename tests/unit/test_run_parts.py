@@ -1,0 +1,84 @@
+"""What a job commits, which images it keeps, and which machines give the same numbers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from validation.batch import job, machine, work
+from validation.batch.stages import Stages
+from validation.batch.store import RunFile
+
+
+class Store:
+    """A run file in which two chunks of three are finished, and after the next piece of work all."""
+
+    def __init__(self, chunks):
+        self.known, self.dropped, self.added = chunks, [], []
+
+    def add(self, index, found):
+        self.added.append((index, found))
+
+    def chunks(self, index):
+        return dict.fromkeys(range(self.known), 64)
+
+    def drop_image(self, index):
+        self.dropped.append(index)
+
+
+@pytest.mark.parametrize(
+    ("index", "chunks", "more", "is_dropped"),
+    [
+        (64, 3, None, True), (63, 3, None, False), (64, 2, None, False), (70, 3, lambda _: None, False),
+        (2, 2, None, False),
+    ],
+    ids=["beyond those kept", "one that is kept", "not finished", "more may be asked", "kept and not finished"],
+)  # fmt: skip
+def test_the_image_of_a_finished_setting_is_given_up(index, chunks, more, is_dropped):
+    """Only where the setting is beyond the first 64, all its chunks are there, and nobody asks for more."""
+    store, said = Store(chunks), []
+    batch = SimpleNamespace(store=store, stages=Stages([[600] * 71]), more=more, done=10, total=900)
+    batch.progress = lambda *told: said.append(told)
+    found = work.Found(None, dict.fromkeys((0, 2), None))
+    job._Batch._commit(batch, index, found)
+    assert store.added == [(index, found)]
+    assert store.dropped == [index] * is_dropped
+    assert said == [("images", 10 + 250 + 100, 900)]
+
+
+def test_images_of_stages():
+    """In all, those of the last stage."""
+    stages = Stages([[3, 4], [10, 4]])
+    assert (stages.total, stages.later) == (14, [[10, 4]])
+    assert not stages.extend([9, 4])
+    assert stages.extend([2, 260])
+    assert (stages.total, stages.sizes(0), stages.sizes(1)) == (270, {0: 3, 1: 7}, {0: 4, 1: 250, 2: 6})
+
+
+def test_an_image_that_is_given_up_is_gone(tmp_path):
+    """That of one setting; the others stay, and all else of it."""
+    store = RunFile(tmp_path / "run", {"campaign": {}, "seed": 1})
+    for setting in (0, 1):
+        clean = work.Clean(work.Packed.of(np.full((2, 3), 5.0 + setting)), {}, {}, {"render": 0.5})
+        store.add(setting, work.Found(clean, {}))
+    store.drop_image(1)
+    assert (store.has_image(0), store.has_image(1), store.image(1)) == (True, False, None)
+    assert store.image(0).tolist() == [[5.0] * 3] * 2
+    assert store.seconds() == {"render": 1.0}
+    store.close()
+
+
+ONE = {"processor": "P", "numpy": "AVX2", "blas": "Haswell", "embree": "AVX2", "system": "s", "cores": 2}
+
+
+def test_machines_that_give_the_same_digits():
+    """However many cores they have, and whatever the system."""
+    assert machine.same(ONE, {**ONE, "system": "t", "cores": 64})
+    for key in ("processor", "numpy", "blas", "embree"):
+        assert not machine.same(ONE, {**ONE, key: "other"}), key
+        assert not machine.same(ONE, {name: value for name, value in ONE.items() if name != key}), key
+
+
+def test_a_machine_in_words():
+    assert machine.named(ONE) == "processor P, numpy AVX2, blas Haswell, embree AVX2"
+    assert machine.named({**ONE, "blas": "", "numpy": "AVX512"}) == "processor P, numpy AVX512, embree AVX2"

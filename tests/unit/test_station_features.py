@@ -1,0 +1,55 @@
+"""How a circle is found again in a picture of another station: the fit of its rim, and where there is none."""
+
+import numpy as np
+import pytest
+
+from imaging.features.circles import Rim
+from planner.budgeting.features import _fit
+
+POINTS = 7
+
+
+def rim(rng, **parts):
+    """Seven points of uneven arcs and contrasts, of which all are seen well, and three parameters."""
+    made = {
+        "design": rng.normal(size=(POINTS, 3)), "arc": rng.uniform(0.5, 2, POINTS),
+        "squared": rng.uniform(400, 900, POINTS), "noise_variance": 2.5, "clear": np.ones(POINTS, bool),
+    }  # fmt: skip
+    return Rim(**(made | parts))
+
+
+def test_the_fit_weighs_by_contrast_and_arc(rng):
+    """Against NumPy's least squares of rows scaled by the weights' roots."""
+    seen, offsets = rim(rng), rng.normal(size=POINTS)
+    root = np.sqrt(seen.squared / seen.noise_variance * seen.arc)
+    expected = np.linalg.lstsq(seen.design * root[:, None], offsets * root, rcond=None)[0]
+    assert _fit(seen) @ offsets == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("how", ["disturbed", "weak"])
+def test_points_that_are_not_found_have_no_weight(rng, how):
+    """Disturbed ones, and those below five sigma of contrast: 62.5 squared here."""
+    seen = rim(rng)
+    if how == "disturbed":
+        other = Rim(**{**vars(seen), "clear": np.arange(POINTS) != 4})
+    else:
+        other = Rim(**{**vars(seen), "squared": np.where(np.arange(POINTS) == 4, 62.4, seen.squared)})
+    fit = _fit(other)
+    assert np.flatnonzero(np.abs(fit).max(0) == 0).tolist() == [4]
+    kept = np.arange(POINTS) != 4
+    assert fit @ seen.design == pytest.approx(np.eye(3), abs=1e-9)
+    assert fit[:, kept].shape == (3, 6)
+
+
+@pytest.mark.parametrize("how", ["nothing seen", "a column of zeros", "two columns alike"])
+def test_a_rim_that_tells_no_circle_is_found_nowhere(rng, how):
+    """NaN for each of the three parameters and seven points."""
+    seen = rim(rng)
+    changed = {"squared": np.zeros(POINTS)} if how == "nothing seen" else {"design": seen.design.copy()}
+    if how == "a column of zeros":
+        changed["design"][:, 1] = 0
+    if how == "two columns alike":
+        changed["design"][:, 1] = 3 * changed["design"][:, 0]
+    found = _fit(Rim(**{**vars(seen), **changed}))
+    assert found.shape == (3, POINTS)
+    assert np.isnan(found).all()
