@@ -29,7 +29,9 @@ _PAST = 1e-6  # of the part's size: how far behind what a ray has met from insid
 _MOST_PASSED = 10_000  # triangles that a ray passes from inside
 
 
-def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]):
+def first_face(
+    solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...], *, margin: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """The first face whose outside a ray meets.
 
     Parameters
@@ -38,6 +40,9 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
         The ray is origin + t vector, t > 0.
     own : tuple of int
         Faces that cannot be met.
+    margin : float
+        Of the part's size. What passes a triangle's side more closely is decided in double precision: the same on every
+        processor, where single precision alone may take either.
 
     Returns
     -------
@@ -48,7 +53,7 @@ def first_face(solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tupl
     """
     shape = origins.shape[:-1]
     rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
-    face, t = (by_embree if rtcore_scene else by_trial)(_plates(solid), *rays, own)
+    face, t = (by_embree if rtcore_scene else by_trial)(_plates(solid, margin), *rays, own)
     return face.reshape(shape), t.reshape(shape)
 
 
@@ -79,6 +84,7 @@ def by_embree(
     lengths = np.linalg.norm(vectors, axis=1)
     at, rays = _entries(plates, origins, vectors, lengths)
     passed, last = np.isin(plates.faces, own), np.full(len(origins), -1)
+    doubtful = np.zeros(len(origins), bool)
     step = np.full(len(origins), _PAST * plates.radius)
     for _ in range(_MOST_PASSED):
         if not rays.size:
@@ -92,12 +98,16 @@ def by_embree(
         over = np.einsum("ni,ni->n", origins[rays], plates.normals[which]) - plates.heights[which]
         with np.errstate(divide="ignore", invalid="ignore"):
             place = -over / fall
+        if plates.margin:
+            doubtful[rays] |= ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
         outside = (fall < 0) & (over > 0) & (place > _STEP) & ~passed[which]
         face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
         rays, which, away = rays[~outside], which[~outside], away[~outside]
         step[rays] = np.where(which == last[rays], 2 * step[rays], _PAST * plates.radius)
         last[rays] = which
         at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
+    if doubtful.any():
+        face[doubtful], t[doubtful] = by_trial(plates, origins[doubtful], vectors[doubtful], own)
     return face, t
 
 
@@ -216,6 +226,7 @@ class Plates:
     heights: np.ndarray
     duals: np.ndarray
     shifts: np.ndarray
+    margin: float = 0.0
 
     @cached_property
     def farthest(self) -> float:
@@ -234,10 +245,33 @@ class Plates:
 
     @cached_property
     def tree(self) -> Any:
-        """Embree's, of the triangles in a sphere of radius 1."""
+        """Embree's, of the triangles in a sphere of radius 1, each wider by the margin."""
         scene = rtcore_scene.EmbreeScene(robust=True)
-        TriangleMesh(scene, ((self.corners.swapaxes(0, 1) - self.centre) / self.radius).astype(np.float32))
+        corners = (self.corners.swapaxes(0, 1) - self.centre) / self.radius
+        if self.margin:
+            sides = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, 1, 1), axis=-1, keepdims=True)
+            middle = (corners * sides).sum(1, keepdims=True) / sides.sum(1, keepdims=True)  # of the circle within
+            radius = self._heights.T[:, :1] * sides[:, 0] / sides.sum(1) / self.radius
+            corners = middle + (corners - middle) * (1 + self.margin / np.maximum(radius, self.margin))[..., None]
+        TriangleMesh(scene, corners.astype(np.float32))
         return scene
+
+    @cached_property
+    def _heights(self) -> np.ndarray:
+        """Of each corner over the side across, (3, T)."""
+        one, two = 1 / np.linalg.norm(self.duals, axis=-1)
+        side = np.linalg.norm(self.corners[2] - self.corners[1], axis=-1)
+        across = one * np.linalg.norm(self.corners[2] - self.corners[0], axis=-1)
+        return np.stack([across / side, one, two])
+
+    def well_within(self, which: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Whether places (n, 3) in the planes of triangles (n,) lie on them, farther within than twice the margin."""
+        one, two = (
+            np.einsum("ni,ni->n", places, dual[which]) - shift[which]
+            for dual, shift in zip(self.duals, self.shifts, strict=True)
+        )
+        within = np.stack([1 - one - two, one, two]) * self._heights[:, which]
+        return within.min(0) > 2 * self.margin * self.radius
 
     def some(self, which: np.ndarray) -> Plates:
         """Those of them."""
@@ -246,16 +280,20 @@ class Plates:
 
 
 @lru_cache(maxsize=16)
-def _plates(solid: Solid) -> Plates:
-    triangles, normals = solid.triangles, solid.normals[solid.triangle_faces]
-    corner, one, two = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+def _plates(solid: Solid, margin: float = 0.0) -> Plates:
+    corner, one, two = solid.triangles[:, 0], *(solid.triangles[:, k] - solid.triangles[:, 0] for k in (1, 2))
     gram = np.einsum("ti,ti->t", one, one), np.einsum("ti,ti->t", one, two), np.einsum("ti,ti->t", two, two)
     size = gram[0] * gram[2] - gram[1] ** 2
     duals = np.stack([gram[2][:, None] * one - gram[1][:, None] * two, gram[0][:, None] * two - gram[1][:, None] * one])
-    duals = duals / size[:, None]
+    with np.errstate(all="ignore"):
+        duals = duals / size[:, None]
+    some = (np.abs(duals).max((0, 2)) > 0) & np.isfinite(duals).all((0, 2))  # the others have no area
+    faces, normals = solid.triangle_faces[some], solid.normals[solid.triangle_faces[some]]
+    corner, duals = corner[some], duals[:, some]
     shifts = np.einsum("kti,ti->kt", duals, corner)
-    corners = np.ascontiguousarray(triangles.swapaxes(0, 1))
-    return Plates(solid.triangle_faces, corners, normals, np.einsum("ti,ti->t", normals, corner), duals, shifts)
+    corners = np.ascontiguousarray(solid.triangles[some].swapaxes(0, 1))
+    heights = np.einsum("ti,ti->t", normals, corner)
+    return Plates(faces, corners, normals, heights, duals, shifts, margin)
 
 
 def _meet(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

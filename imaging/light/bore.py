@@ -8,7 +8,7 @@ difference of the angles alone, so that a Fourier transform around the axis leav
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from imaging.features.seen import plane_axes
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
-from imaging.light.exchange import Exchange, Exchanged, factors_through
+from imaging.light.exchange import Exchange, Exchanged, Hits
 from imaging.light.irradiance import beam
 from scenes import Circle, Scene, Solid
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _AROUND, _DEEP = 48, 24  # patches
 _FINE = 5  # places in a patch, around, over which a form factor is averaged
+_FROM_WALL = 256  # rays
 _NODES = 13  # depths at which the light is told
 _ALIKE = 1e-3  # of the radius: by how much the two rims of one wall may differ
 _WITHIN = 1 - 1e-4  # of the radius of the widest free cylinder: where it is asked what reaches a facet
@@ -75,7 +76,10 @@ def light_in_bore(
     form, gather, nodes = _form_factors(bore.rim.radius / bore.length)
     outside = 0.0, 0.0
     if others is not None:
-        outside = [(each @ others.sent).reshape(_AROUND, -1) for each in _from_outside(bore, others.exchange)]
+        outside = [
+            others.gathered(each, _AROUND * deep, _FROM_WALL).reshape(_AROUND, deep)
+            for each, deep in zip(_from_outside(bore, others.exchange), (_DEEP, _NODES), strict=True)
+        ]
     direct = np.fft.fft(white * (_direct(scene, emitters, bore) + outside[0]), axis=0)
     whole = np.linalg.solve(np.eye(_DEEP) - white * form, direct[..., None])
     found = np.fft.ifft((gather @ whole)[..., 0], axis=0).real + outside[1]
@@ -114,26 +118,13 @@ def _direct(scene: Scene, emitters: tuple[Emitter, ...], bore: Bore) -> np.ndarr
 
 
 @lru_cache(maxsize=4)
-def _from_outside(bore: Bore, exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
-    """Form factors through the openings from the wall's patches and from its nodes to patches outside, (n, p) each."""
+def _from_outside(bore: Bore, exchange: Exchange) -> tuple[Hits, Hits]:
+    """What rays from the wall's patches and from its nodes meet outside."""
     found = []
     for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
         points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
-        found.append(factors_through(exchange, points, normals, partial(_through, bore, points)))
+        found.append(exchange.met(points, normals, _FROM_WALL))
     return found[0], found[1]
-
-
-def _through(bore: Bore, points: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Whether the ways from points (n, 3) of the wall to ends (p, 3) outside leave through an opening, (n, p)."""
-    axis, rim = bore.rim.axis, bore.rim
-    start, stop = (points - rim.centre) @ axis, (ends - rim.centre) @ axis
-    found = np.zeros((len(points), len(ends)), bool)
-    for level, beyond in ((0.0, stop > 0), (-bore.length, stop < -bore.length)):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = (level - start)[:, None] / (stop - start[:, None])
-            place = points[:, None] + share[..., None] * (ends - points[:, None]) - rim.centre
-            found |= beyond & ((place**2).sum(-1) - level**2 < rim.radius**2)
-    return found
 
 
 @lru_cache(maxsize=64)

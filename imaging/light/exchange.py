@@ -1,16 +1,20 @@
-"""Light that plane faces of a body send to each other, by radiosity: of an inner edge, a step, a pocket.
+"""Light that faces of a body send to each other, by radiosity: of an inner edge, a step, a pocket, a blind hole.
 
 Faces on the convex hull see no other, and walls of round through holes have a closed form (`imaging.light.bore`). The
-others are divided into patches, whose form factors with visibility are found once for a solid; light and shadow on
-them, and so the light exchanged, once for each light.
+others, however many, have places spread evenly over them, and patches, which are places near to each other that look
+the same way, so that facets of a fillet share one. Rays tell once for a solid which share of what a patch sees is each
+other one; the patches exchange light by it. What arrives on a face is gathered when it is asked for, by rays from nodes
+of it: what they meet sends its share of the light that falls there, and of what its patch has from the others.
+
+Rays follow Lambert's cosine and a low-discrepancy sequence: a share is off by about their number to the power -0.75,
+and all shares of a place add to 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,87 +25,131 @@ from scenes import Scene, Solid
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
+    from scipy.spatial import cKDTree
 
-_PATCHES = 160  # about, on all faces together
-_LEAST = 6  # of a face, each way
+_PATCHES = 400  # of the whole body
+_PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
+_FROM_NODE = 1024  # rays
+_CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
+_LEAST, _THIN = 6, 0.25  # but at least so many each way, where it is wider than this share of a cell
 _WITHIN = 0.01  # of the first cell's half
-_FINE = 4  # places in a patch, each way, where it is asked what light reaches
-_AT_ONCE = 256  # points whose form factors are made together
-_SMALL = 1e-3  # of the area of all such faces: smaller ones send nothing
-_FLAT = 1e-6  # of a cell's side: how far its corners may be below a horizon
-_LIFT = 1e-6  # of the object's size: between a patch and its own face
+_APART = 2.0  # cells: how far normals of 90 degrees keep places apart
+_AT_ONCE = 200_000  # rays
+_LIFT = 1e-6  # of the object's size: between a place and its own face
+_MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
+_PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places (m, 3) on faces (m,) of a solid, with their normals (m, 3)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+
+    @classmethod
+    def spread(cls, solid: Solid, faces: np.ndarray, count: int) -> Places:
+        """So many, evenly over the area of some faces."""
+        here = np.isin(solid.triangle_faces, faces)
+        triangles, of_face = solid.triangles[here], solid.triangle_faces[here]
+        until = np.cumsum(_areas(triangles))
+        which = np.searchsorted(until, (np.arange(count) + 0.5) / count * until[-1])
+        a, b = _square(count).T
+        a, b = np.where(a + b > 1, 1 - a, a)[:, None], np.where(a + b > 1, 1 - b, b)[:, None]
+        first, second, third = triangles[which].swapaxes(0, 1)
+        points = first + a * (second - first) + b * (third - first)
+        return cls(points, solid.normals[of_face[which]], of_face[which])
+
+
+class Hits(NamedTuple):
+    """What rays meet, k of them: the ray's point and its number, where and on which face, in which patch it ends."""
+
+    starts: np.ndarray
+    rays: np.ndarray
+    points: np.ndarray
+    faces: np.ndarray
+    patches: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """Patches of the faces of a solid that see others.
+
+    Attributes
+    ----------
+    solid : Solid
+    faces : ndarray of int
+        Those faces.
+    cell : float
+        Side of a patch, about.
+    places : Places
+    patches : ndarray of int, shape (m,)
+        The patch of each place.
+    tree : cKDTree
+        Of the patches' middles.
+    """
+
+    solid: Solid
+    faces: np.ndarray
+    cell: float
+    places: Places
+    patches: np.ndarray
+    tree: cKDTree
+
+    @cached_property
+    def between(self) -> np.ndarray:
+        """Form factors between patches, (p, p)."""
+        met = self.met(self.places.points, self.places.normals, _RAYS, turned=True)
+        count = self.tree.n
+        pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
+        return pairs.reshape(count, count) / (_RAYS * np.bincount(self.patches)[:, None])
+
+    def means(self, values: np.ndarray) -> np.ndarray:
+        """Of values (m,) at places those of patches, (p,)."""
+        return np.bincount(self.patches, values) / np.bincount(self.patches)
+
+    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, *, turned: bool = False) -> Hits:
+        """What so many rays from each of points (n, 3) of unit normals meet; ``turned``: others from each."""
+        size = max(1, _AT_ONCE // rays)
+        shifts = _square(len(points)) if turned else np.zeros((len(points), 2))
+        parts = []
+        for at in range(0, len(points), size):
+            part = slice(at, at + size)
+            found = self._met(points[part], normals[part], (_square(rays) + shifts[part, None]) % 1.0)
+            parts.append(found._replace(starts=found.starts + at))
+        return Hits(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray) -> Hits:
+        ways = _ways(normals, square)
+        starts = np.broadcast_to((points + _LIFT * self.solid.extent * normals)[:, None], ways.shape)
+        face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
+        point, ray = np.nonzero(np.isin(face, self.faces))
+        face, t = face[point, ray], t[point, ray]
+        places = starts[point, ray] + t[:, None] * ways[point, ray]
+        return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.cell))[1])
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A rectangle about a face, in its plane, with patches at the middles of its cells and nodes there and on its rim.
+    """A rectangle about a face, in its plane, and nodes on it.
 
     Attributes
     ----------
-    face : int
     corner, one, two : ndarray, shape (3,)
         A corner of the rectangle and its unit sides.
     u, v : ndarray
         Places of the nodes along the sides.
-    patches : ndarray, shape (p, 3)
-        Those on the face.
-    area : float
-        Of one patch: its share of the face.
+    met : Hits
+        What rays from the nodes meet.
     """
 
-    face: int
     corner: np.ndarray
     one: np.ndarray
     two: np.ndarray
     u: np.ndarray
     v: np.ndarray
-    patches: np.ndarray
-    area: float
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """Shape (u v, 3); those on its rim a little within, for in an inner edge light comes from both sides."""
-        u, v = (np.clip(n, _WITHIN * n[1], n[-1] - _WITHIN * n[1]) for n in (self.u, self.v))
-        places = self.corner + u[:, None, None] * self.one + v[:, None] * self.two
-        return places.reshape(-1, 3)
-
-
-@dataclass(frozen=True, eq=False)
-class Patches:
-    """Middles (p, 3) of patches, normals (p, 3), corners from the middles (4, p, 3), areas, and their cells' (p,)."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    corners: np.ndarray
-    areas: np.ndarray
-    cells: np.ndarray
-
-    @classmethod
-    def of(cls, solid: Solid, sheets: tuple[Sheet, ...]) -> Patches:
-        """Of all sheets, one after the other."""
-        counts = [len(sheet.patches) for sheet in sheets]
-        sides = [(sheet.u[-1] / (sheet.u.size - 2), sheet.v[-1] / (sheet.v.size - 2)) for sheet in sheets]
-        corners = [
-            [(i * a * sheet.one + j * b * sheet.two) / 2 for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-            for sheet, (a, b) in zip(sheets, sides, strict=True)
-        ]
-        return cls(
-            np.concatenate([sheet.patches for sheet in sheets]),
-            np.repeat(solid.normals[[sheet.face for sheet in sheets]], counts, 0),
-            np.repeat(np.array(corners), counts, 0).swapaxes(0, 1),
-            np.repeat([sheet.area for sheet in sheets], counts),
-            np.repeat([a * b for a, b in sides], counts),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Exchange:
-    """Patches of all sheets, and form factors between them and from the sheets' nodes."""
-
-    sheets: tuple[Sheet, ...]
-    patches: Patches
-    between: np.ndarray
-    at_nodes: tuple[np.ndarray, ...]
+    met: Hits
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,67 +158,144 @@ class Exchanged:
 
     Attributes
     ----------
+    scene : Scene
+    emitters : tuple of Emitter
     exchange : Exchange
-    sent : ndarray, shape (P,)
-        What each patch sends.
-    told : dict of int to RectBivariateSpline
-        What arrives on a face, by its sheet's coordinates.
+    arriving : ndarray, shape (p,)
+        At the patches, from each other.
     """
 
+    scene: Scene
+    emitters: tuple[Emitter, ...]
     exchange: Exchange
-    sent: np.ndarray
-    told: dict[int, RectBivariateSpline]
+    arriving: np.ndarray
 
     def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What arrives at points (..., 3) on faces (...)."""
         found = np.zeros(faces.shape)
-        for sheet in self.exchange.sheets:
-            here = faces == sheet.face
-            if here.any():
-                away = points[here] - sheet.corner
-                place = (np.clip(away @ side, 0, n[-1]) for side, n in ((sheet.one, sheet.u), (sheet.two, sheet.v)))
-                found[here] = self.told[sheet.face].ev(*place)
+        for face in np.intersect1d(faces, self.exchange.faces):
+            here, sheet = faces == face, _sheet(self.exchange, int(face))
+            away = points[here] - sheet.corner
+            place = (np.clip(away @ side, 0, n[-1]) for side, n in ((sheet.one, sheet.u), (sheet.two, sheet.v)))
+            found[here] = _told(self, int(face)).ev(*place)
         return found
+
+    def gathered(self, met: Hits, count: int, rays: int) -> np.ndarray:
+        """What arrives at ``count`` points from what so many rays from each of them met.
+
+        Of several emitters each is asked for every so manieth ray.
+        """
+        solid, several = self.scene.solid, len(self.emitters)
+        direct = np.zeros(len(met.points))
+        for k, emitter in enumerate(self.emitters):
+            asked = met.rays % several == k
+            direct[asked] = several * _arriving(self.scene, emitter, met.points[asked], solid.normals[met.faces[asked]])
+        sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
+        return np.bincount(met.starts, sent, count) / rays
+
+
+@lru_cache(maxsize=256)
+def _told(light: Exchanged, face: int) -> RectBivariateSpline:
+    """What arrives on a face, by its sheet's coordinates."""
+    from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
+
+    sheet = _sheet(light.exchange, face)
+    size = sheet.u.size, sheet.v.size
+    values = light.gathered(sheet.met, size[0] * size[1], _FROM_NODE).reshape(size)
+    return RectBivariateSpline(sheet.u, sheet.v, values, kx=min(3, size[0] - 1), ky=min(3, size[1] - 1))
 
 
 @lru_cache(maxsize=4)
 def exchange_of(solid: Solid, without: tuple[int, ...]) -> Exchange | None:
     """Of the faces that are not on the convex hull, those ``without`` left out; None where fewer than two are."""
-    areas = np.bincount(solid.triangle_faces, _areas(solid.triangles), len(solid.faces))
-    inner = [f for f in np.flatnonzero(~solid.outer) if f not in without]
-    inner = [f for f in inner if areas[f] > _SMALL * areas[inner].sum()]
-    if len(inner) < 2:
+    from scipy.spatial import cKDTree  # slow to load, and rarely needed
+
+    faces = np.setdiff1d(np.flatnonzero(~solid.outer), without)
+    if len(faces) < 2:
         return None
-    cell = np.sqrt(areas[inner].sum() / _PATCHES)
-    sheets = tuple(_sheet(solid, int(face), cell) for face in inner)
-    patches = Patches.of(solid, sheets)
-    at_nodes = [
-        _seen_factors(solid, sheet.nodes, np.broadcast_to(solid.normals[sheet.face], sheet.nodes.shape), patches)
-        for sheet in sheets
-    ]
-    return Exchange(sheets, patches, _seen_factors(solid, patches.points, patches.normals, patches), tuple(at_nodes))
+    area = _areas(solid.triangles[np.isin(solid.triangle_faces, faces)]).sum()
+    places, cell = Places.spread(solid, faces, _PATCHES * _PLACES), float(np.sqrt(area / _PATCHES))
+    coordinates = _placed(places.points, places.normals, cell)
+    tree = cKDTree(coordinates[_PLACES // 2 :: _PLACES])
+    return Exchange(solid, faces, cell, places, tree.query(coordinates)[1], tree)
+
+
+def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
+    """Coordinates (n, 6) in which what is near belongs to one patch."""
+    return np.concatenate([points / cell, _APART / np.sqrt(2) * normals], axis=-1)
+
+
+def _square(count: int) -> np.ndarray:
+    """So many points that fill the unit square evenly, (n, 2)."""
+    return np.arange(1, count + 1)[:, None] / _PLASTIC ** np.arange(1, 3) % 1.0
+
+
+def _ways(normals: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """Unit vectors about normals (n, 3), as dense as the cosine to them, of points (n, k, 2) of the unit square."""
+    beside = np.eye(3)[np.abs(normals).argmin(-1)]
+    one = np.cross(normals, beside)
+    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    turn, out = 2 * np.pi * square[..., 0], np.sqrt(square[..., 1])
+    along = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1 - square[..., 1])], -1)
+    return along @ np.stack([one, np.cross(normals, one), normals], -2)
 
 
 def _areas(triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
 
-def _sheet(solid: Solid, face: int, cell: float) -> Sheet:
-    """The rectangle along the face's longest edge."""
+@lru_cache(maxsize=32)
+def _sheet(exchange: Exchange, face: int) -> Sheet:
+    """The rectangle along a face's longest edge; nodes that are not on the face see what the nearest place of it does.
+
+    Those on its rim stand a little within, for in an inner edge light comes from both sides.
+    """
+    solid, cell = exchange.solid, exchange.cell * np.sqrt(_PATCHES / _CELLS)
     corners, normal = solid.vertices[list(solid.faces[face])], solid.normals[face]
     sides = np.roll(corners, -1, 0) - corners
     one = max(sides, key=np.linalg.norm)
     one = one / np.linalg.norm(one)
     two = np.cross(normal, one)
-    low, high = ((corners @ np.stack([one, two], 1)).min(0), (corners @ np.stack([one, two], 1)).max(0))
+    low, high = (end(corners @ np.stack([one, two], 1), axis=0) for end in (np.min, np.max))
+    size = high - low
+    counts = np.maximum(np.ceil(size / cell).astype(int), np.where(size > _THIN * cell, _LEAST, 1))
+    u, v = (s * (1 - np.cos(np.pi * np.arange(n + 2) / (n + 1))) / 2 for n, s in zip(counts, size, strict=True))
     corner = normal * solid.offsets[face] + low[0] * one + low[1] * two
-    counts = np.maximum(np.ceil((high - low) / cell).astype(int), _LEAST)
-    middles = [(np.arange(n) + 0.5) / n * size for n, size in zip(counts, high - low, strict=True)]
-    nodes = [np.concatenate([[0.0], m, [size]]) for m, size in zip(middles, high - low, strict=True)]
-    places = (corner + middles[0][:, None, None] * one + middles[1][:, None] * two).reshape(-1, 3)
-    places = places[_on(solid.triangles[solid.triangle_faces == face], places)]
-    area = _areas(solid.triangles[solid.triangle_faces == face]).sum() / max(len(places), 1)
-    return Sheet(face, corner, one, two, *nodes, places, float(area))
+    a, b = (np.clip(n, _WITHIN * n[1], n[-1] - _WITHIN * n[1]) for n in (u, v))
+    nodes = (corner + a[:, None, None] * one + b[:, None] * two).reshape(-1, 3)
+    nodes = _onto(solid, face, nodes, _WITHIN * min(u[1], v[1]))
+    return Sheet(corner, one, two, u, v, exchange.met(nodes, np.broadcast_to(normal, nodes.shape), _FROM_NODE))
+
+
+def _onto(solid: Solid, face: int, points: np.ndarray, within: float) -> np.ndarray:
+    """Points of a face's plane, those outside of it brought to the nearest place a little within its rim."""
+    from scipy.spatial import cKDTree  # slow to load, and rarely needed
+
+    away = ~_on(solid.triangles[solid.triangle_faces == face], points)
+    if not away.any():
+        return points
+    rim = _rim(solid, face, within)
+    found = points.copy()
+    found[away] = rim[cKDTree(rim).query(points[away])[1]]
+    return found
+
+
+_ALONG_RIM = 400  # places
+
+
+def _rim(solid: Solid, face: int, within: float) -> np.ndarray:
+    """Places a little within a face's boundaries, those on the face, (n, 3)."""
+    loops = [solid.faces[face], *(solid.holes[face] if solid.holes else ())]
+    start = np.concatenate([solid.vertices[list(loop)] for loop in loops])
+    way = np.concatenate([solid.vertices[np.roll(loop, -1)] for loop in loops]) - start
+    length = np.linalg.norm(way, axis=1)
+    each = np.maximum(np.ceil(_ALONG_RIM * length / length.sum()).astype(int), 1)
+    side = np.repeat(np.arange(len(each)), each)
+    share = (np.arange(len(side)) - np.repeat(np.cumsum(each) - each, each) + 0.5) / each[side]
+    inwards = np.cross(solid.normals[face], way / length[:, None])
+    places = start[side] + share[:, None] * way[side] + within * inwards[side]
+    inside = _on(solid.triangles[solid.triangle_faces == face], places)
+    return places[inside] if inside.any() else solid.triangles[solid.triangle_faces == face].mean(1)
 
 
 def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -178,61 +303,9 @@ def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     inside = np.ones((len(points), len(triangles)), bool)
     for k in range(3):
-        side = triangles[:, (k + 1) % 3] - triangles[:, k]
-        away = points[:, None] - triangles[:, k]
-        inside &= np.einsum("nti,ti->nt", np.cross(side[None], away), normals) >= 0
+        across = np.cross(normals, triangles[:, (k + 1) % 3] - triangles[:, k])
+        inside &= points @ across.T >= np.einsum("ti,ti->t", across, triangles[:, k])
     return inside.any(1)
-
-
-def form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
-    """From points (n, 3) to patches, nothing between them, (n, p).
-
-    By Lambert's contour integral over a patch' rectangle where all of it is over the point's horizon; else as a disc.
-    """
-    parts = [
-        _form_factors(points[at : at + _AT_ONCE], normals[at : at + _AT_ONCE], patches)
-        for at in range(0, len(points), _AT_ONCE)
-    ]
-    return np.concatenate(parts) if parts else np.zeros((0, len(patches.points)))
-
-
-def _form_factors(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
-    found = np.zeros((len(points), len(patches.points)))
-    heights = points @ patches.normals.T - np.einsum("pi,pi->p", patches.points, patches.normals)
-    n, p = np.nonzero((heights > 0) & (_highest(points, normals, patches) > 0))
-    away, normal, there = patches.points[p] - points[n], normals[n], heights[n, p]
-    distance2, area, cell = (away**2).sum(-1), patches.areas[p], patches.cells[p]
-    corners = [away + offset[p] for offset in patches.corners]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        disc = np.maximum((away * normal).sum(-1), 0) / distance2 * there / (np.pi * distance2 + area) * area
-        whole = 0.0
-        for corner, onward in zip(corners, [*corners[1:], corners[0]], strict=True):
-            turn = np.cross(corner, onward)
-            size = np.linalg.norm(turn, axis=-1)
-            angle = np.arctan2(size, (corner * onward).sum(-1))
-            whole = whole + angle / size * (turn * normal).sum(-1)
-        whole = np.abs(whole) / (2 * np.pi) * area / cell
-    lowest = np.min([(corner * normal).sum(-1) for corner in corners], axis=0)
-    over = (lowest >= -_FLAT * cell**0.5) & np.isfinite(whole)
-    found[n, p] = np.nan_to_num(np.where(over, whole, disc))
-    return found
-
-
-def _highest(points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
-    """At least how high the highest corner of each patch stands over each point's horizon, (n, p)."""
-    middles = normals @ patches.points.T - np.einsum("ni,ni->n", points, normals)[:, None]
-    return middles + np.linalg.norm(patches.corners, axis=-1).max(0)
-
-
-def _seen_factors(solid: Solid, points: np.ndarray, normals: np.ndarray, patches: Patches) -> np.ndarray:
-    """The same, 0 where something stands between."""
-    found = form_factors(points, normals, patches)
-    start, stop = np.nonzero(found)
-    lift = _LIFT * solid.extent
-    origin, end = points[start] + lift * normals[start], patches.points[stop] + lift * patches.normals[stop]
-    _, t = first_face(solid, origin, end - origin, ())
-    found[start[t < 1], stop[t < 1]] = 0.0
-    return found
 
 
 @lru_cache(maxsize=8)
@@ -241,42 +314,22 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     exchange = exchange_of(scene.solid, without)
     if exchange is None:
         return None
-    white = np.concatenate(
-        [np.full(len(sheet.patches), scene.surfaces.of(sheet.face).diffuse()) for sheet in exchange.sheets]
-    )
-    direct = _direct(scene, exchange.patches, emitters)
-    sent = np.linalg.solve(np.eye(direct.size) - white[:, None] * exchange.between, white * direct)
-    from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
-
-    told = {
-        sheet.face: RectBivariateSpline(sheet.u, sheet.v, (factors @ sent).reshape(sheet.u.size, sheet.v.size))
-        for sheet, factors in zip(exchange.sheets, exchange.at_nodes, strict=True)
-    }
-    return Exchanged(exchange, sent, told)
+    places, white = exchange.places, _white(scene, exchange.places.faces)
+    direct = sum(_arriving(scene, each, places.points, places.normals) for each in emitters)
+    lends = np.eye(exchange.tree.n) - exchange.means(white)[:, None] * exchange.between
+    sent = np.linalg.solve(lends, exchange.means(white * direct))
+    return Exchanged(scene, emitters, exchange, exchange.between @ sent)
 
 
-def _direct(scene: Scene, patches: Patches, emitters: tuple[Emitter, ...]) -> np.ndarray:
-    """What arrives on patches from the lights, (p,): the mean over places in their cells, for shadows cross them."""
-    share = (np.arange(_FINE) + 0.5) / _FINE
-    a, b = np.stack(np.meshgrid(share, share), -1).reshape(-1, 2).T[:, :, None, None]
-    first, right, _, left = patches.corners
-    points = patches.points + first + a * (right - first) + b * (left - first)  # (cells, p, 3)
-    start, found = points + _LIFT * scene.solid.extent * patches.normals, 0.0
-    for emitter in emitters:
-        at = np.array(emitter.at)
-        blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, ())
-        arriving = beam(emitter, points)
-        cosine = np.maximum(np.einsum("cpi,pi->cp", arriving.to_light, patches.normals), 0)
-        found = found + np.where((blocker < 0) | (t >= 1), arriving.strength * cosine, 0.0)
-    return found.mean(0)
+def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
+    """Diffuse reflectance of faces (n,)."""
+    return np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds[faces]]
 
 
-def factors_through(
-    exchange: Exchange, points: np.ndarray, normals: np.ndarray, free: Callable[[np.ndarray], np.ndarray]
-) -> np.ndarray:
-    """Form factors from points (n, 3) of unit normals (n, 3) to the patches, (n, p).
-
-    ``free`` says which ways to their middles (p, 3) are, bool (n, p).
-    """
-    patches = exchange.patches
-    return np.where(free(patches.points), form_factors(points, normals, patches), 0.0)
+def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Irradiance of points (n, 3) of unit normals by one emitter, 0 in shadow."""
+    start, at = points + _LIFT * scene.solid.extent * normals, np.array(emitter.at)
+    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
+    arriving = beam(emitter, points)
+    cosine = np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
+    return np.where((blocker < 0) | (t >= 1), arriving.strength * cosine, 0.0)

@@ -1,11 +1,17 @@
-"""Light between surfaces against the closed forms of form factors: a cylinder's wall, two plates at a right angle."""
+"""Light between surfaces against closed forms of form factors: a wall, a right angle, a blind hole, a cavity."""
 
 import numpy as np
 import pytest
+import trimesh
 
 import scenes
+from imaging.light.between import light_between
 from imaging.light.bore import _form_factors
-from imaging.light.exchange import Patches, form_factors
+from imaging.light.emitters import emitters
+from imaging.light.exchange import Hits, _arriving, exchange_of, exchanged
+from imaging.pictures import Pictures
+from scenes.lights import GLANCE
+from scenes.parts.mesh import solid as mesh_solid
 
 
 @pytest.mark.parametrize("deep", [0.5, 2.0, 4.0])
@@ -22,26 +28,110 @@ def test_a_bore_sees_itself(deep):
     assert np.ptp(at_nodes[0].real.sum(1)) > 0.05 * at_nodes[0].real.sum(1).max()  # it is no constant
 
 
-def test_plates_at_a_right_angle():
+_RAYS = 16384
+_FEW_RAYS = 5 * _RAYS**-0.75  # a low-discrepancy sequence's error
+
+
+@pytest.mark.parametrize(("away", "along"), [(0.4, 0.2), (0.05, 0.7)])
+def test_plates_at_a_right_angle(away, along):
     """A point y before a corner of an upright w x h: (atan(w / y) - y / s atan(w / s)) / 2 pi, s^2 = y^2 + h^2."""
-    height, width, y = 2.0, 3.0, 0.7
-    cells = [((i + 0.5) / 4, (j + 0.5) / 12) for i in range(4) for j in range(12)]
-    middles = np.array([[0.0, width * v, height * u] for u, v in cells])
-    half = np.array([[0, s * width / 24, t * height / 8] for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
-    corners = np.repeat(half[:, None], len(middles), 1)
-    area = np.full(len(middles), width / 12 * height / 4)
-    patches = Patches(middles, np.tile([1.0, 0, 0], (len(middles), 1)), corners, area, area)
-    found = form_factors(np.array([[y, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]), patches).sum()
+    solid = scenes.load("bracket").solid
+    exchange = exchange_of(solid, ())
+    wall = next(f for f in exchange.faces if abs(solid.normals[f, 2]) < 0.5)
+    corners = solid.vertices[list(solid.faces[wall])]
+    side = np.cross(solid.normals[wall], [0, 0, 1])
+    height, width = np.ptp(corners[:, 2]), np.ptp(corners @ side)
+    foot = corners[np.lexsort([corners @ side, corners[:, 2].round(9)])[0]]
+    y, parts = away * height, (along * width, (1 - along) * width)
+    point = foot + along * width * side + y * solid.normals[wall]
     slant = np.hypot(y, height)
-    expected = (np.arctan(width / y) - y / slant * np.arctan(width / slant)) / (2 * np.pi)
-    assert found == pytest.approx(expected, rel=1e-6)
-    behind = form_factors(np.array([[-y, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]), patches)
-    assert not behind.any()
+    expected = sum((np.arctan(w / y) - y / slant * np.arctan(w / slant)) / (2 * np.pi) for w in parts)
+    found = exchange.met(point[None], np.array([[0.0, 0.0, 1.0]]), _RAYS)
+    assert len(found.rays) / _RAYS == pytest.approx(expected, abs=_FEW_RAYS)
+    assert set(found.faces) == {wall}
+    assert (found.points - foot) @ solid.normals[wall] == pytest.approx(0.0, abs=1e-12 * solid.extent)
+
+
+def test_a_blind_hole_sees_the_sky_through_its_mouth():
+    """The middle of its bottom: R^2 / (R^2 + h^2) of what it sees is sky; nothing else is left over."""
+    radius, deep = 3.0, 4.0
+    cup = trimesh.creation.revolve(
+        [(0, 0), (6, 0), (6, 1 + deep), (radius, 1 + deep), (radius, 1), (0, 1)], sections=96
+    )
+    solid = mesh_solid(cup)
+    exchange = exchange_of(solid, ())
+    bottom = next(f for f in exchange.faces if solid.normals[f, 2] > 0.5)
+    found = len(exchange.met(np.array([[0.0, 0.0, 1.0]]), solid.normals[[bottom]], _RAYS).rays) / _RAYS
+    flats = 1 - np.cos(np.pi / 96)  # how far the middles of its 96 facets stand within
+    assert 1 - found == pytest.approx(radius**2 / (radius**2 + deep**2), abs=_FEW_RAYS + 2 * flats)
+
+
+def test_a_cavity_sees_itself_alone():
+    """A hollow block: from every patch all rays meet patches; between its walls the closed form of opposed plates."""
+    inner = trimesh.creation.box((3.0, 4.0, 1.0))
+    inner.invert()
+    solid = mesh_solid(trimesh.util.concatenate([trimesh.creation.box((5.0, 6.0, 4.0)), inner]))
+    exchange = exchange_of(solid, ())
+    assert exchange.between.sum(1) == pytest.approx(1.0, abs=1e-12)
+    of_patch = [np.bincount(exchange.places.faces[exchange.patches == k]).argmax() for k in range(exchange.tree.n)]
+    count = np.bincount(exchange.patches)
+    for axis, (a, b) in enumerate([(4.0, 1.0), (3.0, 1.0), (3.0, 4.0)]):
+        one, two = (f for f in exchange.faces if abs(solid.normals[f, axis]) > 0.5)
+        of_one, of_two = np.equal(of_patch, one), np.equal(of_patch, two)
+        there, back = exchange.between[np.ix_(of_one, of_two)], exchange.between[np.ix_(of_two, of_one)]
+        x, y = np.array([a, b]) / (3.0, 4.0, 1.0)[axis]
+        s, t = np.sqrt(1 + x**2), np.sqrt(1 + y**2)
+        form = np.log(s * t / np.sqrt(1 + x**2 + y**2)) + x * t * np.arctan(x / t) + y * s * np.arctan(y / s)
+        form = 2 / (np.pi * x * y) * (form - x * np.arctan(x) - y * np.arctan(y))
+        there, back = (np.average(f.sum(1), weights=count[of]) for f, of in ((there, of_one), (back, of_two)))
+        assert [there, back] == pytest.approx([form, form], rel=0.15)  # margin: 0.05, patches at edges
+    assert exchange.tree.n == pytest.approx(400, abs=40)
+
+
+def test_many_points_see_what_each_of_them_does():
+    """What is asked in several parts, for they are many rays."""
+    exchange = exchange_of(scenes.load("bracket").solid, ())
+    points, normals = exchange.places.points[:70], exchange.places.normals[:70]
+    whole = exchange.met(points, normals, 4096)
+    assert whole.starts.max() > 200_000 // 4096
+    for start in (0, 48, 69):
+        alone = exchange.met(points[[start]], normals[[start]], 4096)
+        of_it = whole.starts == start
+        assert whole.rays[of_it].tolist() == alone.rays.tolist()
+        assert whole.faces[of_it].tolist() == alone.faces.tolist()
+
+
+def test_what_rays_gather():
+    """Of what they meet the light that falls there and what its patch has, by its reflectance; of two lights each by
+    every second ray, doubled.
+    """
+    scene = scenes.load("bracket")
+    dull = next(f for f in np.flatnonzero(~scene.solid.outer) if scene.solid.normals[f, 2] > 0.5)
+    paint = scenes.FaceMaterial(name="dull", faces=(scene.solid.face_names[dull],), diffuse_reflectance=0.2)
+    scene = scene.with_(materials=(paint,))
+    shining = [
+        tuple(
+            each._replace(at=tuple(each.at.tolist()))
+            for each in emitters(scene, Pictures.of(scene, (40, 30), pose).lights, GLANCE)
+        )
+        for pose in ((30.0, 80.0), (50.0, -100.0))
+    ]
+    both = exchanged(scene, shining[0] + shining[1], ())
+    one, two = (exchanged(scene, each, ()) for each in shining)
+    assert both.arriving == pytest.approx(one.arriving + two.arriving, rel=1e-9)
+    exchange, places = both.exchange, both.exchange.places
+    here = [3, 500, 2500, 5000]
+    met = Hits(
+        np.array([0, 0, 2, 2]), np.array([0, 1, 3, 4]), places.points[here], places.faces[here], exchange.patches[here]
+    )
+    white = np.array([scene.surfaces.of(face).diffuse() for face in met.faces])
+    assert len(set(white)) == 2
+    direct = [_arriving(scene, *each, met.points, scene.solid.normals[met.faces]) for each in shining]
+    by_turns = 2 * np.where(met.rays % 2, direct[1], direct[0])
+    sent = white * (by_turns + both.arriving[met.patches])
+    assert both.gathered(met, 3, 8) == pytest.approx([(sent[0] + sent[1]) / 8, 0.0, (sent[2] + sent[3]) / 8], rel=1e-12)
 
 
 def test_a_convex_body_has_none():
-    from imaging.light.between import light_between
-    from imaging.pictures import Pictures
-
     pictures = Pictures.of(scenes.load("task1"), (30, 135), (15, 315))
     assert light_between(pictures, np.zeros((3, 3)), np.zeros(3, int)) == 0

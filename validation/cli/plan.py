@@ -35,7 +35,15 @@ Over = Annotated[str, typer.Option(help="Of several measurands: minimax (worst s
 Search = Annotated[str, typer.Option(help="exhaustive or alternating (the paper's)")]
 Model = Annotated[str, typer.Option(help="calibrated or paper")]
 Edges = Annotated[str, typer.Option(help="given, or best of all sets that measure the same")]
-Step = Annotated[float | None, typer.Option(help="Grid step, degrees; default 1, or 10 for hollow or glossy.")]
+Step = Annotated[
+    float | None,
+    typer.Option(
+        help=(
+            "Grid step, degrees; default 1 where a bound leaves out most pairs (a matt convex part, a point light), "
+            "else 10 (5 for several pictures that need no ray tracing)."
+        )
+    ),
+]
 Pair = Annotated[str | None, typer.Option(metavar="P,A", help="Hold it fixed: polar angle and azimuth, degrees.")]
 Shares = Annotated[str, typer.Option(help="Of several lights in their total: best, or given by the scene.")]
 Start = Annotated[str, typer.Option(metavar="P,A", help="First sensor of the alternating search.")]

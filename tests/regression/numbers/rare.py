@@ -142,14 +142,11 @@ def _bores():
     found = {}
     for name in ("plate", "bracket_mm", "flange"):
         for i, each in enumerate(bore.bores(load(name).solid)[:2]):
-            rng = np.random.default_rng(i)
             one, two = plane_axes(each.rim.axis)
             turn = np.array([0.3, 2.1, 4.4, 5.9])
             wall = each.rim.centre + each.rim.radius * (np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * two)
             wall = wall - each.rim.axis * each.length * np.array([[0.1], [0.4], [0.7], [0.95]])
-            ends = each.rim.centre + rng.normal(0, 3 * each.length, (9, 3))
-            found[f"{name} {i}"] = [each.length, each.free_radius, len(each.faces), bore.place_in(each, wall),
-                                    bore._through(each, wall, ends)]  # fmt: skip
+            found[f"{name} {i}"] = [each.length, each.free_radius, len(each.faces), bore.place_in(each, wall)]
     form, gather, nodes = bore._form_factors(0.37)
     return found | {"form": [form.real, form.imag, gather.real, nodes]}
 
