@@ -25,7 +25,7 @@ from scenes import Scene, Solid
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
 _PATCHES = 400  # of the whole body
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
@@ -86,7 +86,7 @@ class Exchange:
     places : Places
     patches : ndarray of int, shape (m,)
         The patch of each place.
-    tree : cKDTree
+    tree : KDTree
         Of the patches' middles.
     """
 
@@ -95,7 +95,7 @@ class Exchange:
     cell: float
     places: Places
     patches: np.ndarray
-    tree: cKDTree
+    tree: KDTree
 
     @cached_property
     def between(self) -> np.ndarray:
@@ -208,7 +208,7 @@ def _told(light: Exchanged, face: int) -> RectBivariateSpline:
 @lru_cache(maxsize=4)
 def exchange_of(solid: Solid, without: tuple[int, ...]) -> Exchange | None:
     """Of the faces that are not on the convex hull, those ``without`` left out; None where fewer than two are."""
-    from scipy.spatial import cKDTree  # slow to load, and rarely needed
+    from scipy.spatial import KDTree  # slow to load, and rarely needed
 
     faces = np.setdiff1d(np.flatnonzero(~solid.outer), without)
     if len(faces) < 2:
@@ -216,7 +216,7 @@ def exchange_of(solid: Solid, without: tuple[int, ...]) -> Exchange | None:
     area = _areas(solid.triangles[np.isin(solid.triangle_faces, faces)]).sum()
     places, cell = Places.spread(solid, faces, _PATCHES * _PLACES), float(np.sqrt(area / _PATCHES))
     coordinates = _placed(places.points, places.normals, cell)
-    tree = cKDTree(coordinates[_PLACES // 2 :: _PLACES])
+    tree = KDTree(coordinates[_PLACES // 2 :: _PLACES])
     return Exchange(solid, faces, cell, places, tree.query(coordinates)[1], tree)
 
 
@@ -269,14 +269,14 @@ def _sheet(exchange: Exchange, face: int) -> Sheet:
 
 def _onto(solid: Solid, face: int, points: np.ndarray, within: float) -> np.ndarray:
     """Points of a face's plane, those outside of it brought to the nearest place a little within its rim."""
-    from scipy.spatial import cKDTree  # slow to load, and rarely needed
+    from scipy.spatial import KDTree  # slow to load, and rarely needed
 
     away = ~_on(solid.triangles[solid.triangle_faces == face], points)
     if not away.any():
         return points
     rim = _rim(solid, face, within)
     found = points.copy()
-    found[away] = rim[cKDTree(rim).query(points[away])[1]]
+    found[away] = rim[KDTree(rim).query(points[away])[1]]
     return found
 
 
