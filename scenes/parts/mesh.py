@@ -18,13 +18,13 @@ from scipy.sparse.csgraph import connected_components
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
 from scenes.parts.facets import Chain, Facets, facets
+from scenes.parts.mend import mended
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
 
 FORMATS = (".stl", ".ply", ".obj")
-MOST_BYTES = 32 << 20
-MOST_TRIANGLES = 100_000
-MOST_FACES = 2_000  # plane ones: what is computed grows with the square of their edges
+MOST_BYTES = 64 << 20
+MOST_TRIANGLES = 1_000_000
 _FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
 _PLAIN = {"obj": {"skip_materials": True}}
 _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
@@ -86,7 +86,7 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def solid(mesh: trimesh.Trimesh) -> Solid:
-    """Solid from a closed mesh.
+    """Solid from a mesh, mended where it is clear how (`scenes.parts.mend`).
 
     Coplanar triangles become faces, collinear pieces one edge. Vertices where sharp edges meet are named v1, v2, ... in
     the order of their (x, y, z), sharp edges e1, e2, ... in the order of their ends, circles c1, c2, ... in that of
@@ -97,7 +97,7 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     Raises
     ------
     InvalidInput
-        If the surface is not closed and consistently oriented.
+        If the surface is not closed; the message says where.
 
     Examples
     --------
@@ -110,19 +110,17 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     """
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise InvalidInput("object.file must hold triangles, got none")
-    mesh.merge_vertices()
-    if not mesh.is_volume:
-        raise InvalidInput("object.file must be a closed surface with outward normals, got an open or inverted one")
+    mesh, said = mended(mesh)
     group = _planes(mesh)
-    if group.max() >= MOST_FACES:
-        raise InvalidInput(f"object.file must have at most {MOST_FACES} plane faces, got {group.max() + 1}")
     chains = _straight_chains(mesh.vertices, _pieces(mesh, group))
     if not chains:  # nearly flat: all its triangles count as coplanar
         raise InvalidInput("object.file must have faces that meet at an angle, got triangles that are all coplanar")
     normals, areas = _normals(mesh, group)
     loops = _loops(mesh, group, chains, normals)
     circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
-    return _assembled(mesh, group, chains, loops, circular, facets(mesh.vertices, chains, normals, areas, circular))
+    known = facets(mesh.vertices, chains, normals, areas, circular)
+    plain = _assembled(mesh, group, chains, loops, circular, known)
+    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"])
 
 
 def _assembled(mesh, group: np.ndarray, chains: list[Chain], loops, circular: list[Rim], known: Facets) -> Solid:

@@ -15,6 +15,7 @@ from scenes.parts.curved import Curved
 if TYPE_CHECKING:
     import trimesh
 
+_MANY = 2000  # vertices, of which those on the convex hull are looked for; faces at a time
 _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
 
 
@@ -85,6 +86,10 @@ class Solid:
         One name a face; f1, f2, ... when not given.
     curved : tuple of Curved
         Surfaces that some of the faces stand for.
+    triangle_sources : ndarray of int, shape (T,), optional
+        Numbers of the file's triangles of which they are pieces.
+    mended : tuple of str
+        What was done to a file's triangles to make them a closed surface.
     """
 
     vertex_names: tuple[str, ...]
@@ -97,6 +102,8 @@ class Solid:
     holes: tuple[tuple[tuple[int, ...], ...], ...] = ()
     face_names: tuple[str, ...] = ()
     curved: tuple[Curved, ...] = ()
+    triangle_sources: np.ndarray | None = None
+    mended: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.face_names:
@@ -129,8 +136,14 @@ class Solid:
     @cached_property
     def outer(self) -> np.ndarray:
         """Which faces lie on the convex hull, so that no vertex stands over them; bool, shape (F,)."""
-        over = self.vertices @ self.normals.T - self.offsets
-        return over.max(0) <= _FLAT * self.extent
+        corners = self.vertices
+        if len(corners) > _MANY:
+            from scipy.spatial import ConvexHull  # half a second to load, which a block does not need
+
+            corners = corners[ConvexHull(corners).vertices]
+        parts = range(0, len(self.faces), _MANY)
+        highest = [(corners @ self.normals[i : i + _MANY].T).max(0) for i in parts]
+        return np.concatenate(highest) - self.offsets <= _FLAT * self.extent
 
     @cached_property
     def is_convex(self) -> bool:
@@ -142,7 +155,7 @@ class Solid:
         """Planes (normals, offsets) of the convex hull."""
         if self.is_convex:
             return self.normals, self.offsets
-        from scipy.spatial import ConvexHull  # as trimesh, half a second to load, which a block does not need
+        from scipy.spatial import ConvexHull
 
         planes = ConvexHull(self.vertices).equations
         return planes[:, :3], -planes[:, 3]

@@ -29,6 +29,7 @@ FORMATS = (".step", ".stp")
 MOST_BYTES = 32 << 20
 MOST_SECONDS = 120
 SEGMENTS = 96  # pieces of a full turn; fewer where there are many curved faces
+MOST_FACES = 20_000  # of the file's; then so many plane ones, about, of all of them
 _SAME = 1e-6  # of the part's size: a circle of the mesh is that of an edge
 _MISSING = (
     "object.file must be of a kind that can be read: a STEP file needs OpenCASCADE, pip install 'ice-vision[step]'"
@@ -92,8 +93,6 @@ class StepPart:
         """
         body = trimesh.Trimesh(self.triangles.reshape(-1, 3), np.arange(self.triangles.size // 3).reshape(-1, 3))
         found = mesh.solid(body)
-        if len(found.triangles) != len(self.triangles):
-            raise InvalidInput("object.file must have faces without slivers, got some that vanish")
         edges = tuple(self._known(found))
         return replace(found, face_names=self._face_names(found), circles=self._exact(found), edges=edges)
 
@@ -112,7 +111,7 @@ class StepPart:
     def _owners(self, solid: Solid) -> np.ndarray:
         """The part's face that each plane face of the solid belongs to, shape (F,)."""
         _, first = np.unique(solid.triangle_faces, return_index=True)
-        return self.triangle_faces[first]
+        return self.triangle_faces[solid.triangle_sources[first]]
 
     def _face_names(self, solid: Solid) -> tuple[str, ...]:
         names, given = list(solid.face_names), set(solid.face_names)
@@ -168,7 +167,7 @@ def read(path: Path, unit: Unit = "mm") -> StepPart:
 
 def _asked(path: Path, data: bytes) -> dict[str, Any]:
     """The kernel's record, from a process of its own."""
-    command = [sys.executable, "-P", step_kernel.__file__, str(SEGMENTS), str(mesh.MOST_FACES)]
+    command = [sys.executable, "-P", step_kernel.__file__, str(SEGMENTS), str(MOST_FACES)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, timeout=MOST_SECONDS, check=False)
     except subprocess.TimeoutExpired:

@@ -33,6 +33,7 @@ def facts(scene: Scene) -> dict[str, Any]:
         "faces": [_face(scene, f) for f in range(len(solid.faces)) if solid.plane[f]],
         "cylinders": list(map(_cylinder, facets.values())),
         "surfaces": [_surface(wall, facets.get(wall.name)) for wall in scene.all_walls.curved],
+        "mended": solid.mended,
         "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
     })  # fmt: skip
 
@@ -68,6 +69,7 @@ def report(scene: Scene) -> Group:
         Text(
             f"{scene.title or scene.name}\n"
             f"Object {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
+            + "".join(f"\nMended: {each}" for each in scene.solid.mended)
         )
     ]
     found = (table(f"\n{title}, {unit}", *columns, rows=rows, words=_WORDS) for title, columns, rows in _tables(scene))

@@ -1,0 +1,194 @@
+"""Triangles as files have them: what is done to close a surface, and where it is said to be open."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from scenes.errors import InvalidInput
+from scenes.parts import mesh
+from scenes.parts.mend import mended
+
+SIZE = np.array([3.0, 4.0, 6.0])
+
+
+def box(corner=(0, 0, 0), size=SIZE):
+    made = trimesh.creation.box(size)
+    made.apply_translation(np.array(corner) + np.array(size) / 2)
+    return made
+
+
+def of(*parts, faces=None):
+    """One mesh of the parts' triangles, nothing merged."""
+    joined = trimesh.util.concatenate(parts)
+    return trimesh.Trimesh(joined.vertices, joined.faces if faces is None else faces, process=False)
+
+
+def two_sided(found):
+    """Every edge of two triangles that pass it one way and the other."""
+    return found.is_watertight and found.is_winding_consistent
+
+
+def test_a_closed_surface_stays_as_it_is():
+    before = box()
+    found, said = mended(before.copy())
+    assert said == ()
+    assert found.faces.tolist() == before.faces.tolist()
+    assert found.volume == pytest.approx(72.0)
+
+
+@pytest.mark.parametrize("again", [1, 2])
+def test_triangles_that_are_there_several_times(again):
+    part = box()
+    found, said = mended(of(part, faces=np.concatenate([part.faces, *[part.faces[[2, 7]]] * again])))
+    assert said == (f"doubled triangles left out: {2 * again}",)
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72.0)
+
+
+def test_triangles_of_two_corners():
+    part = box()
+    found, said = mended(of(part, faces=np.concatenate([part.faces, [[1, 1, 5], [2, 6, 2], [3, 4, 4]]])))
+    assert said == ("triangles of two corners left out: 3",)
+    assert len(found.faces) == 12
+
+
+def test_bodies_that_touch_in_a_face_are_one():
+    """Two blocks of unequal length side by side: nothing is left of the wall between them."""
+    one, two = box(), box((-5, 0, 0), (5, 4, 6))
+    two.vertices = [3, 0, 0] + two.vertices * [-1, 1, 1]  # its wall has the same triangles
+    two.invert()
+    found, said = mended(of(one, two))
+    assert said == ("pairs of triangles where bodies touch left out: 2",)
+    assert two_sided(found)
+    assert found.volume == pytest.approx((3 + 5) * 4 * 6)
+    solid = mesh.solid(of(one, two))
+    assert (len(solid.faces), len(solid.sharp), len(solid.vertices)) == (6, 12, 8)
+    assert solid.mended == said
+
+
+@pytest.mark.parametrize("turned", [0, 1])
+def test_bodies_that_touch_in_an_edge_have_it_both(turned):
+    """Two blocks corner to corner, whichever comes first: a chain of one face from each body nowhere."""
+    parts = [box(), box((3, 4, 0), (2, 5, 6))]
+    found, said = mended(of(*parts[:: -1 if turned else 1]))
+    assert said == ("edges in which surfaces touch parted: 1",)
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72 + 60)
+    assert sorted(piece.volume for piece in found.split()) == pytest.approx([60, 72])
+    solid = mesh.solid(of(*parts))
+    assert (len(solid.faces), len(solid.sharp)) == (12, 24)
+    assert all(edge.convex for edge in solid.sharp)
+
+
+def test_a_body_that_touches_itself_in_an_edge():
+    """Two slots that meet in a line from both sides leave a web of no thickness: material is on its two sides."""
+    cells = [(0, 0), (1, 1), (0, 2), (1, 0), (1, 2)]  # of a 2 x 3 grid all but (0, 1); then one less
+    parts = [box((2 * i, 3 * j, 0), (2, 3, 4)) for i, j in (*cells[:3], (2, 0), (2, 2), (2, 1), (1, 2))]
+    found, said = mended(of(*parts))
+    assert any(line.startswith("edges in which surfaces touch parted") for line in said)
+    assert two_sided(found)
+    assert found.volume == pytest.approx(7 * 24)
+    for face, other in found.face_adjacency:  # no pair of triangles has the air between them alone
+        assert len({*found.faces[face]} & {*found.faces[other]}) == 2
+
+
+def test_an_open_edge_that_is_a_small_gap_is_closed():
+    """The lid's corners are 0.1 micrometres off, as of a file in text with few digits."""
+    part = box()
+    lid = np.flatnonzero((part.triangles[:, :, 2] > 5.9).all(1))
+    rest = np.setdiff1d(np.arange(12), lid)
+    shifted = part.vertices + [1e-5, -1e-5, 0]
+    found, said = mended(
+        trimesh.Trimesh(
+            np.concatenate([part.vertices, shifted]),
+            np.concatenate([part.faces[rest], part.faces[lid] + 8]),
+            process=False,
+        )
+    )
+    assert said == ("vertices of open edges joined: 4",)
+    assert two_sided(found)
+    far = trimesh.Trimesh(
+        np.concatenate([part.vertices, part.vertices + [1e-3, 0, 0]]),
+        np.concatenate([part.faces[rest], part.faces[lid] + 8]),
+        process=False,
+    )
+    with pytest.raises(InvalidInput, match="open edges: 8"):
+        mended(far)
+
+
+def test_triangles_that_look_the_other_way_are_turned():
+    part = box()
+    faces = part.faces.copy()
+    faces[[3, 8]] = faces[[3, 8], ::-1]
+    found, said = mended(of(part, faces=faces))
+    assert said == ("triangles that looked the other way turned: 2",)
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72.0)
+
+
+def test_shells_inside_out_are_turned_and_cavities_stay():
+    """Of a hollow block, a block inside out beside it and one in its cavity, too, which has been turned."""
+    outer, cavity, beside, core = (
+        box(),
+        box((0.5, 0.5, 0.5), (2, 3, 5)),
+        box((9, 0, 0), (1, 2, 3)),
+        box((1, 1, 1), (1, 1, 1)),
+    )
+    cavity.invert()
+    beside.invert()
+    found, said = mended(of(outer, cavity, beside, core))
+    assert said == ("inverted shells turned: 1",)
+    assert found.volume == pytest.approx(72 - 30 + 6 + 1)
+    core.invert()
+    found, said = mended(of(outer, cavity, beside, core))
+    assert said == ("inverted shells turned: 1",)
+
+
+def test_a_sheet_of_no_thickness_is_left_out():
+    sheet = np.array([[8.0, 0, 0], [9, 0, 0], [9, 1, 0], [8, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]]) + 8
+    one = box()
+    found, said = mended(
+        trimesh.Trimesh(np.concatenate([one.vertices, sheet]), np.concatenate([one.faces, faces]), process=False)
+    )
+    assert said == ("pairs of triangles where bodies touch left out: 2",)
+    pyramid = np.concatenate([sheet[:3], [[8.5, 0.5, 1e-7]]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]) + 8
+    found, said = mended(
+        trimesh.Trimesh(np.concatenate([one.vertices, pyramid]), np.concatenate([one.faces, faces]), process=False)
+    )
+    assert said == ("shells of no thickness left out: 1",)
+    assert len(found.faces) == 12
+
+
+def test_where_it_is_open_is_said():
+    """How many edges, and the middles of the three longest."""
+    part = box()
+    faces = part.faces[np.flatnonzero(~(part.triangles[:, :, 2] > 5.9).all(1))]
+    with pytest.raises(
+        InvalidInput, match=r"closed surface, got open edges: 4, at \(0, 2, 6\), \(3, 2, 6\), \(1\.5, 0, 6\)"
+    ):
+        mended(of(part, faces=faces))
+
+
+def test_a_surface_that_encloses_nothing_is_no_body():
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    with pytest.raises(InvalidInput, match="of some thickness"):
+        mended(trimesh.Trimesh(square, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]], process=False))
+
+
+def test_triangles_know_which_of_the_file_they_are_pieces_of():
+    """Doubled ones first, then two blocks that touch in an edge: the pieces lie in their triangles' planes."""
+    parts = of(box(), box((3, 4, 0), (2, 5, 6)))
+    before = of(parts, faces=np.concatenate([[[1, 1, 2]], parts.faces[[4]], parts.faces]))
+    places = before.triangles.copy()
+    found, said = mended(before)
+    assert len(said) == 3
+    of_file = places[found.face_attributes["source"]]
+    normal = np.cross(of_file[:, 1] - of_file[:, 0], of_file[:, 2] - of_file[:, 0])
+    assert (np.einsum("ti,ti->t", normal, np.asarray(found.face_normals)) > 0).all()
+    off = np.einsum("ti,tki->tk", normal, found.triangles - of_file[:, :1])
+    assert np.abs(off).max() < 1e-9
+    middle = found.triangles.mean(1)
+    low, high = of_file.min(1), of_file.max(1)
+    assert ((middle >= low - 1e-9) & (middle <= high + 1e-9)).all()
