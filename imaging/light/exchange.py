@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 _PATCHES = 400  # of the whole body
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
-_FROM_NODE = 1024  # rays
+_FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a face that is narrower than a cell
 _CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
-_LEAST, _THIN = 6, 0.25  # but at least so many each way, where it is wider than this share of a cell
+_LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _AT_ONCE = 200_000  # rays
@@ -131,25 +131,26 @@ class Exchange:
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
-    """A rectangle about a face, in its plane, and nodes on it.
-
-    Attributes
-    ----------
-    corner, one, two : ndarray, shape (3,)
-        A corner of the rectangle and its unit sides.
-    u, v : ndarray
-        Places of the nodes along the sides.
-    met : Hits
-        What rays from the nodes meet.
-    """
+class Frame:
+    """A rectangle about a face, in its plane: a corner (3,), its unit sides (2, 3) and their lengths (2,)."""
 
     corner: np.ndarray
-    one: np.ndarray
-    two: np.ndarray
+    sides: np.ndarray
+    size: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Nodes on a face, at places u along one side of its rectangle and v along the other.
+
+    ``met`` is what so many ``rays`` from each of them meet.
+    """
+
+    frame: Frame
     u: np.ndarray
     v: np.ndarray
     met: Hits
+    rays: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +175,8 @@ class Exchanged:
         """What arrives at points (..., 3) on faces (...)."""
         found = np.zeros(faces.shape)
         for face in np.intersect1d(faces, self.exchange.faces):
-            here, sheet = faces == face, _sheet(self.exchange, int(face))
-            away = points[here] - sheet.corner
-            place = (np.clip(away @ side, 0, n[-1]) for side, n in ((sheet.one, sheet.u), (sheet.two, sheet.v)))
-            found[here] = _told(self, int(face)).ev(*place)
+            here = faces == face
+            found[here] = _told(self, int(face)).at(points[here])
         return found
 
     def gathered(self, met: Hits, count: int, rays: int) -> np.ndarray:
@@ -194,15 +193,27 @@ class Exchanged:
         return np.bincount(met.starts, sent, count) / rays
 
 
-@lru_cache(maxsize=256)
-def _told(light: Exchanged, face: int) -> RectBivariateSpline:
-    """What arrives on a face, by its sheet's coordinates."""
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What arrives on a face, by places in the rectangle about it."""
+
+    frame: Frame
+    values: RectBivariateSpline
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """At points (n, 3) of the face."""
+        return self.values.ev(*np.clip((points - self.frame.corner) @ self.frame.sides.T, 0, self.frame.size).T)
+
+
+@lru_cache(maxsize=2048)
+def _told(light: Exchanged, face: int) -> Told:
     from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
 
     sheet = _sheet(light.exchange, face)
-    size = sheet.u.size, sheet.v.size
-    values = light.gathered(sheet.met, size[0] * size[1], _FROM_NODE).reshape(size)
-    return RectBivariateSpline(sheet.u, sheet.v, values, kx=min(3, size[0] - 1), ky=min(3, size[1] - 1))
+    shape = sheet.u.size, sheet.v.size
+    values = light.gathered(sheet.met, shape[0] * shape[1], sheet.rays).reshape(shape)
+    along, across = (min(3, n - 1) for n in shape)
+    return Told(sheet.frame, RectBivariateSpline(sheet.u, sheet.v, values, kx=along, ky=across))
 
 
 @lru_cache(maxsize=4)
@@ -244,27 +255,32 @@ def _areas(triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=256)
 def _sheet(exchange: Exchange, face: int) -> Sheet:
     """The rectangle along a face's longest edge; nodes that are not on the face see what the nearest place of it does.
 
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
     solid, cell = exchange.solid, exchange.cell * np.sqrt(_PATCHES / _CELLS)
-    corners, normal = solid.vertices[list(solid.faces[face])], solid.normals[face]
-    sides = np.roll(corners, -1, 0) - corners
-    one = max(sides, key=np.linalg.norm)
-    one = one / np.linalg.norm(one)
-    two = np.cross(normal, one)
-    low, high = (end(corners @ np.stack([one, two], 1), axis=0) for end in (np.min, np.max))
-    size = high - low
-    counts = np.maximum(np.ceil(size / cell).astype(int), np.where(size > _THIN * cell, _LEAST, 1))
-    u, v = (s * (1 - np.cos(np.pi * np.arange(n + 2) / (n + 1))) / 2 for n, s in zip(counts, size, strict=True))
-    corner = normal * solid.offsets[face] + low[0] * one + low[1] * two
+    frame = _frame(solid, face)
+    small = frame.size < cell
+    counts = np.ceil(frame.size / cell * np.where(small, _LEAST, 1)).astype(int).clip(np.where(small, 1, _LEAST))
+    u, v = (s * (1 - np.cos(np.pi * np.arange(n + 2) / (n + 1))) / 2 for n, s in zip(counts, frame.size, strict=True))
     a, b = (np.clip(n, _WITHIN * n[1], n[-1] - _WITHIN * n[1]) for n in (u, v))
-    nodes = (corner + a[:, None, None] * one + b[:, None] * two).reshape(-1, 3)
+    nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
     nodes = _onto(solid, face, nodes, _WITHIN * min(u[1], v[1]))
-    return Sheet(corner, one, two, u, v, exchange.met(nodes, np.broadcast_to(normal, nodes.shape), _FROM_NODE))
+    rays = _FROM_SMALL if small.any() else _FROM_NODE
+    return Sheet(frame, u, v, exchange.met(nodes, np.broadcast_to(solid.normals[face], nodes.shape), rays), rays)
+
+
+def _frame(solid: Solid, face: int) -> Frame:
+    corners, normal = solid.vertices[list(solid.faces[face])], solid.normals[face]
+    ways = np.roll(corners, -1, 0) - corners
+    one = max(ways, key=np.linalg.norm)
+    one = one / np.linalg.norm(one)
+    sides = np.stack([one, np.cross(normal, one)])
+    low, high = (end(corners @ sides.T, axis=0) for end in (np.min, np.max))
+    return Frame(normal * solid.offsets[face] + low @ sides, sides, high - low)
 
 
 def _onto(solid: Solid, face: int, points: np.ndarray, within: float) -> np.ndarray:
