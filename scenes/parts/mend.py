@@ -30,7 +30,7 @@ def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     Examples
     --------
     >>> box = trimesh.creation.box((1, 2, 3))
-    >>> box.invert()
+    >>> _ = box.invert()
     >>> mended(box)[1]
     ('inverted shells turned: 1',)
     """
