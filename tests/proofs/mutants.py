@@ -4,9 +4,10 @@ A mutant is one place of the code changed by one of cosmic-ray's operators (a si
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
 examples of its own module, the tests that read the code and, where it may have records, those of their fields; then the
 unit tests and the stored numbers that call the changed function and others of the module, the quickest first
-(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines. Killed is what
-makes one of them fail that passes on clean code, where it is run, too, or was when it was noted what it calls. What
-survives is printed with its line: a test is missing, or the mutant is equivalent.
+(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
+the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
+run, too, or was when it was noted what it calls. What survives is printed with its line: a test is missing, or the
+mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ OPERATORS = tuple(
 _FILES = 3  # test files that a mutant meets after the unit tests
 _CALLING_S = 12  # processor seconds, on clean code, of the tests that call the changed function
 _MODULE_S = 3  # of those that call others of the module
+_REST_S = 90  # of those that call the changed function and are asked last, of what survived until then
 _LIMIT_S = 90  # after which these do not end
 _OTHERS_S = 45  # of the files that are asked then
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
@@ -99,7 +101,13 @@ def sources(root: Path = ROOT) -> list[str]:
     return [str(path.relative_to(root)) for some in each for path in some if path.name != "__init__.py"]
 
 
-def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path = ROOT) -> list[str]:
+def calling(
+    mutant: Mutant,
+    line: int,
+    tests: dict[str, dict[str, Any]],
+    root: Path = ROOT,
+    limits: tuple[float, float] = (_CALLING_S, _MODULE_S),
+) -> list[str]:
     """The tests that call the function around a line, then those that call others of the module.
 
     The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others.
@@ -110,11 +118,11 @@ def calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: P
     }
     own = {t for t, calls in some.items() if any(c == name or c.startswith(f"{name}.") for c in calls)}
     chosen: list[str] = []
-    for group, seconds in ((own, _CALLING_S), (some.keys() - own, _MODULE_S)):
+    for group, seconds in zip((own, some.keys() - own), limits, strict=True):
         spent = 0.0
         for test in sorted(group, key=lambda test: (tests[test]["seconds"], test)):
             spent += tests[test]["seconds"]
-            if spent > seconds and chosen:
+            if spent > seconds and (chosen or not seconds):
                 break
             chosen.append(test)
     return chosen
@@ -185,7 +193,9 @@ def judged(
     after, line = changed(mutant, root)
     own = [mutant.file] if ">>> " in before else []
     fields = FIELDS if _RECORDS.search(before) else []
-    near = [*own, *READERS, *fields, *calling(mutant, int(line.split(":")[1]), tests, root)]
+    number = int(line.split(":")[1])
+    near = [*own, *READERS, *fields, *calling(mutant, number, tests, root)]
+    others, rest = [], []
     path.write_text(after, encoding="utf-8")
     try:
         code, by = _tested(near, runner, _LIMIT_S)
@@ -194,6 +204,9 @@ def judged(
         others = [] if is_first or code not in _PASSED else nearest(mutant.file, root)
         if others:
             code, by = _tested(others, runner, _OTHERS_S)
+        rest = [] if is_first or code not in (*_PASSED, *_ENDED) else _rest(mutant, number, tests, root, near)
+        if rest:
+            code, by = _tested(rest, runner, 2 * _REST_S)
     finally:
         path.write_text(before, encoding="utf-8")
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # the compiled one is of this text
@@ -201,8 +214,13 @@ def judged(
         return "survived", ""
     if by in tests:
         return "killed", by
-    clean, wrong = _tested([by] if by else others or near, runner, _LIMIT_S)
+    clean, wrong = _tested([by] if by else rest or others or near, runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
+
+
+def _rest(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path, asked: list[str]) -> list[str]:
+    """The slower tests that call the changed function."""
+    return [each for each in calling(mutant, line, tests, root, (_REST_S, 0.0)) if each not in asked]
 
 
 _PASSED = 0, 5  # exit status of pytest; the second: no tests
