@@ -93,7 +93,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     (
         "core/NumberReplacer",
         r": _WORKERS = min\(os\.cpu_count\(\) or 1, ",
-    ): "how many threads there are changes no result",
+    ): "how many threads changes no result",
     (
         "core/NumberReplacer",
         r"^render/.*: .*normal @ triangles\[0, +-?\d\]",

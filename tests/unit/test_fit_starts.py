@@ -1,5 +1,6 @@
 """What a fit begins with, and where it looks beside the maximum."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,7 +51,7 @@ def test_images_get_ever_sharper(two, monkeypatch):
     values, rest = start._followed(parameters, (), np.zeros(4), parameters.scene.noise)
     assert asked[0] == 0.25
     assert len(asked) > 2
-    assert all(0.4 < after / before < 0.6 for before, after in zip(asked, asked[1:], strict=False))
+    assert all(0.4 < after / before < 0.6 for before, after in pairwise(asked))
     assert (values.tolist(), rest, left) == ([len(asked)] * 4, 0.7, [asked[-1]])
 
 
