@@ -103,7 +103,8 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
     places = project(places, np.array(list(picture.sensor)), scene.camera)
     pieces = [np.linspace(*ends, 2 + max(shape)) for each in limbs for ends in limb_pieces(picture, each)]
-    x, y = np.nan_to_num(np.concatenate([places, *pieces]), nan=-1e9).T
+    places = np.concatenate([places, *pieces])
+    x, y = places[np.isfinite(places).all(1)].T
     column, row = np.rint(x - left).astype(int), np.rint(y - top).astype(int)
     inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
     found = np.zeros(shape, bool)

@@ -144,6 +144,6 @@ def _polished(quadric: Quadric, eye: np.ndarray, points: np.ndarray) -> np.ndarr
             one, two = -quadric.function(points), -(slope * away).sum(-1)
             both = a * d - b * c
             move = ((one * d - two * b) / both)[:, None] * normal + ((a * two - c * one) / both)[:, None] * sight
-        small = np.isfinite(move).all(-1, keepdims=True) & (np.linalg.norm(move, axis=-1, keepdims=True) < 1e-3 * far)
+            small = np.linalg.norm(move, axis=-1, keepdims=True) < 1e-3 * far  # and finite
         points = points + np.where(small, move, 0.0)
     return points

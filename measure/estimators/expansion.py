@@ -23,7 +23,7 @@ ROWS = int(_STARTS[-1])
 _KERNEL, _CONTRAST, _ACROSS, _ALONG, _ACROSS2, _ACROSS3 = (slice(a, b) for a, b in pairwise(_STARTS))
 _ITERATIONS = 40
 _SETTLED = 3e-4  # of a standard deviation
-_BOW_SEEN = 1.0  # px: bows that an image tells no better are left out
+_BOW_SEEN = 1.0  # 1/px^2, information: bows of which an image tells less are left out
 _STRIDE = 8.0  # standard deviations that one iteration may go
 
 
@@ -357,7 +357,7 @@ class Expansion:
         bows[first + 2, np.arange(pieces)] = -4 * self.pieces.lengths
         shared = self._score(np.zeros((pieces, len(self.inverse))), bows.T @ self.gram)
         information = bows.T @ self.gram @ bows - shared @ self.inverse @ shared.T
-        seen = np.diag(information) > _BOW_SEEN**-2
+        seen = np.diag(information) > _BOW_SEEN
         return bows[:, seen], information[np.ix_(seen, seen)]
 
     def _climb(self, told: np.ndarray, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -48,8 +48,8 @@ def outline(shape: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (m, 2) on an ellipse at the parameters t (m,), and its outward unit normals there (m, 2)."""
     x, y, xx, yy, xy = shape
     u, v = np.cos(t), np.sin(t)
-    normals = np.stack([yy * u - xy * v, xx * v - xy * u], -1)
-    places = np.stack([x + xx * u + xy * v, y + xy * u + yy * v], -1)
+    normals = np.column_stack([yy * u - xy * v, xx * v - xy * u])
+    places = np.column_stack([x + xx * u + xy * v, y + xy * u + yy * v])
     return places, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 

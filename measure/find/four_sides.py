@@ -94,7 +94,7 @@ def _sides(corners: np.ndarray, left_out: float) -> tuple[np.ndarray, np.ndarray
     """Places along the sides (m, 2), outward normals (m, 2), which side (m,), and the sides' lengths (4,)."""
     along = np.roll(corners, -1, 0) - corners
     lengths = np.linalg.norm(along, axis=1)
-    turning = np.sign(cv2.contourArea(corners.astype(np.float32), True)) or 1.0
+    turning = _turning(corners)
     outward = turning * np.stack([along[:, 1], -along[:, 0]], 1) / lengths[:, None]
     counts = np.clip(lengths.astype(int), 8, 120)
     fractions = [np.linspace(max(left_out, 1.5 / n), 1 - max(left_out, 1.5 / n), k)
@@ -102,6 +102,11 @@ def _sides(corners: np.ndarray, left_out: float) -> tuple[np.ndarray, np.ndarray
     places = [corners[i] + f[:, None] * along[i] for i, f in enumerate(fractions)]
     piece = np.repeat(np.arange(4), counts)
     return np.concatenate(places), outward[piece], piece, lengths
+
+
+def _turning(corners: np.ndarray) -> float:
+    """1 or -1: which way round the corners go."""
+    return float(np.copysign(1.0, cv2.contourArea(corners.astype(np.float32), True)))
 
 
 def _moved(coarse: Coarse, corners: np.ndarray, reach: float) -> np.ndarray | None:
@@ -135,7 +140,7 @@ def _goes_on(coarse: Coarse, corners: np.ndarray, signs: np.ndarray, slopes: np.
     """Whether a side goes straight on beyond a corner: then it ends elsewhere, and the corner is none of the shape."""
     along = np.roll(corners, -1, 0) - corners
     lengths = np.linalg.norm(along, axis=1)
-    turning = np.sign(cv2.contourArea(corners.astype(np.float32), True)) or 1.0
+    turning = _turning(corners)
     for side, length in enumerate(lengths):
         direction = along[side] / length
         outward = turning * np.array([direction[1], -direction[0]])

@@ -49,8 +49,6 @@ EQUIVALENT: dict[str, str] = {
         "behind the first triangle, if it is the second of the list, 2e-6 of the part's size is stepped over, not 1e-6",
     "imaging/blurred/arrangement.py: t = np.linspace(0, 1, 3 if arrangement.camera is None else 9)[:, None]":
         "two halves of a straight line are that line",
-    "render/large.py: x, y = np.nan_to_num(np.concatenate([places, *pieces]), nan=1e9).T":
-        "as far outside of the image on its other side",
     'render/mosaic.py: _SENSOR = {"perspective": 19, "thinlens": 200}  # rays that take as long as making a sensor':
         "a time, by which one of several sizes of tiles is chosen that all show the same",
     "imaging/pose_scatter.py: if sigma == -1:": "a shorter way to zeros is not taken",
@@ -72,6 +70,7 @@ EQUIVALENT: dict[str, str] = {
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
     "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
+    "measure/fitting/noise.py: continue": "at a fixed point: rounds that are left move it by less than 1e-9",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
@@ -91,6 +90,14 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         r"\breshape\((?:(?:[^()]|\([^()]*\))*, )?- [2-9][,)]",
     ): "numpy takes any negative size as open",
     ("core/NumberReplacer", r'unpack\(">\w", [^()]*\)\[ -1\]'): "of one number the first is the last",
+    (
+        "core/NumberReplacer",
+        r": _WORKERS = min\(os\.cpu_count\(\) or 1, ",
+    ): "how many threads changes no result",
+    (
+        "core/NumberReplacer",
+        r"^render/.*: .*normal @ triangles\[0, +-?\d\]",
+    ): "all corners of a plane triangle are as high",
     ("core/NumberReplacer", r"^imaging/.*: _(?:AT_ONCE|CHUNK|BLOCK) = "): "how many at a time changes no result",
     ("end", r'unpack\(">\w", [^()]*\)\[-1\]'): "of one number the first is the last",
 }

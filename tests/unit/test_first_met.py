@@ -74,3 +74,58 @@ def test_without_embree_every_triangle_is_tried(monkeypatch):
     expected = first_face(body, origins, vectors, ())
     monkeypatch.setattr(rays, "rtcore_scene", None)
     assert np.array_equal(first_face(body, origins, vectors, ())[0], expected[0])
+
+
+def random_plates(margin):
+    """Triangles of no symmetry, 7 of them."""
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(-3, 4, (3, 7, 3))
+    normals = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    duals = np.stack([np.cross(corners[2] - corners[0], normals), np.cross(normals, corners[1] - corners[0])])
+    duals /= np.einsum("kti,kti->kt", duals, corners[1:] - corners[0])[..., None]
+    heights, shifts = (np.einsum("...ti,ti->...t", each, corners[0]) for each in (normals, duals))
+    return rays.Plates(np.arange(7), corners, normals, heights, duals, shifts, margin)
+
+
+def test_heights_of_triangles():
+    """Twice the area over the side across from each corner."""
+    plates = random_plates(0.0)
+    one, two, three = plates.corners
+    area = np.linalg.norm(np.cross(two - one, three - one), axis=1)
+    sides = np.linalg.norm([three - two, three - one, two - one], axis=-1)
+    assert plates._heights == pytest.approx(area / sides, rel=1e-9)
+
+
+def test_well_within_is_twice_the_margin_from_every_side():
+    """By the distances from three lines; places are spread over each triangle and around it."""
+    plates, rng = random_plates(0.03), np.random.default_rng(6)
+    which = np.repeat(np.arange(7), 400)
+    shares = rng.uniform(-0.2, 0.9, (len(which), 2))
+    one, two, three = plates.corners[:, which]
+    places = one + shares[:, :1] * (two - one) + shares[:, 1:] * (three - one)
+    away = []
+    for start, stop in ((one, two), (two, three), (three, one)):
+        along = (stop - start) / np.linalg.norm(stop - start, axis=1, keepdims=True)
+        away.append(np.einsum("ni,ni->n", np.cross(plates.normals[which], along), places - start))
+    expected = np.min(away, axis=0) > 2 * 0.03 * plates.radius
+    assert np.array_equal(plates.well_within(which, places), expected)
+    assert 0.1 < expected.mean() < 0.6  # margin: a share: places of both kinds
+
+
+@pytest.mark.parametrize("margin", [0.01, 0.03])
+def test_triangles_are_wider_by_the_margin(margin):
+    """A ray beside a side's middle by less than the margin of the sphere's radius meets it, by more it does not."""
+    plates = random_plates(margin)
+    for k in range(7):
+        alone = plates.some(np.arange(7) == k)
+        alone = rays.Plates(*(getattr(alone, name) for name in ("faces", "corners", "normals", "heights", "duals",
+                                                                 "shifts")), margin)  # fmt: skip
+        corners = (alone.corners[:, 0] - alone.centre) / alone.radius
+        for start, stop in zip(corners, np.roll(corners, -1, 0), strict=True):
+            outward = np.cross(stop - start, alone.normals[0])
+            outward /= np.linalg.norm(outward)
+            for share, met in ((0.9, True), (1.1, False)):
+                origin = (start + stop) / 2 + share * margin * outward + 0.5 * alone.normals[0]
+                ray = np.float32([origin]), np.float32([-alone.normals[0]])
+                assert (alone.tree.run(*ray, query="INTERSECT", output=1)["primID"][0] >= 0) == met

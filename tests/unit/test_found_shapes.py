@@ -10,7 +10,7 @@ from measure.find.candidate import CHESSBOARD, ELLIPSE, QUADRILATERAL, TAG, Cand
 from measure.find.chessboard import _alternation, find_chessboard
 from measure.find.coarse import Coarse
 from measure.find.distinct import outside, same
-from measure.find.four_sides import deviation, near, polygon, shaped
+from measure.find.four_sides import _sides, deviation, near, polygon, shaped
 from measure.find.support import Steepest, contrast, sign_of, steepest
 from tests.boards import SMALL
 
@@ -204,6 +204,7 @@ def test_the_steepest_place_is_found_in_its_direction():
     for sign, place in ((1, -2.0), (-1, 3.0)):
         assert steepest(coarse, places, normals, sign, 4.0).offsets == pytest.approx([place] * 4)
     assert (steepest(coarse, places, normals, 1, 1.0).offsets == -1).all()
+    assert (steepest(coarse, places, normals, -1, 1.0).offsets == 1).all()
 
 
 def test_a_large_image_is_seen_in_squares():
@@ -263,3 +264,26 @@ def test_alternation_of_squares(weak, good):
 
     told = _alternation(SimpleNamespace(levels=seen, noise=4.0), grid)
     assert told == (pytest.approx((14 if good else 12) / 17), pytest.approx(15))
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_places_along_four_sides(turned):
+    """A place a pixel, a tenth of each side left out at its ends, with unit normals that lead away from the middle."""
+    corners = np.array([[10.0, 12.0], [90.0, 20.0], [84.0, 71.0], [17.0, 55.0]])[::turned]
+    places, normals, piece, lengths = _sides(corners, 0.1)
+    ends = np.roll(corners, -1, 0)
+    assert lengths == pytest.approx(np.hypot(*(ends - corners).T))
+    assert np.bincount(piece).tolist() == lengths.astype(int).tolist()
+    assert np.hypot(*normals.T) == pytest.approx(np.ones(len(normals)))
+    for side in range(4):
+        of, along = piece == side, (ends - corners)[side] / lengths[side]
+        assert normals[of] @ along == pytest.approx(np.zeros(of.sum()), abs=1e-12)
+        assert (((corners.mean(0) - places[of]) * normals[of]).sum(1) < 0).all()
+        share = (places[of] - corners[side]) @ along / lengths[side]
+        assert share == pytest.approx(np.linspace(0.1, 0.9, of.sum()))
+
+
+def test_sides_of_no_area_have_normals():
+    """A bow tie, whose two halves cancel."""
+    _, normals, *_ = _sides(np.array([[0.0, 0], [40, 40], [40, 0], [0, 40]]), 0.1)
+    assert np.hypot(*normals.T) == pytest.approx(np.ones(len(normals)))

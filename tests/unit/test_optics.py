@@ -68,3 +68,16 @@ def test_a_crop_is_bent_as_the_whole():
     assert part[10:50, 10:50] == pytest.approx(whole[30:70, 40:80], abs=1e-4)
     centre = undistorted(np.array([[20.25, 15.25]]), seen)[0]
     assert whole[31, 41] == pytest.approx(np.sin(0.3 * (centre[0] + 0.25)) * np.cos(0.2 * (centre[1] + 0.25)), abs=1e-3)
+
+
+def test_a_sharp_image_is_bent_by_straight_lines_between_fine_pixels():
+    """Without blur nothing may ring: a bilinear mean of four, written out, of random levels."""
+    seen = Camera(width=30, height=20, focal_px=40.0, distance=100.0, blur_px=0.0, lens=Lens(distortion=(-0.08, 0.02)))
+    fine = np.random.default_rng(3).uniform(10, 90, (40, 60))
+    found = distort(fine, seen, (0, 0), 2)
+    for row, column in ((7, 11), (22, 47), (31, 14)):
+        at = (undistorted(np.array([[column, row]]) / 2 - 0.25, seen)[0] + 0.25) * 2
+        (x, y), (u, v) = np.floor(at).astype(int), at % 1
+        around = fine[y : y + 2, x : x + 2]
+        assert found[row, column] == pytest.approx(np.array([1 - v, v]) @ around @ np.array([1 - u, u]), rel=1e-9)
+        assert 0.005 < min(u, v) < max(u, v) < 0.995  # between fine pixels

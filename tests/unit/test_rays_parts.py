@@ -107,3 +107,54 @@ def test_each_fine_pixel_is_crossed_in_all_its_strata(numpy_for_drjit):
     assert lens.place.y == pytest.approx(y.ravel())
     assert (np.array(lens.aperture) == rays._table[:2, points]).all()
     assert (np.array(rays._pair(points, 6)) == rays._table[6:8, points]).all()
+
+
+class Met:
+    """What rays meet at one surface after another, with the numbers that are drawn there; `weights` by surface."""
+
+    def __init__(self, weights, at, drawn):
+        self.weights, self.at, self.drawn = weights, at, drawn
+
+    def ray_intersect(self, ray, active=True):
+        return Met(self.weights, sum(kind == "onward" for kind, *_ in self.drawn), self.drawn)
+
+    def is_valid(self):
+        return np.array([True, True])
+
+    def bsdf(self, ray):
+        return self
+
+    def to_local(self, way):
+        return way
+
+    to_world = spawn_ray = to_local
+
+    def sample_emitter_direction(self, hit, pair, _, active):
+        self.drawn.append(("light", hit.at, pair))
+        return SimpleNamespace(pdf=np.array([0.5, 0.5]), d=hit.at), np.array([[3.0, 5.0]])
+
+    def eval(self, context, hit, way, lit):
+        return self.weights[hit.at][0] * np.where(lit, 1.0, np.nan)
+
+    def sample(self, context, hit, one, pair, active):
+        self.drawn.append(("onward", hit.at, pair))
+        return SimpleNamespace(wo=None), [np.full(2, self.weights[hit.at][1])]
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 2])
+def test_light_by_way_of_each_surface_and_numbers_of_their_own(bounces, numpy_for_drjit):
+    """What is reflected at each, weakened by all before it; no two numbers of a ray are of one column of the table."""
+    module = sys.modules["drjit"]
+    module.zeros, module.width = lambda kind, count: np.zeros(count), len
+    mitsuba = numpy_for_drjit.mitsuba
+    mitsuba.BSDFContext = lambda: None
+    mitsuba.Float = lambda values: np.float64(values) if np.isscalar(values) else np.asarray(values)
+    rays, scene = Rays(mitsuba, 2, 9, bounces, 11), Met([(0.7, 0.5), (0.2, 0.3), (0.11, 0.9)], 0, [])
+    point = np.array([6, 41])
+    found = rays._follow(scene, None, point)
+    expected = sum(part for part, _ in zip((0.7, 0.5 * 0.2, 0.5 * 0.3 * 0.11), range(bounces + 1), strict=False))
+    assert found == pytest.approx(expected * np.array([3.0, 5.0]))
+    assert [each[:2] for each in scene.drawn] == [("light", 0), ("onward", 0), ("light", 1), ("onward", 1),
+                                                 ("light", 2)][: 2 * bounces + 1]  # fmt: skip
+    numbers = np.concatenate([np.array(pair) for *_, pair in scene.drawn])
+    assert (numbers == rays._table[2 : 2 + len(numbers)][:, point]).all()

@@ -1,0 +1,80 @@
+"""What a fit begins with, and where it looks beside the maximum."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import planner
+from measure.fitting import sides, start
+from measure.fitting.parameters import Parameters
+from measure.fitting.photograph import Shots
+from scenes import Picture
+
+
+@pytest.fixture(scope="module")
+def two(task1):
+    camera = task1.camera.model_copy(update={"width": 112, "height": 104, "focal_px": 350.0})
+    scene = task1.model_copy(update={"camera": camera})
+    return tuple(Picture.of(scene, sensor, (25, 300)) for sensor in ((35, 120), (20, 60)))
+
+
+def moved(picture, down, right, factor, dark):
+    """A photograph of it, moved and made brighter."""
+    return Shots(np.roll(planner.image(picture), (down, right), (0, 1)) * factor + dark, 1, None, (0,))
+
+
+def test_the_first_photograph_tells_place_and_brightness(two):
+    """Moved by pixels, which are so much of the object at its distance; the second, elsewhere, tells nothing."""
+    parameters = Parameters.of(two)
+    values, names, noise = parameters.start(), parameters.names, parameters.scene.noise
+    camera = parameters.scene.camera
+    shots = moved(two[0], -4, 7, 1.3, 9.0), moved(two[1], 10, -12, 2.5, 40.0)
+    found = dict(zip(names, start._aligned(parameters, shots, values, noise) - values, strict=True))
+    given = dict(zip(names, values, strict=True))
+    pixel = camera.distance / camera.focal_px
+    assert found["aim.right"] / pixel == pytest.approx(-7, abs=0.2)
+    assert found["aim.down"] / pixel == pytest.approx(4, abs=0.2)
+    assert found["camera.distance"] / given["camera.distance"] == pytest.approx(0, abs=0.01)
+    assert found["camera.exposure"] / given["camera.exposure"] == pytest.approx(0.3, rel=0.05)
+    dark = np.median(planner.image(two[0])[:3]) * 1.3 + 9.0
+    assert found["noise.dark_level"] + given["noise.dark_level"] == pytest.approx(dark, abs=0.5)
+
+
+def test_images_get_ever_sharper(two, monkeypatch):
+    """From a quarter of the object on, each time half as smooth or less so; what is left is told of the sharpest."""
+    parameters, asked, left = Parameters.of(two), [], []
+    monkeypatch.setattr(start, "_problem", lambda parameters, shots, values, share: asked.append(share))
+    monkeypatch.setattr(start, "most_likely", lambda problem, values, *rest: values + 1)
+    monkeypatch.setattr(start, "_left", lambda parameters, shots, values, noise, share: left.append(share) or 0.7)
+    values, rest = start._followed(parameters, (), np.zeros(4), parameters.scene.noise)
+    assert asked[0] == 0.25
+    assert len(asked) > 2
+    assert all(0.4 < after / before < 0.6 for before, after in pairwise(asked))
+    assert (values.tolist(), rest, left) == ([len(asked)] * 4, 0.7, [asked[-1]])
+
+
+@pytest.mark.parametrize(("edge", "turns"), [(11.9, True), (12.1, False), (-11.9, True), (-12.1, False)])
+def test_faces_come_into_sight_within_six_standard_errors(edge, turns, monkeypatch):
+    """On either side: of a sensor's angle of standard error 2 that another parameter goes along with."""
+    root = np.array([[2.0, 0.0], [3.0, 1.0]])
+    white = np.linalg.inv(root)  # of a covariance root root.T: 4, 6; 6, 10
+    which, values = np.array([1, 3]), np.array([7.0, 50.0, 8.0, 60.0])
+    free = [None, SimpleNamespace(where=(2, 0)), None, None]
+    parameters = SimpleNamespace(
+        free=free,
+        scene_at=lambda there: SimpleNamespace(solid=there, camera=None),
+        poses_at=lambda there, k: ((there, k), None),
+    )
+
+    def facing(there, sensor):
+        assert sensor[1] == 2
+        assert (there[[0, 2]] == values[[0, 2]]).all()
+        away = there[[1, 3]] - values[[1, 3]]
+        assert away[1] == pytest.approx(away[0] * 6 / 4)
+        return np.array([True, away[0] > edge])
+
+    monkeypatch.setattr(sides, "facing", facing)
+    monkeypatch.setattr(sides, "sensor_position", lambda camera, sensor: sensor)
+    assert sides._turns_away(SimpleNamespace(parameters=parameters), values, 1, which, white) is turns

@@ -1,0 +1,150 @@
+"""Parts of a rim's image: where lines cross its outline, cells beside it, hidden points, and others that come near."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import scenes
+from imaging.features import limb_look, rim_look, rim_sides
+from imaging.features.rim_look import RimLook
+from imaging.features.rim_outline import _crossed, zero_of_steps
+from imaging.pictures import Pictures
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return scenes.load("plate")
+
+
+def test_zero_of_steps(rng):
+    """Of 30 sets of five weighted steps up to a third of a standard deviation off: where their bells balance."""
+    where, weight = rng.uniform(-0.35, 0.3, (30, 5)), rng.uniform(0.2, 1.5, 5)
+    found = zero_of_steps(where, weight)
+    for places, at in zip(where, found, strict=True):
+
+        def balance(z, places=places):
+            return float((weight * (places - z) * np.exp(-((places - z) ** 2) / 2)).sum())
+
+        assert at == pytest.approx(brentq(balance, -0.4, 0.4, xtol=1e-14), abs=1e-10)
+
+
+def test_where_lines_first_cross_an_outline():
+    """Lines along a slanted normal beside two places, through a zigzag of three pieces, each line by itself."""
+    zigzag = np.array([[-3.0, 1.0], [-0.5, 2.0], [1.0, -1.5], [4.0, 2.5]])
+    ends = np.stack([zigzag[:-1], zigzag[1:]], 1)
+    places, beside = np.array([[0.0, 0.2], [0.5, -0.3]]), np.array([-2.0, -0.7, 0.1, 1.9, 9.0])
+    normals = np.array([[0.28, 0.96], [-0.6, 0.8]])
+    found = _crossed(ends, places, normals, beside[None] * [[1.0], [0.9]])
+    for m in range(2):
+        for j, aside in enumerate(beside * (1.0, 0.9)[m]):
+            start = places[m] + aside * np.array([-normals[m, 1], normals[m, 0]])
+            met = []
+            for one, two in ends:
+                away, share = np.linalg.solve(np.column_stack([normals[m], one - two]), one - start)
+                met += [away] if 0 <= share < 1 else []
+            expected = min(met, key=abs) if met else np.nan
+            assert found[m, j] == pytest.approx(expected, abs=1e-12, nan_ok=True)
+    assert np.isnan(found[:, -1]).all()
+    assert np.isfinite(found[:, :4]).sum() >= 5
+
+
+@pytest.mark.parametrize("polar", [25.0, 50.0])
+def test_what_is_hidden_of_a_bores_far_rim_has_no_level(plate, polar):
+    """From above: the line of sight to a point of it leaves the bore through the near rim, or does not."""
+    near, far = sorted(plate.solid.circles, key=lambda circle: -circle.centre[2])
+    pictures = Pictures.of(plate, np.array([polar, 20.0]), np.array([35.0, 30.0]))
+    angle = rim_sides.equal_angles()
+    points = far.centre + far.radius * rim_sides.radials(far, angle)
+    toward = pictures.sensor_at - points
+    above = points + toward * ((near.centre[2] - points[:, 2]) / toward[:, 2])[:, None]
+    aside = np.linalg.norm(above - near.centre, axis=1) / near.radius
+    plain, wall = rim_sides._sides_at(pictures, far, angle, False)
+    assert (plain[aside > 1.01] == 0).all()
+    assert (wall[aside > 1.01] == 0).all()
+    assert (wall[aside < 0.99] > 0).any()
+    assert 0.1 < (aside > 1.01).mean() < 0.9
+
+
+def test_places_of_a_rim_are_two_smoothing_scales_apart_or_nearer(plate):
+    """In whole times the usual number, up to four; the perimeter is that of an ellipse seen by a pinhole from afar."""
+    circle = max(plate.solid.circles, key=lambda each: each.centre[2])
+    for focal, times in ((800.0, 1), (1600.0, 2), (2900.0, 3), (6000.0, 4)):
+        camera = plate.camera.model_copy(update={"focal_px": focal, "width": 2000, "height": 1900})
+        pictures = Pictures.of(
+            plate.model_copy(update={"camera": camera}), np.array([20.0, 70.0]), np.array([15.0, 200.0])
+        )
+        axes = focal / 50 * np.array([1.0, np.cos(np.radians(20))])
+        perimeter = np.pi * (3 * axes.sum() - np.sqrt((3 * axes[0] + axes[1]) * (axes[0] + 3 * axes[1])))
+        assert times == min(np.ceil(perimeter / (2 * plate.locator.scale_px * 64)), 4)
+        assert rim_look.look(pictures, circle).shift.size == 64 * times
+
+
+def test_cells_that_are_looked_at_closely():
+    """Both beside the outline, and either of two on one side that differ by more than 2 % of the brightest level."""
+    levels = np.full((1, 2, 48), 100.0)
+    levels[0, 0, 24:] = 30.0  # over the outline nothing is told by a difference
+    levels[0, 1, 5] = 97.9
+    levels[0, 1, 40:] = 101.9
+    expected = np.zeros((1, 2, 48), bool)
+    expected[..., [23, 24]] = True
+    expected[0, 1, [4, 5, 6]] = True
+    assert np.array_equal(rim_look._uneven(levels), expected)
+    levels[0, 1, 40:] = 102.2
+    expected[0, 1, [39, 40]] = True
+    assert np.array_equal(rim_look._uneven(levels), expected)
+
+
+def test_between_places_of_a_rim(rng):
+    """Linear, round the end too; good where both neighbours are, at a place itself where it is."""
+    count = 7
+    known = RimLook(*rng.uniform(1, 5, (3, count)), np.array([True, True, False, True, True, True, False]))
+    angles = (np.arange(count) + 0.5) * 2 * np.pi / count
+    here = known.at(angles)
+    assert here.good.tolist() == known.good.tolist()
+    for name in ("shift", "squared", "noise_variance"):
+        assert getattr(here, name) == pytest.approx(getattr(known, name))
+    between = known.at(angles + 0.3 * 2 * np.pi / count)
+    assert between.good.tolist() == [True, False, False, True, True, False, False]
+    for name in ("shift", "squared", "noise_variance"):
+        value = getattr(known, name)
+        assert getattr(between, name) == pytest.approx(0.7 * value + 0.3 * np.roll(value, -1))
+
+
+def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
+    """In two pictures: of an edge along x, seen in part or not at all, and of a rim of which single pieces are seen.
+
+    A rim's pieces count each by itself, an edge as a whole where anything of it is seen.
+    """
+    at = np.array([[[0.0, 1.0], [5.0, 2.9], [9.0, 3.1], [12.0, -2.9]]] * 2)
+    steady = []
+    seen_edge = np.array([[0.5] * 16 + [1.0], [0.998] * 17])  # at one end in the first picture, nowhere in the second
+
+    def first_face(bodies, eye, way, own):
+        assert eye.shape == way.shape
+        return None, seen_edge
+
+    def image(places, sensors, camera):
+        return np.broadcast_to(places[:, :2], (2, len(places), 2))
+
+    for name, stand_in in {
+        "clear_of_ends": lambda outline, scene: np.array([[True, True, True, True], [True, False, True, True]]),
+        "unlent": lambda pictures, outline: np.ones((2, 4), bool), "reach": lambda *_: 3.0, "first_face": first_face,
+        "from_axis": image, "steady": lambda *given: steady.append(given) or np.ones((2, 4), bool),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(limb_look, name, stand_in)
+    solid = SimpleNamespace(
+        circles=(), sharp=(SimpleNamespace(ends=(1, 0)),), vertices=np.array([[-1.0, 0, 7], [6.0, 0, 7]])
+    )
+    scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False), camera=SimpleNamespace(blur_px=1.0),
+                            locator=SimpleNamespace(scale_px=1.0))  # fmt: skip
+    pictures = SimpleNamespace(scene=scene, sensor_at=np.array([[0, 0, 90.0], [0, 0, 80.0]]), sensors=None)
+    outline = SimpleNamespace(at=at, arc=np.array([1.0, 2.0, np.nan, 3.0]))
+    look = SimpleNamespace(good=np.array([[True, False, True, True]] * 2), squared=np.full((2, 4), 9.0))
+    found = limb_look.clear_of_others(pictures, None, outline, look)
+    assert found.tolist() == [[False, False, True, True], [True, False, True, True]]
+    lit, still, arc, far = steady[0]
+    assert lit.tolist() == [[9, 0, 9, 9]] * 2
+    assert (still == 0).all()
+    assert (arc.tolist(), far) == ([1, 2, 0, 3], 3.0)
