@@ -1,5 +1,7 @@
 """The search by bounds is the search of all pairs, and says truly how far it is."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -50,3 +52,34 @@ def test_where_the_bound_is_far_from_the_value(at_once, poses, monkeypatch):
     values = worse(SearchProblem.of(task1, "calibrated", "image"), sensors, lights).reshape(len(poses), -1)
     assert found.variance == pytest.approx(values.min(), rel=1e-12)
     assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)
+
+
+def test_pair_by_pair_the_least_of_each_sensor_is_told():
+    """None where nothing can be measured or is allowed; what the scale's end has cut off only where all are."""
+    levels = np.array([[5.0, np.inf, 3.0, 8.0], [np.inf] * 4, [2.0, 9.0, 7.0, 6.0], [4.0, 4.5, 1.0, 9.5]])
+    allowed = np.array([[1, 1, 1, 1], [1, 1, 1, 1], [1, 0, 0, 1], [0, 0, 0, 0]], bool)
+    cut = np.array([[0, 0, 1, 0], [0, 0, 0, 0], [1, 0, 0, 1], [0, 0, 0, 0]], bool)
+
+    def found(cut):
+        def table(sensors, lights, report):
+            for part in (slice(0, 3), slice(3, 4)):
+                yield part, SimpleNamespace(values=levels[part], cut=cut[part]), allowed[part]
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(exhaustive, "minimised", lambda errors, aim: errors.values)
+            patch.setattr(exhaustive, "cut_off", lambda errors, scene: errors.cut)
+            problem = SimpleNamespace(table=table, objective=None, scene=None)
+            return exhaustive._one_by_one(problem, np.zeros((4, 2)), np.zeros((4, 2)), None)
+
+    plain = found(np.zeros_like(cut))
+    assert (plain.sensor, plain.light, plain.variance) == (2, 0, 2.0)
+    assert plain.best_light.tolist() == [2, -1, 0, -1]
+    assert plain.least.tolist() == [3.0, np.inf, 2.0, np.inf]
+    assert (plain.pairs, plain.evaluated, plain.within_scale) == (16, 16, False)
+    within = found(cut)
+    assert (within.sensor, within.light, within.variance) == (0, 0, 5.0)
+    assert within.best_light.tolist() == [0, -1, -1, -1]
+    assert within.least.tolist() == [5.0, np.inf, np.inf, np.inf]
+    assert within.within_scale
+    everything = found(np.ones_like(cut))
+    assert (everything.sensor, everything.light, everything.within_scale) == (2, 0, False)

@@ -95,3 +95,13 @@ def test_listed_with_their_residuals():
     walls = scene_table.facts(scenes.load("bracket_mm"))["cylinders"]
     assert [(w["name"], round(w["diameter"], 4), w["hole"]) for w in walls] == [("k1", 8.0, True), ("k2", 10.0, True)]
     assert all(0 < w["residual"] <= w["largest"] < 1e-5 for w in walls)  # margin: the order is said
+
+
+def test_ends_are_where_the_rod_ends():
+    """Counted along the axis from its point, wherever in space the rod stands."""
+    mesh, _ = turned(trimesh.creation.cylinder(2.0, 5.0, sections=36), 8)
+    (found,) = cylinders(solid(mesh))
+    surface, middle = found.surface, np.array([3.0, -2.0, 7.0])
+    ends = surface.point + np.array(surface.ends)[:, None] * surface.axis
+
+    assert ends == pytest.approx(middle + np.array([[-2.5], [2.5]]) * surface.axis, abs=1e-9)
