@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.geometry.projection import direction
+from planner import Constraints
 from planner.search import exhaustive
 from planner.search.objective import SearchProblem
 from tests.pairs import evaluate_pairs
@@ -83,3 +85,22 @@ def test_pair_by_pair_the_least_of_each_sensor_is_told():
     assert within.within_scale
     everything = found(np.ones_like(cut))
     assert (everything.sensor, everything.light, everything.within_scale) == (2, 0, False)
+
+
+def test_sensors_that_can_measure_by_no_light_have_none(poses):
+    """From below, or within 80 degrees of every light; each other one's bound is below the values of all its pairs."""
+    task1, sensors = scenes.load("task1"), np.concatenate([[[175.0, 10.0]], poses, [[179.0, 200.0]]])
+    limits = Constraints(min_separation_deg=80, camera_body=0, light_body=0)
+    found = exhaustive.exhaustive(task1, sensors, poses, "calibrated", "image", limits, lambda *_: None)
+    pairs = [part.reshape(-1, 2) for part in np.broadcast_arrays(sensors[:, None], poses[None])]
+    values = evaluate_pairs(task1, *pairs, "calibrated", "image")
+    apart = np.einsum("ij,ij->i", *map(direction, pairs)) <= np.cos(np.radians(80))
+    values = np.where(apart, values, np.inf).reshape(len(sensors), -1)
+    lost = ~np.isfinite(values).any(1)
+    assert lost[[0, 1, -1]].all()  # at a polar angle of 10 degrees, 70 degrees from any light at most
+    assert not lost.all()
+    assert ((found.best_light == -1) == lost).all()
+    assert (np.isinf(found.least) == lost).all()
+    assert (found.least <= values.min(1) * (1 + 1e-9)).all()
+    assert not lost[found.sensor]
+    assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)
