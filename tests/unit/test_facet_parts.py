@@ -114,13 +114,14 @@ def test_a_bend_of_32_degrees_ends_a_curve():
 
 
 def test_a_face_that_is_much_wider_than_both_beyond_is_no_facet():
-    """Six times as wide; five times is. One that bends the other way ends it, too."""
+    """More than five times as wide as either. One that bends the other way ends it, too."""
     bends = np.radians([15.0] * 8)
-    wide = found([9, 1, 1, 1, 6.1, 1, 1, 1, 9], bends)
+    wide = found([9, 1, 1, 1, 5.1, 1, 1, 1, 9], bends)
     assert wide.region[4] == -1
     assert wide.region[3] != wide.region[5]
     assert (wide.region[[1, 2, 3, 5, 6, 7]] >= 0).all()
     assert len(set(found([9, 1, 1, 1, 4.9, 1, 1, 1, 9], bends).region[1:8])) == 1
+    assert len(set(found([9, 1, 1, 1, 5.1, 1.1, 1, 1, 9], bends).region[1:8])) == 1
     other = found([9, 1, 1, 1, 1, 1, 1, 1, 9], bends, [True] * 4 + [False] * 4)
     assert other.region[4] == -1
     assert other.region[3] != other.region[5]
