@@ -71,6 +71,7 @@ EQUIVALENT: dict[str, str] = {
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
     "scenes/materials/torrance_sparrow.py: safe = ops.select(lit, cosine, 2 + 0 * cosine)":
         "what is not lit is 0 two lines below",
+    "planner/search/lights.py: size = max(1, _AT_ONCE // max(two.size, 2))": "how many at a time changes no result",
     "scenes/parts/walls.py: return bool(np.abs(off).max() <= near and abs(slopes / np.sign(turned) - slope) <= _SAME)":
         "a sign is 1 or -1: axes at right angles are told apart before",
     "validation/report/overlay.py: _outlined(axes, one.outline, \"white\", 1.8, \":\")": "how thick a line is drawn",

@@ -6,7 +6,7 @@ import trimesh
 
 import scenes
 from scenes.parts.mesh import solid
-from scenes.parts.recognised import cylinders
+from scenes.parts.recognised import _turn, cylinders
 from tests.parts import bracket, unevenly
 from validation.report import scene_table
 
@@ -105,3 +105,16 @@ def test_ends_are_where_the_rod_ends():
     ends = surface.point + np.array(surface.ends)[:, None] * surface.axis
 
     assert ends == pytest.approx(middle + np.array([[-2.5], [2.5]]) * surface.axis, abs=1e-9)
+
+
+def test_how_far_round_facets_go(rng):
+    """From the first facet's middle to the last one's and a mean step more; all round where no gap is wide."""
+    axis, one, two = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
+
+    def turn(degrees):
+        angles = np.radians(rng.permutation(degrees))
+        return np.degrees(_turn(np.cos(angles)[:, None] * one + np.sin(angles)[:, None] * two, axis))
+
+    assert turn([160.0, 170.0, 185.0, 190.0, 210.0]) == pytest.approx(50 + 12.5)  # across the half turn
+    assert turn([10.0, 100.0, 190.0, 250.0]) == pytest.approx(360)  # steps of 90, 90, 60 and 120
+    assert turn([10.0, 100.0, 180.0, 230.0]) == pytest.approx(360 - 140 + 220 / 3)

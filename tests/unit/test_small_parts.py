@@ -9,9 +9,10 @@ import measure
 from imaging.geometry.projection import frame, project, project_ideal, sensor_position
 from imaging.pictures import Pictures
 from planner.budgeting import plans
-from scenes import InvalidInput, Picture, Pose
+from scenes import InvalidInput, Jitter, Picture, Pose
 from scenes.measurands import position
 from validation import plan_check
+from validation.batch import work
 from validation.cli import plan as plan_command
 from validation.cli import recorded
 from validation.explore import preview
@@ -114,3 +115,21 @@ def test_settings_in_nearly_the_same_place_are_rendered_once(first):
         2 * np.degrees(np.arcsin(np.sin(np.radians(1)) * np.sin(np.radians(60))))
     )
     assert plan_check._angle(Pose(30, 20), Pose(75, 200)) == pytest.approx(105)
+
+
+def test_poses_scatter_as_far_as_that_is_simulated(monkeypatch):
+    """What a scene says of them counts where the effect is on; of exact poses nothing is asked."""
+    said, asked = Jitter(sensor_deg=0.2), []
+
+    def choose(scene, effects, tolerance, picture):
+        asked.append((effects, tolerance, picture))
+        return SimpleNamespace(scene=SimpleNamespace(jitter=said if effects == "all" else Jitter()))
+
+    monkeypatch.setattr(work.render, "choose", choose)
+    case = SimpleNamespace(scene=SimpleNamespace(jitter=said), picture="picture")
+    assert work._jitter(case, work.Rendering(effects="all")) == said
+    assert work._jitter(case, work.Rendering(effects="floor")) == Jitter()
+    assert [(effects, picture) for effects, _, picture in asked] == [("all", "picture"), ("floor", "picture")]
+    exact = SimpleNamespace(scene=SimpleNamespace(jitter=Jitter()), picture="picture")
+    assert work._jitter(exact, work.Rendering(effects="all")) == Jitter()
+    assert len(asked) == 2
