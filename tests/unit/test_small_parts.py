@@ -9,6 +9,7 @@ import measure
 from imaging.geometry.projection import frame, project, project_ideal, sensor_position
 from imaging.pictures import Pictures
 from planner.budgeting import plans
+from planner.search import lights
 from scenes import InvalidInput, Jitter, Picture, Pose
 from scenes.measurands import position
 from validation import plan_check
@@ -133,3 +134,41 @@ def test_poses_scatter_as_far_as_that_is_simulated(monkeypatch):
     exact = SimpleNamespace(scene=SimpleNamespace(jitter=Jitter()), picture="picture")
     assert work._jitter(exact, work.Rendering(effects="all")) == Jitter()
     assert len(asked) == 2
+
+
+@pytest.mark.parametrize("free", [1, 2, 3])
+def test_a_sensor_that_sees_nothing_has_no_lights(free):
+    """As many poses as lights are free, all the same."""
+    told = SimpleNamespace(scene=SimpleNamespace(free=tuple(range(free))))
+    value, poses = lights._Contrasts.best(told, None, (0.5, 0.5))
+    assert value == np.inf
+    assert poses.tolist() == [0.0] * (2 * free)
+
+
+def test_a_plan_is_checked_where_it_can_be_measured(monkeypatch):
+    """Asked of its sensor before anything is rendered; then each setting with its place, as many as are wanted."""
+    asked, said = [], []
+    monkeypatch.setattr(plan_check, "_judged", lambda rows, reason, seconds: (rows, reason))
+    monkeypatch.setattr(plan_check, "_checked", lambda found, *setting, rank, quality: (*setting, rank, quality))
+    monkeypatch.setattr(
+        measure, "region_of_interest", lambda scene, sensor, estimators: asked.append((sensor, estimators))
+    )
+    candidates = [SimpleNamespace(sensor=Pose(30, k), light=Pose(70, k), edges=("e2",)) for k in (100, 200)]
+    found = SimpleNamespace(
+        sensor=Pose(10, 20), light=Pose(50, 60), scene=SimpleNamespace(required=("e1",)), candidates=candidates
+    )
+    rows, reason = plan_check.check_plan(found, 2, "quick", lambda *told: said.append(told))
+    assert asked == [(Pose(10, 20), (plan_check.ESTIMATOR,))]
+    assert rows == [
+        (Pose(10, 20), Pose(50, 60), ("e1",), 1, "quick"), (Pose(30, 100), Pose(70, 100), ("e2",), 2, "quick")
+    ]  # fmt: skip
+    assert reason == ""
+    assert said == [("settings", done, 2) for done in range(3)]
+
+    def refuse(*_, **__):
+        raise InvalidInput("nothing is seen")
+
+    monkeypatch.setattr(measure, "region_of_interest", refuse)
+    assert plan_check.check_plan(found, 2, "quick") == ([], "nothing is seen")
+    with pytest.raises(InvalidInput, match="check must be at least 1, got 0"):
+        plan_check.check_plan(found, 0)
