@@ -74,6 +74,8 @@ EQUIVALENT: dict[str, str] = {
     "planner/search/lights.py: size = max(1, _AT_ONCE // max(two.size, 2))": "how many at a time changes no result",
     "scenes/parts/walls.py: return bool(np.abs(off).max() <= near and abs(slopes / np.sign(turned) - slope) <= _SAME)":
         "a sign is 1 or -1: axes at right angles are told apart before",
+    "validation/hard/precision.py: pull = pull / np.linalg.norm(pull, axis=1, keepdims=True)":
+        "of two axes the second is the last",
     "validation/report/overlay.py: _outlined(axes, one.outline, \"white\", 1.8, \":\")": "how thick a line is drawn",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
     "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
