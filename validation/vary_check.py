@@ -13,6 +13,7 @@ import render
 from planner import Chosen, Varied
 from render import Quality
 from scenes import Picture, status
+from validation.defaults import DEFAULT_SEED
 from validation.remeasured import Sample, propagated, remeasured
 from validation.statistics import STRAY
 
@@ -83,7 +84,7 @@ class VaryCheck:
 
 
 def check_varied(
-    found: planner.Plan, images: int = IMAGES, quality: Quality = Quality(), seed: int = 1995,
+    found: planner.Plan, images: int = IMAGES, quality: Quality = Quality(), seed: int = DEFAULT_SEED,
     report: Callable[[str, int, int], None] = lambda *_: None,
 ) -> VaryCheck:  # fmt: skip
     """Render the fixed and the varied plan and measure both in noisy pictures.

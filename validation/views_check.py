@@ -16,6 +16,7 @@ from scenes import Picture, Pose
 from scenes.status import counted, is_trusted
 from validation import statistics
 from validation.batch.measurands import independent
+from validation.defaults import DEFAULT_SEED
 from validation.remeasured import GRADIENT, Sample, batches, propagated, remeasured
 
 IMAGES = 300  # of each picture: a variance is known to 8 %
@@ -96,7 +97,7 @@ class _Shot:
 def check_views(
     found: planner.Views,
     images: int = IMAGES,
-    seed: int = 1995,
+    seed: int = DEFAULT_SEED,
     quality: Quality = Quality(),
     report: Callable[[str, int, int], None] = lambda *_: None,
 ) -> ViewsCheck:

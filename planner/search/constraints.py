@@ -146,9 +146,7 @@ def _check(good: bool, name: str, must: str, got: object) -> None:
 
 def _cosines(sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
     """Cosines of the angles between directions (..., 3), broadcast."""
-    if sensors.ndim == lights.ndim == 3 and sensors.shape[1] == lights.shape[0] == 1:
-        return sensors[:, 0] @ lights[0].T  # a table of all pairs
-    return np.einsum("...i,...i->...", *np.broadcast_arrays(sensors, lights))
+    return np.einsum("...i,...i->...", sensors, lights)
 
 
 def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray:

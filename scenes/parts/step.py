@@ -132,14 +132,14 @@ class StepPart:
         known = [edge for edge in self.edges if edge.kind == "circle"]
         if not known:
             return solid.circles
-        places = np.array([[*edge.centre, edge.radii[0]] for edge in known])
+        places = np.array([[*edge.centre, *edge.radii] for edge in known])
         found = []
         for circle in solid.circles:
             off = np.abs(places - [*circle.centre, circle.radius]).max(1)
             edge = known[int(off.argmin())]
             if off.min() <= _SAME * solid.extent:
-                axis = edge.axis * math.copysign(1.0, float(edge.axis @ circle.axis))
-                circle = replace(circle, centre=edge.centre, axis=axis, radius=edge.radii[0])
+                (radius,), axis = edge.radii, edge.axis * math.copysign(1.0, float(edge.axis @ circle.axis))
+                circle = replace(circle, centre=edge.centre, axis=axis, radius=radius)
             found.append(circle)
         return tuple(found)
 

@@ -65,9 +65,16 @@ EQUIVALENT: dict[str, str] = {
     "len(_with_pose_errors(end.sensor, end.lights, tolerances)[ -1]),": "as many lights as sensors",
     "validation/views_check.py: for m, forecast in enumerate(chosen.views[ -1].prediction.measurands):":
         "name, unit and value in the object are those of every picture",
-    "validation/batch/store.py: variance, value, status = rows[ -1]": "of the rows with a key there is one",
     "validation/hard/polygon.py: first = np.clip(np.floor(ends).astype(int) - count // 2 * 1, -count, width)[:, None]":
         "of two flat pixels more than are needed at either side of an end one goes to the other side",
+    "scenes/materials/torrance_sparrow.py: safe = ops.select(lit, cosine, 2 + 0 * cosine)":
+        "what is not lit is 0 two lines below",
+    "planner/search/lights.py: size = max(1, _AT_ONCE // max(two.size, 2))": "how many at a time changes no result",
+    "scenes/parts/walls.py: return bool(np.abs(off).max() <= near and abs(slopes / np.sign(turned) - slope) <= _SAME)":
+        "a sign is 1 or -1: axes at right angles are told apart before",
+    "validation/hard/precision.py: pull = pull / np.linalg.norm(pull, axis=1, keepdims=True)":
+        "of two axes the second is the last",
+    "validation/report/overlay.py: _outlined(axes, one.outline, \"white\", 1.8, \":\")": "how thick a line is drawn",
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
     "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
     "measure/fitting/noise.py: continue": "at a fixed point: rounds that are left move it by less than 1e-9",

@@ -128,3 +128,12 @@ def test_distance_from_a_segment(point, away):
     found = _to_segment(np.array([point], float) @ turned.T + 7, ends @ turned.T + 7)
     assert found == pytest.approx([away], abs=1e-12)
     assert _to_segment(np.array([[3.0, 4.0]]), np.zeros((2, 2))) == pytest.approx([5.0])  # a segment of no length
+
+
+def test_a_table_of_pairs_is_that_of_each_pair(task1, rng):
+    """Sensors in rows and lights in columns, also as many of the one as of the other, and one of each."""
+    limits = Constraints(min_separation_deg=50, light_out_of_view=True)
+    for rows, columns in ((7, 4), (5, 5), (1, 6), (6, 1), (1, 1)):
+        sensors, lights = (rng.uniform((0, 0), (90, 360), (n, 2)) for n in (rows, columns))
+        each = [[bool(limits.pairs(task1, s[None], k[None])[0]) for k in lights] for s in sensors]
+        assert limits.pairs(task1, sensors[:, None], lights[None]).tolist() == each

@@ -215,3 +215,16 @@ def test_roots_of_quadratics_keep_their_digits(b):
 def test_refused(make, match):
     with pytest.raises(InvalidInput, match=match):
         make()
+
+
+@pytest.mark.parametrize("size", [1e3, 1e-3, -1.0, -1e3])
+def test_a_line_meets_a_quadric_at_the_same_places_however_its_direction_is_given(size):
+    """Nearly along a rod of radius 2: at 1e-6 it meets both walls far away, at 1e-7 it counts as met once."""
+    start, ways = np.array([0.5, 0.3, 0.7]), np.array([[1e-6, 0.0, 1.0], [1e-7, 0.0, 1.0], [0.0, 0.0, 1.0]])
+    rod = Quadric(np.diag([3.0, 3.0, 0.0]), (0, 0, 0), -12.0)
+    found = rod.intersections(start, ways)
+    assert np.isfinite(found).sum(1).tolist() == [2, 1, 0]
+    wall = np.sqrt(4 - 0.3**2)
+    assert found[0] == pytest.approx(1e6 * (np.array([-wall, wall]) - 0.5), rel=1e-9)
+    assert np.sort(size * rod.intersections(start, size * ways), axis=1)[0] == pytest.approx(found[0], rel=1e-9)
+    assert np.isfinite(rod.intersections(start, size * ways)).sum(1).tolist() == [2, 1, 0]

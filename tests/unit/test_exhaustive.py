@@ -1,9 +1,13 @@
 """The search by bounds is the search of all pairs, and says truly how far it is."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import scenes
+from imaging.geometry.projection import direction
+from planner import Constraints
 from planner.search import exhaustive
 from planner.search.objective import SearchProblem
 from tests.pairs import evaluate_pairs
@@ -49,4 +53,54 @@ def test_where_the_bound_is_far_from_the_value(at_once, poses, monkeypatch):
     sensors, lights = (part.reshape(-1, 2) for part in np.broadcast_arrays(poses[:, None], poses[None]))
     values = worse(SearchProblem.of(task1, "calibrated", "image"), sensors, lights).reshape(len(poses), -1)
     assert found.variance == pytest.approx(values.min(), rel=1e-12)
+    assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)
+
+
+def test_pair_by_pair_the_least_of_each_sensor_is_told():
+    """None where nothing can be measured or is allowed; what the scale's end has cut off only where all are."""
+    levels = np.array([[5.0, np.inf, 3.0, 8.0], [np.inf] * 4, [2.0, 9.0, 7.0, 6.0], [4.0, 4.5, 1.0, 9.5]])
+    allowed = np.array([[1, 1, 1, 1], [1, 1, 1, 1], [1, 0, 0, 1], [0, 0, 0, 0]], bool)
+    cut = np.array([[0, 0, 1, 0], [0, 0, 0, 0], [1, 0, 0, 1], [0, 0, 0, 0]], bool)
+
+    def found(cut):
+        def table(sensors, lights, report):
+            for part in (slice(0, 3), slice(3, 4)):
+                yield part, SimpleNamespace(values=levels[part], cut=cut[part]), allowed[part]
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(exhaustive, "minimised", lambda errors, aim: errors.values)
+            patch.setattr(exhaustive, "cut_off", lambda errors, scene: errors.cut)
+            problem = SimpleNamespace(table=table, objective=None, scene=None)
+            return exhaustive._one_by_one(problem, np.zeros((4, 2)), np.zeros((4, 2)), None)
+
+    plain = found(np.zeros_like(cut))
+    assert (plain.sensor, plain.light, plain.variance) == (2, 0, 2.0)
+    assert plain.best_light.tolist() == [2, -1, 0, -1]
+    assert plain.least.tolist() == [3.0, np.inf, 2.0, np.inf]
+    assert (plain.pairs, plain.evaluated, plain.within_scale) == (16, 16, False)
+    within = found(cut)
+    assert (within.sensor, within.light, within.variance) == (0, 0, 5.0)
+    assert within.best_light.tolist() == [0, -1, -1, -1]
+    assert within.least.tolist() == [5.0, np.inf, np.inf, np.inf]
+    assert within.within_scale
+    everything = found(np.ones_like(cut))
+    assert (everything.sensor, everything.light, everything.within_scale) == (2, 0, False)
+
+
+def test_sensors_that_can_measure_by_no_light_have_none(poses):
+    """From below, or within 80 degrees of every light; each other one's bound is below the values of all its pairs."""
+    task1, sensors = scenes.load("task1"), np.concatenate([[[175.0, 10.0]], poses, [[179.0, 200.0]]])
+    limits = Constraints(min_separation_deg=80, camera_body=0, light_body=0)
+    found = exhaustive.exhaustive(task1, sensors, poses, "calibrated", "image", limits, lambda *_: None)
+    pairs = [part.reshape(-1, 2) for part in np.broadcast_arrays(sensors[:, None], poses[None])]
+    values = evaluate_pairs(task1, *pairs, "calibrated", "image")
+    apart = np.einsum("ij,ij->i", *map(direction, pairs)) <= np.cos(np.radians(80))
+    values = np.where(apart, values, np.inf).reshape(len(sensors), -1)
+    lost = ~np.isfinite(values).any(1)
+    assert lost[[0, 1, -1]].all()  # at a polar angle of 10 degrees, 70 degrees from any light at most
+    assert not lost.all()
+    assert ((found.best_light == -1) == lost).all()
+    assert (np.isinf(found.least) == lost).all()
+    assert (found.least <= values.min(1) * (1 + 1e-9)).all()
+    assert not lost[found.sensor]
     assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)

@@ -417,3 +417,12 @@ def test_work_can_be_stopped(task1):
     assert [each["text"] for each in sent if each["type"] == "told"] == [
         "another work must be finished or stopped before this, got one under way"
     ]
+
+
+@pytest.mark.parametrize("size", [(2500, 1), (2500, 7), (1, 1900), (1, 1), (1600, 900)])
+def test_a_part_of_any_shape_is_as_large_as_its_scale_says(task1, size):
+    """At least one pixel either way."""
+    part = preview.Window(5, 7, *size)
+    image = np.arange(3000.0 * 3000).reshape(3000, 3000) % 200
+    wanted = [max(1, round(n * part.scale)) for n in (part.height, part.width)]
+    assert list(preview.rendered(task1, image, part).shape) == wanted

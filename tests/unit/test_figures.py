@@ -98,3 +98,28 @@ def test_a_range_of_more_than_a_decade_is_logarithmic(drawn, spread, scale):
     variance = np.geomspace(1, spread**2, len(chart.found.space)) * 1e-6
     steep = replace(chart, found=replace(chart.found, variance=variance))
     assert type(steep.norm()) is scale
+
+
+def test_the_scale_of_a_map_spans_95_percent_of_the_directions(drawn):
+    """From the least; where all are nearly alike, one per cent from end to end; 0 to 1 where nothing is known."""
+    chart = drawn[3]
+
+    def norm(sigma):
+        return replace(chart, found=replace(chart.found, variance=np.square(sigma))).norm()
+
+    count = len(chart.found.space)
+    sigma = np.linspace(2.0, 6.0, count)
+    assert (norm(sigma).vmin, norm(sigma).vmax) == pytest.approx((2.0, 5.8))
+    lost = np.append(sigma, [np.inf, np.nan])
+    assert (norm(lost).vmin, norm(lost).vmax) == pytest.approx((2.0, 5.8))
+    assert (norm(np.full(count, 3.0)).vmin, norm(np.full(count, 3.0)).vmax) == pytest.approx((3.0, 3.03))
+    assert (norm(np.full(count, np.inf)).vmin, norm(np.full(count, np.inf)).vmax) == (0, 1)
+
+
+def test_a_maps_scale_is_as_wide_as_the_map_at_most(drawn):
+    figure, axis, below, _ = drawn
+    (bar,) = (each for each in figure.axes if each not in (axis, below))
+    figure.draw_without_rendering()
+    map_, scale = axis.get_position(original=True), bar.get_position()
+    assert map_.x0 < scale.x0 < scale.x1 < map_.x1  # margin: where it stands, by its kind
+    assert scale.y1 < map_.y0  # margin: the same

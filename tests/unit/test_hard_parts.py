@@ -1,5 +1,6 @@
 """The references of the hard cases: a point's place and its camera, against the planner's own projection."""
 
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -10,7 +11,9 @@ from matplotlib.figure import Figure
 import planner
 from imaging.geometry.projection import project_ideal
 from scenes import Pose
-from validation.hard import precise, precise_models
+from scenes.parts.surfaces import Cylinder, Quadric, Sphere, Torus
+from validation.hard import limb_cases, precise, precise_models, render_cases
+from validation.hard.case import Answer, run
 from validation.report import precision_figure
 
 SENSOR, LIGHT = (37.0, 112.0), (21.0, 301.0)
@@ -86,3 +89,25 @@ def test_conditions_in_closed_form():
     assert precise.condition_of(lambda x: x[0] ** 4 / x[2] + x[1], numbers) == pytest.approx(5, rel=1e-9)
     told = precise.reference(lambda x: x[0] ** 2 * x[1], [1.5, 2.0])
     assert (told.value, told.condition) == (4.5, pytest.approx(3, rel=1e-9))
+
+
+def test_limbs_that_are_round_are_of_balls():
+    """By all of two coordinates; of a rod and a torus, and of a rod as an equation, across alone."""
+    axis = np.array([1.0, 0.0, 0.0])
+    rod = Quadric(np.diag([0.0, 1, 1]), (0, 0, 0), -4.0)
+    assert limb_cases._is_ball(Sphere(np.zeros(3), 2.0))
+    assert limb_cases._is_ball(Quadric(np.eye(3), (0, 0, 0), -4.0))
+    others = (rod, Cylinder(np.zeros(3), axis, 2.0, (-1, 1)), Torus(np.zeros(3), axis, 2.0, 0.5))
+    assert not any(map(limb_cases._is_ball, others))
+
+
+def test_levels_are_judged_to_a_few_thousandths():
+    """One per mille off is right, half a per cent is not."""
+    found = [case for case in render_cases.cases() if case.measurand == "grey level"]
+    assert len(found) == 2
+    for case in found:
+        exact = case.reference().value
+        told = [
+            run(replace(case, ours=lambda f=f, exact=exact: Answer(exact * f))).verdict for f in (0.999, 1.001, 1.005)
+        ]
+        assert told == ["right", "right", "WRONG"]

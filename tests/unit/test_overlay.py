@@ -119,6 +119,7 @@ def test_corners_without_covariance_have_no_part_in_it():
     whole[:2] = whole[:, :2] = np.nan
     assert overlay._largest(quad(covariance=whole)) == pytest.approx(np.linalg.eigvalsh(SPREAD)[-1] / 2)
     assert overlay._largest(quad(covariance=np.full((8, 8), np.nan))) == 0
+    assert overlay._largest(quad(covariance=-1e-20 * np.eye(8))) == 0  # rounding
     _, axes = drawn(quad(covariance=whole))
     assert [tuple(each.center) for each in axes.patches] == [tuple(corner) for corner in CORNERS[1:]]
 

@@ -4,6 +4,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import render
 import scenes
 from scenes import InvalidInput, Picture, Pose
 from scenes.load import from_document
-from scenes.picture import several
+from scenes.picture import mounted, several
 from tests.oracle import block_image
 
 
@@ -102,3 +103,14 @@ def test_lights_of_a_scene_in_one_line(task1):
     for message, lights in wrong.items():
         with pytest.raises(InvalidInput, match=message):
             from_document(Path("here.toml"), {**document, **lights})
+
+
+def test_a_light_that_is_not_free_stands_where_the_sensors_or_it_is_said_to():
+    """Opposite: 180 degrees less the polar angle, half a turn of azimuth; of any number of sensors in any order."""
+    sensors = np.array([[[10.0, 20.0], [35.0, 200.0], [90.0, 359.0]], [[0.0, 0.0], [120.0, 180.0], [60.0, 95.0]]])
+    opposite = SimpleNamespace(mount="camera", faces_sensor=True, pose=None)
+    wanted = [[[170, 200], [145, 20], [90, 179]], [[180, 180], [60, 0], [120, 275]]]
+    assert mounted(opposite, sensors).tolist() == wanted
+    assert mounted(opposite, sensors[0, 1]).tolist() == wanted[0][1]
+    assert mounted(SimpleNamespace(mount="camera", faces_sensor=False, pose=None), sensors) is sensors
+    assert mounted(SimpleNamespace(mount="fixed", faces_sensor=True, pose=Pose(12, 34)), sensors).tolist() == [12, 34]

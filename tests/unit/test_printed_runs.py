@@ -15,7 +15,7 @@ import scenes
 import validation
 from scenes import Pose
 from validation import comparison
-from validation.batch import job, work
+from validation.batch import job, result, work
 from validation.report import diagnostics, export, figures, page_tables, run_cells, table
 from validation.statistics import ALLOWANCE, LEVEL, SHARES
 
@@ -348,6 +348,18 @@ def test_standardised_values_are_counted_on_both_sides(run):
         assert made.inside(sigmas) == pytest.approx((np.abs(z) < sigmas).mean(), abs=0.01)
 
 
+def test_two_values_are_enough_to_stand_off_their_mean(run):
+    """One stands off itself by nothing: it is not counted."""
+    found, told = run
+    some = {0: 2, 1: 1, 2: 0, 3: 3}
+    kept = {i: np.append(here.values["gradient"][np.isfinite(here.values["gradient"])][: some[i]], np.nan)
+            for i, here in enumerate(told)}  # fmt: skip
+    made = diagnostics.Distances.of(found, SimpleNamespace(distances=lambda index, method: kept[index]))
+    assert made.total == 5
+    z = [(kept[i][:-1] - kept[i][:-1].mean()) / told[i].sigma["gradient"] for i in (0, 3)]
+    assert np.repeat(np.arange(1600), made.counts).tolist() == sorted(np.floor((np.concatenate(z) + 8) * 100))
+
+
 def test_the_figure_shows_variances_and_their_intervals(run, monkeypatch):
     """Points at (predicted, measured), bars from the one end of the interval to the other."""
     found, told = run
@@ -405,3 +417,21 @@ def test_two_runs_are_compared_by_what_is_not_lost(run):
                 found = by.get((name, a["method"], what))
                 assert found is not None, (name, what)
                 assert (found.before, found.after, found.p_value) == pytest.approx((old, new, p), rel=1e-6)
+
+
+def test_of_a_run_that_was_killed_early_no_time_is_known(run):
+    """What was measured until then is told all the same."""
+    found, told = run
+    scene = _scene()
+    store = SimpleNamespace(
+        identity=lambda: {"seed": 3, "variant": "scalar_rgb"}, fact=lambda name, default: default,
+        seconds=lambda: {"render": 1.5}, predicted=lambda i: told[i].predicted if i != 1 else None,
+        trouble=lambda i: None, propagated=lambda i, name: told[i].propagated[name],
+        distances=lambda i, name: told[i].values[name], failures=lambda i, name: {},
+    )  # fmt: skip
+    early = result.collect(result.Campaign.of(scene), store)
+    assert early.seconds == {"wall": 0.0, "workers": 0, "render": 1.5}
+    assert early.machines == ()
+    assert early.refused == {1: "not yet worked on"}
+    assert [row.index for row in early.rows] == [0, 2, 3]
+    assert [row.main.ratio for row in early.rows] == [found.rows[i].main.ratio for i in (0, 2, 3)]

@@ -6,7 +6,7 @@ import trimesh
 
 import scenes
 from scenes.parts.mesh import solid
-from scenes.parts.recognised import cylinders
+from scenes.parts.recognised import _turn, cylinders
 from tests.parts import bracket, unevenly
 from validation.report import scene_table
 
@@ -95,3 +95,26 @@ def test_listed_with_their_residuals():
     walls = scene_table.facts(scenes.load("bracket_mm"))["cylinders"]
     assert [(w["name"], round(w["diameter"], 4), w["hole"]) for w in walls] == [("k1", 8.0, True), ("k2", 10.0, True)]
     assert all(0 < w["residual"] <= w["largest"] < 1e-5 for w in walls)  # margin: the order is said
+
+
+def test_ends_are_where_the_rod_ends():
+    """Counted along the axis from its point, wherever in space the rod stands."""
+    mesh, _ = turned(trimesh.creation.cylinder(2.0, 5.0, sections=36), 8)
+    (found,) = cylinders(solid(mesh))
+    surface, middle = found.surface, np.array([3.0, -2.0, 7.0])
+    ends = surface.point + np.array(surface.ends)[:, None] * surface.axis
+
+    assert ends == pytest.approx(middle + np.array([[-2.5], [2.5]]) * surface.axis, abs=1e-9)
+
+
+def test_how_far_round_facets_go(rng):
+    """From the first facet's middle to the last one's and a mean step more; all round where no gap is wide."""
+    axis, one, two = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
+
+    def turn(degrees):
+        angles = np.radians(rng.permutation(degrees))
+        return np.degrees(_turn(np.cos(angles)[:, None] * one + np.sin(angles)[:, None] * two, axis))
+
+    assert turn([160.0, 170.0, 185.0, 190.0, 210.0]) == pytest.approx(50 + 12.5)  # across the half turn
+    assert turn([10.0, 100.0, 190.0, 250.0]) == pytest.approx(360)  # steps of 90, 90, 60 and 120
+    assert turn([10.0, 100.0, 180.0, 230.0]) == pytest.approx(360 - 140 + 220 / 3)

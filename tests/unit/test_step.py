@@ -6,6 +6,7 @@ import sys
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import scenes
 from scenes import InvalidInput
 from scenes.load import from_document
 from scenes.parts import step, step_kernel
+from scenes.parts.solid import Circle
 from scenes.parts.surfaces import Cone, Cylinder, Plane
 
 RECORD = Path(__file__).parent / "flange.step.json"
@@ -166,3 +168,31 @@ def test_the_worker_is_silent(tmp_path):
     record = json.loads(done.stdout)
     assert (record["format"], record["unit"], len(record["faces"])) == (1, "mm", 8)
     assert sum(edge["kind"] == "circle" for edge in record["edges"]) == 4
+
+
+def test_circles_of_the_mesh_are_those_of_the_edges_that_they_stand_for():
+    """Centre, axis and radius of the nearest edge, the axis along the mesh's own; the mesh's where none is near."""
+
+    def edge(kind, centre, axis, *radii):
+        return step.StepEdge(kind, (0, 1), np.zeros((2, 3)), np.array(centre, float), np.array(axis, float), radii)
+
+    circles = near, far, small = (
+        Circle("c1", np.array([1.0, 2.0, 3.0]), np.array([0.6, 0.0, 0.8]), 2.5, 0, (), True),
+        Circle("c2", np.array([-4.0, 2.0, 1.0]), np.array([0.0, 0.0, 1.0]), 1.5, 1, (), True),
+        Circle("c3", np.array([4.0, -2.0, 0.5]), np.array([0.0, 1.0, 0.0]), 0.7, 2, (), False),
+    )
+    edges = (
+        edge("ellipse", near.centre, near.axis, near.radius, near.radius / 2),
+        edge("circle", near.centre + [0, 0, 3e-6], -near.axis, near.radius + 2e-6),
+        edge("circle", near.centre + [4e-6, 0, 0], near.axis, near.radius + 7e-6),
+        edge("circle", far.centre + [0, 3e-4, 0], far.axis, far.radius),
+        edge("circle", small.centre, small.axis, small.radius + 3e-4),
+    )
+    part = step.StepPart((), (), edges, np.zeros((0, 3, 3)), np.zeros(0, int))
+    found = part._exact(SimpleNamespace(circles=circles, extent=10.0))
+    assert found[0].centre.tolist() == edges[1].centre.tolist()
+    assert found[0].axis.tolist() == near.axis.tolist()
+    assert found[0].radius == near.radius + 2e-6
+    assert found[1:] == (far, small)
+    bare = step.StepPart((), (), edges[:1], np.zeros((0, 3, 3)), np.zeros(0, int))
+    assert bare._exact(SimpleNamespace(circles=circles, extent=10.0)) is circles

@@ -119,7 +119,14 @@ def test_the_own_choice_stays_without_gain():
     ],
 )
 def test_gains(name, poses, vary, hold, least):
-    found = planner.plan(scenes.load(name), sensor=poses[0], light=poses[1], vary=vary, hold=hold).varied
+    said = []
+    found = planner.plan(
+        scenes.load(name), sensor=poses[0], light=poses[1], vary=vary, hold=hold, report=lambda *told: said.append(told)
+    ).varied
+    choices = [told[1:] for told in said if told[0] == "choices"]
+    assert choices == sorted(choices)
+    assert choices[-1] == (found.evaluated, found.evaluated)  # all that is to be tried, from the first one on
+    assert {whole for _, whole in choices} == {found.evaluated}
     assert found.gain >= found.gain_same_poses >= 1  # margin: same poses are among all, by their kind
     assert found.gain >= least  # margin: the least that is said of each
     assert (found.best.sensor, found.best.light) == (found.fixed.sensor, found.fixed.light)

@@ -1,10 +1,13 @@
 """Plans of several pictures."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import planner
 import scenes
+from planner import views
 from planner.search.objective import Aim
 from tests.sides import sides
 
@@ -100,3 +103,27 @@ def test_held_sensor(task1):
 def test_bad_input(task1, arguments, line):
     with pytest.raises(scenes.InvalidInput, match=line):
         planner.plan_views(task1, **arguments)
+
+
+def test_each_chosen_picture_is_refined_once_beside_the_others_of_its_set(monkeypatch):
+    """Sets grow by one; what was refined, or came of it, is not refined again."""
+    asked, said = [], []
+    pool = SimpleNamespace(seen=np.array([4, 6, 9, 11]))
+    pool.known = lambda: SimpleNamespace(together=tuple)
+    pool.refine = lambda row, others, step: asked.append((row, others, step)) or {4: 4, 6: 11, 9: 20}[row]
+    sets = {1: (0,), 2: (0, 1), 3: (3, 0, 2)}  # numbers among those seen
+    monkeypatch.setattr(views, "_chosen", lambda known, rows, groups, size: ("smaller ones", sets[size]))
+    views._refine(pool, 3, 5.0, lambda *told: said.append(told))
+    assert asked == [(4, (), 5.0), (6, (0,), 5.0), (9, (3, 0), 5.0)]
+    assert said == [("descents", size, 3) for size in (1, 2, 3)]
+
+
+def test_the_others_of_a_set_are_all_but_the_one(monkeypatch):
+    asked = []
+    pool = SimpleNamespace(seen=np.arange(4), known=lambda: SimpleNamespace(together=tuple))
+    pool.refine = lambda row, others, step: asked.append((row, others)) or row
+    monkeypatch.setattr(views, "_chosen", lambda known, rows, groups, size: ((2, 0, 3, 1)[:size],) * 2)
+    views._refine(pool, 1, 5.0, lambda *_: None)
+    monkeypatch.setattr(views, "_chosen", lambda known, rows, groups, size: ((2, 0, 3, 1),))
+    views._refine(pool, 1, 5.0, lambda *_: None)
+    assert asked == [(2, ()), (2, (0, 3, 1)), (0, (2, 3, 1)), (3, (2, 0, 1)), (1, (2, 0, 3))]

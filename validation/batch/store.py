@@ -155,7 +155,7 @@ class RunFile:
     def fact(self, key: str, default: Any = None) -> Any:
         """A recorded fact."""
         rows = self._rows("SELECT value FROM run WHERE key = ?", key)
-        return self._document(key, rows[0][0]) if rows else default
+        return next((self._document(key, text) for (text,) in rows), default)
 
     def identity(self) -> dict[str, Any]:
         """What the run's numbers depend on."""
@@ -189,10 +189,11 @@ class RunFile:
 
     def packed(self, setting: int) -> Packed | None:
         """Noise-free image of a setting, or None if it is not rendered or not kept."""
-        rows = self._rows("SELECT height, width, image FROM setting WHERE setting = ?", setting)
-        if not rows or rows[0][2] is None:
+        query = "SELECT height, width, image FROM setting WHERE setting = ? AND image IS NOT NULL"
+        rows = self._rows(query, setting)
+        if not rows:
             return None
-        packed = Packed(*rows[0])
+        (packed,) = (Packed(*row) for row in rows)
         if not (isinstance(packed.data, bytes) and packed.fits()):
             raise self._damaged(f"the image of setting {setting} has no size")
         return packed
@@ -225,13 +226,13 @@ class RunFile:
 
     def predicted(self, setting: int) -> dict[str, float] | None:
         """Predictions that need no image, as `work.Clean.predicted`; None if there are none yet."""
-        rows = self._rows("SELECT predicted FROM setting WHERE setting = ?", setting)
-        return self._document("predicted", rows[0][0]) if rows and rows[0][0] is not None else None
+        rows = self._rows("SELECT predicted FROM setting WHERE setting = ? AND predicted IS NOT NULL", setting)
+        return next((self._document("predicted", text) for (text,) in rows), None)
 
     def trouble(self, setting: int) -> str | None:
         """Why a setting cannot be worked on, in one line."""
-        rows = self._rows("SELECT trouble FROM setting WHERE setting = ?", setting)
-        return one_line(str(rows[0][0])) if rows and rows[0][0] is not None else None
+        rows = self._rows("SELECT trouble FROM setting WHERE setting = ? AND trouble IS NOT NULL", setting)
+        return next((one_line(str(trouble)) for (trouble,) in rows), None)
 
     def propagated(self, setting: int, method: str) -> tuple[float, float, str]:
         """Variance (px^2), distance in the noise-free image (px) and status, as predicted from the image."""
@@ -239,7 +240,7 @@ class RunFile:
         rows = self._rows(query, setting, method)
         if not rows:
             raise self._damaged(f"no prediction of setting {setting} by {method}")
-        variance, value, status = rows[0]
+        ((variance, value, status),) = rows
         value = float("nan") if value is None else value
         if not (isinstance(variance, float) and variance >= 0 and isinstance(value, float) and status in statuses.ALL):
             raise self._damaged(f"the prediction of setting {setting} by {method}")

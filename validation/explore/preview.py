@@ -85,7 +85,7 @@ def _beside(pictures: Pictures, scene: Scene) -> float:
 def rendered(scene: Scene, image: np.ndarray, part: Window) -> np.ndarray:
     """The same part of a rendered image (grey levels, float), uint8."""
     cut = image[part.top : part.top + part.height, part.left : part.left + part.width].astype(np.float32)
-    size = max(1, round(part.width * part.scale)), max(1, round(part.height * part.scale))
+    size = round(part.width * part.scale), max(1, round(part.height * part.scale))
     how = cv2.INTER_AREA if part.scale < 1 else cv2.INTER_NEAREST
     return shades(scene, cv2.resize(cut, size, interpolation=how))
 

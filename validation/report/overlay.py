@@ -89,7 +89,7 @@ def _grey(image: np.ndarray, scale: float) -> np.ndarray:
 def _factors(found: measure.Shapes, scale: float) -> tuple[float, float]:
     """How many times larger residuals and ellipses are drawn than they are in the drawing: 1, 2 or 5 times 10^k."""
     rms = [side.rms for one in found.found for side in one.residuals]
-    radii = [math.sqrt(_CHI2 * max(_largest(one), 0.0)) for one in found.found if one.covariance is not None]
+    radii = [math.sqrt(_CHI2 * _largest(one)) for one in found.found if one.covariance is not None]
     return _nice(_DOT / scale / max(np.median(rms), 1e-9) if rms else 1), _nice(
         _CORNER / scale / max(*radii, 1e-9) if radii else 1
     )
@@ -97,7 +97,7 @@ def _factors(found: measure.Shapes, scale: float) -> tuple[float, float]:
 
 def _largest(one: measure.Found) -> float:
     known = [block for block in _blocks(one) if np.isfinite(block).all()]
-    return max((float(np.linalg.eigvalsh(block)[-1]) for block in known), default=0.0)
+    return max([0.0, *(float(np.linalg.eigvalsh(block)[-1]) for block in known)])
 
 
 def _blocks(one: measure.Found) -> list[np.ndarray]:

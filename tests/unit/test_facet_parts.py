@@ -1,0 +1,148 @@
+"""Boundaries of faces and what makes faces facets of a curved surface: steps of each, on made-up shapes."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from scenes.parts import facets, rims
+
+
+def ring(count, radius, centre=(0.0, 0.0), start=0.0):
+    """Points of a circle in the plane z = 2, at uneven steps."""
+    turn = start + 2 * np.pi * (np.arange(count) + 0.2 * np.sin(np.arange(count))) / count
+    return np.column_stack([centre[0] + radius * np.cos(turn), centre[1] + radius * np.sin(turn), np.full(count, 2.0)])
+
+
+def test_boundaries_run_counter_clockwise_around_the_face_the_outer_one_first():
+    """A square plate with a triangular hole; what lies on a straight edge is left out, in any order of triangles."""
+    outer = np.array([[0.0, 0], [8, 0], [8, 5], [0, 5]])
+    inner = np.array([[2.0, 1], [3, 3], [5, 1]])  # clockwise
+    extra = np.array([[4.0, 0]])  # on the first side
+    points = np.concatenate([outer, inner, extra])
+    vertices = np.column_stack([points, np.full(len(points), 3.0)])
+    triangles = np.array([[0, 7, 4], [7, 6, 4], [7, 1, 6], [1, 2, 6], [6, 2, 5], [2, 3, 5], [5, 3, 4], [3, 0, 4]])
+    kept = np.arange(8) != 7
+    for seed in range(3):
+        order = np.random.default_rng(seed).permutation(len(triangles))
+        found = rims.boundaries(triangles[order], kept, vertices, np.array([0.0, 0, 1]))
+        assert [len(loop) for loop in found] == [4, 3]
+        turned = [tuple(np.roll(loop, -int(np.argmin(loop)))) for loop in found]
+        assert turned == [(0, 1, 2, 3), (4, 5, 6)]
+    areas = [rims._area(vertices[list(loop)], np.array([0.0, 0, 1])) for loop in found]
+    assert areas == pytest.approx([40.0, -3.0])
+    assert rims._area(vertices[:2], np.array([0.0, 0, 1])) == 0
+    below = rims.boundaries(triangles[:, ::-1], kept, vertices, np.array([0.0, 0, -1]))
+    assert [len(loop) for loop in below] == [4, 3]
+
+
+def test_boundaries_that_touch_in_a_corner_end_there():
+    """Two triangles with one vertex in common: each is closed by itself."""
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [-3, 0, 0], [0, -3, 0]])
+    found = rims.boundaries(np.array([[0, 1, 2], [0, 3, 4]]), np.ones(5, bool), points, np.array([0.0, 0, 1]))
+    assert sorted(map(sorted, found)) == [[0, 1, 2], [0, 3, 4]]
+    assert 0 in found[0]
+    assert set(found[0]) == {0, 3, 4}  # the larger one first
+
+
+def test_round_boundaries_of_twelve_pieces_are_circles():
+    """Of fewer a polygon; a millionth of the radius off is nothing, a hundredth is too much."""
+    many, few, wavy, fine = ring(12, 3.0, (1, 2)), ring(11, 3.0), ring(20, 3.0), ring(30, 2.0, (-4, 1))
+    wavy[::2, 0] *= 1.01
+    fine[::3, 1] += 1e-6
+    vertices = np.concatenate([many, few, wavy, fine])
+    starts = np.cumsum([0, 12, 11, 20, 30])
+    loops = [tuple(range(a, b)) for a, b in pairwise(starts.tolist())]
+    found = rims.rims([[loops[1]], [loops[2], loops[0]], [loops[3]]], vertices, np.tile([0.0, 0, 1], (3, 1)))
+    assert [(each.face, each.loop) for each in found] == [(1, loops[0]), (2, loops[3])]
+    assert found[0].centre == pytest.approx([1, 2, 2])
+    assert [each.radius for each in found] == pytest.approx([3.0, 2.0], abs=2e-6)
+    assert found[0].pieces == [*zip(range(11), range(1, 12), strict=True), (11, 0)]
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-2 / 3, 1 / 3, 2 / 3)])
+def test_a_circle_through_points_of_any_plane(normal):
+    """And how far the farthest and the nearest one are apart in radius."""
+    normal = np.array(normal)
+    one = np.cross(normal, [0.3, -0.5, 0.7])
+    one /= np.linalg.norm(one)
+    frame, middle = np.stack([one, np.cross(normal, one)]), np.array([3.0, -5.0, 0.5])
+    flat = ring(15, 2.5)[:4, :2]
+    centre, radius, off = rims.circle_through(middle + flat @ frame, normal)
+    assert centre == pytest.approx(middle)
+    assert (radius, off) == (pytest.approx(2.5), pytest.approx(0, abs=1e-9))
+    square = np.array([[2.0, 0], [0, 1], [-2, 0], [0, -1]])
+    centre, radius, off = rims.circle_through(middle + square @ frame, normal)
+    assert centre == pytest.approx(middle)
+    assert (radius, off) == (pytest.approx(1.5), pytest.approx(1.0))
+
+
+def strip(widths, bends, convex=True, length=4.0):
+    """Faces side by side along y, n + 1 of them, that bend at n parallel edges of a length."""
+    turn = np.concatenate([[0.0], np.cumsum(bends)])
+    normals = np.column_stack([np.zeros(turn.size), np.sin(turn), np.cos(turn)])
+    steps = np.array(widths)[:, None] * np.column_stack([np.zeros(turn.size), np.cos(turn), -np.sin(turn)])
+    places = np.cumsum(steps, 0)[:-1]
+    vertices = np.concatenate([places, places + [length, 0, 0]])
+    n = len(bends)
+    convex = np.broadcast_to(convex, n)
+    chains = [((i, n + i), (i, i + 1), bool(convex[i])) for i in range(n)]
+    return vertices, chains, normals, length * np.array(widths, float)
+
+
+def found(*parts, **more):
+    return facets.facets(*strip(*parts, **more), ())
+
+
+def test_four_bends_that_follow_each_other_are_a_curved_surface():
+    """The outer faces are planes that it continues smoothly; three bends are a polygon's."""
+    four = found([9, 1, 1.2, 0.9, 7], np.radians([20, 21, 22, 19]))
+    assert four.region.tolist()[1] == four.region.tolist()[2] == four.region.tolist()[3] >= 0
+    assert four.region[[0, 4]].tolist() == [-1, -1]
+    assert four.smooth.tolist() == [True] * 4
+    assert not four.rim.any()
+    three = found([9, 1, 1.2, 7], np.radians([20, 21, 22]))
+    assert three.region.tolist() == [-1] * 4
+    assert not three.smooth.any()
+
+
+def test_a_bend_of_32_degrees_ends_a_curve():
+    some = found([9, 1, 1, 1, 1, 1, 7], np.radians([20, 20, 20, 20, 32, 20]))
+    assert (some.region >= 0).tolist() == [False, True, True, True, False, False, False]
+    assert some.smooth.tolist() == [True] * 4 + [False] * 2
+    assert (found([9, 1, 1, 1, 1, 1, 7], np.radians([20, 20, 20, 20, 30.9, 20])).region >= 0).sum() == 5
+
+
+def test_a_face_that_is_much_wider_than_both_beyond_is_no_facet():
+    """More than five times as wide as either. One that bends the other way ends it, too."""
+    bends = np.radians([15.0] * 8)
+    wide = found([9, 1, 1, 1, 5.1, 1, 1, 1, 9], bends)
+    assert wide.region[4] == -1
+    assert wide.region[3] != wide.region[5]
+    assert (wide.region[[1, 2, 3, 5, 6, 7]] >= 0).all()
+    assert len(set(found([9, 1, 1, 1, 4.9, 1, 1, 1, 9], bends).region[1:8])) == 1
+    assert len(set(found([9, 1, 1, 1, 5.1, 1.1, 1, 1, 9], bends).region[1:8])) == 1
+    other = found([9, 1, 1, 1, 1, 1, 1, 1, 9], bends, [True] * 4 + [False] * 4)
+    assert other.region[4] == -1
+    assert other.region[3] != other.region[5]
+
+
+def test_an_end_is_smooth_that_bends_little_more_than_the_curve():
+    """A quarter more than the largest bend beside it."""
+    for factor, is_smooth in ((1.2, True), (1.3, False)):
+        some = found([9, 1, 1, 1, 1, 7], np.radians([10 * factor, 10, 10, 10, 10]))
+        assert some.smooth.tolist() == [is_smooth] + [True] * 4
+
+
+def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
+    """Where two of its walls meet in an edge; what belongs to both is no rim."""
+    loop = (0, 1, 2)
+    rim = rims.Rim(0, loop, np.zeros(3), 1.0)
+    chains = [((1, 0), (0, 1), True), ((1, 2), (2, 0), True), ((2, 0), (0, 3), True), ((1, 4), (1, 2), True),
+              ((2, 5), (3, 2), True), ((0, 6), (1, 3), True), ((4, 5), (2, 4), True)]  # fmt: skip
+    around, edging = facets._of_rims(chains, [rim])
+    assert edging.tolist() == [True] * 3 + [False] * 4
+    assert around.tolist() == [False] * 3 + [True] * 3 + [False]
+    nothing = facets._of_rims(chains, [])
+    assert not nothing[0].any()
+    assert not nothing[1].any()
