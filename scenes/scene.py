@@ -25,7 +25,7 @@ from scenes.materials.kinds import MATERIALS, AnyMaterial
 from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.measurands.features import Corner, Wall, check_feature
+from scenes.measurands.features import Centre, Corner, Side, Wall, check_feature
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
 from scenes.model import FileName, Model, Title, rebuild
@@ -159,15 +159,22 @@ class Scene(Model):
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """All numbers to be measured: that of ``task``, or those of ``measurands``."""
+        """All numbers to be measured: that of ``task``, or those of ``measurands``; InvalidInput without either."""
+        if self.task is None and not self.measurands:
+            raise InvalidInput(f"task or measurands must be given to plan, predict or measure, got none in {self.name}")
         return quantities_of(self.task, self.measurands)
+
+    @property
+    def features(self) -> tuple[Corner | Centre | Side | Wall, ...]:
+        """Those of all quantities, in their order; none of a scene that asks for nothing."""
+        return sum((quantity.features for quantity in quantities_of(self.task, self.measurands)), ())
 
     @property
     def required(self) -> tuple[str, ...]:
         """Names of the edges and circles that its numbers need, each once: a task's as it names them."""
         if self.task is not None:
             return self.task.edges
-        return tuple(dict.fromkeys(name for quantity in self.quantities for name in quantity.edges))
+        return tuple(dict.fromkeys(name for feature in self.features for name in feature.edges))
 
     def unit_of(self, quantity: Quantity) -> str:
         """Of a number in the object: the scene's unit of length, or degrees."""
@@ -357,11 +364,10 @@ class Scene(Model):
                 self.check_pose("light", light.pose, f"lights[{i}].pose" if self.several_lights else "light.pose", i)
 
     def _check_measurands(self) -> None:
-        """Either ``task`` or ``measurands``, of features that the object has."""
-        if (self.task is None) == (not self.measurands):
-            got = "none of them" if self.task is None else "both"
-            raise ValueError(f"task or measurands must be given, not both, got {got}")
-        names = [quantity.name for quantity in self.quantities]
+        """``task`` or ``measurands``, not both, of features that the object has; a scene without is only looked at."""
+        if self.task is not None and self.measurands:
+            raise ValueError("task or measurands must be given, not both, got both")
+        names = [quantity.name for quantity in quantities_of(self.task, self.measurands)]
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"measurands must have different names, got {name!r} twice")

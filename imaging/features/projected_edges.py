@@ -66,19 +66,18 @@ class ProjectedEdges:
 def straight(scene: Scene) -> tuple[str, ...]:
     """The different straight edges that the scene's quantities need, in their order."""
     rims = set(circles(scene))
-    return tuple(dict.fromkeys(name for q in scene.quantities for name in q.edges if name not in rims))
+    names = (name for feature in scene.features for name in feature.edges)
+    return tuple(dict.fromkeys(name for name in names if name not in rims))
 
 
 def circles(scene: Scene) -> tuple[str, ...]:
     """The different circles and curved surfaces that they need."""
-    features = (feature for quantity in scene.quantities for feature in quantity.features)
-    return tuple(dict.fromkeys(place_of(feature) for feature in features if isinstance(feature, Centre | Wall)))
+    return tuple(dict.fromkeys(place_of(feature) for feature in scene.features if isinstance(feature, Centre | Wall)))
 
 
 def corner_features(scene: Scene) -> tuple[Corner, ...]:
     """The different corners of all quantities."""
-    features = (feature for quantity in scene.quantities for feature in quantity.features)
-    return tuple(dict.fromkeys(feature for feature in features if isinstance(feature, Corner)))
+    return tuple(dict.fromkeys(feature for feature in scene.features if isinstance(feature, Corner)))
 
 
 def projected_edges(pictures: Pictures, names: tuple[str, ...] | None = None) -> ProjectedEdges:

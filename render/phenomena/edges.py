@@ -23,6 +23,7 @@ from scenes import Scene
 NEAR_STEP = float(np.exp(-0.5))
 _FRACTIONS = np.linspace(0.03, 0.97, 24)
 _STAND_INS = 4  # straight edges that stand for a circle
+_MOST = 50  # edges that stand for the part
 _INWARD = 1e-3  # of the object's size: how far inside a face its slope is taken
 
 
@@ -123,9 +124,12 @@ def lever(pictures: Pictures) -> np.ndarray:
     what moves them. The most over the lengths that are measured; angles are told in other units and do not count. For
     the edges that stand for a circle the plain bound 2.
     """
-    known, names = measurands(pictures), required(pictures.scene)
-    lengths = np.array([not quantity.is_angle for quantity in known.quantities])
+    names = required(pictures.scene)
     found = np.full((len(pictures.sensors), len(names)), 2.0)
+    if not pictures.scene.features:
+        return found
+    known = measurands(pictures)
+    lengths = np.array([not quantity.is_angle for quantity in known.quantities])
     if lengths.any() and known.view.names:
         with np.errstate(all="ignore"):
             offset, tilt = (part[:, lengths] for part in known.of_lines(known.gradient))
@@ -137,9 +141,11 @@ def lever(pictures: Pictures) -> np.ndarray:
 def required(scene: Scene) -> tuple[str, ...]:
     """The straight edges that are needed, then those around the face of each circle, which stand for it.
 
-    Of a face with none pieces of the circle itself do.
+    Of a face with none pieces of the circle itself do. The longest sharp edges where nothing is asked for.
     """
     solid, names = scene.solid, list(straight(scene))
+    if not scene.features:
+        return tuple(edge.name for edge in sorted(solid.sharp or solid.edges, key=solid.length, reverse=True)[:_MOST])
     rims = {name for circle in solid.circles for name in circle.edges}
     for name in circles(scene):
         circle = solid.circle(name)

@@ -182,6 +182,10 @@ class Solid:
         """The sharp edges: those of the part itself, by which it can be measured."""
         return tuple(edge for edge in self.edges if edge.kind == "sharp")
 
+    def length(self, edge: Edge) -> float:
+        """Of an edge, scene units."""
+        return float(np.linalg.norm(np.subtract(*self.vertices[list(edge.ends)])))
+
     @cached_property
     def plane(self) -> np.ndarray:
         """Faces that are no facets of a curved surface: none of their edges lies inside one; bool, shape (F,)."""

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import planner
+import render
 import scenes
 from imaging.models.calibrated import calibrated
 from imaging.pictures import Pictures
@@ -73,10 +74,29 @@ def test_either_a_task_or_a_list():
     data = scenes.load("task1").model_dump()
     with pytest.raises(ValueError, match="task or measurands must be given, not both, got both"):
         scenes.Scene.model_validate({**data, "measurands": [DEPTH]})
-    with pytest.raises(ValueError, match="task or measurands must be given, not both, got none of them"):
-        scenes.Scene.model_validate({**data, "task": None})
     with pytest.raises(ValueError, match="measurands must have different names, got 'depth' twice"):
         block(DEPTH, DEPTH)
+
+
+def test_a_scene_that_asks_for_nothing_is_pictured_and_no_more():
+    """The same image as with a task; who needs a quantity says so in one line."""
+    asking = scenes.load("task1")
+    pose = asking.settings[0]
+    silent = scenes.Scene.model_validate({**asking.model_dump(), "task": None})
+    assert (silent.features, silent.required) == ((), ())
+    assert (
+        np.abs(render.image(silent, pose.sensor, pose.light) - render.image(asking, pose.sensor, pose.light)).max()
+        < 1e-9
+    )
+    for ask in (
+        planner.plan,
+        lambda scene: planner.predict(scene, pose.sensor, pose.light),
+        lambda scene: scene.quantities,
+    ):
+        with pytest.raises(
+            InvalidInput, match="task or measurands must be given to plan, predict or measure, got none"
+        ):
+            ask(silent)
 
 
 def test_a_task_is_the_short_form_of_one():

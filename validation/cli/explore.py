@@ -27,6 +27,7 @@ def explore_command(
     """Drag camera and lights around the object and see at once how well it can be measured; ends with Ctrl-C."""
     check_number("--port", port, 0, 65535)
     loaded = scenes.load(scene)
+    _ = loaded.quantities  # or one line
     try:
         import aiohttp  # noqa: F401
     except ImportError:

@@ -39,9 +39,8 @@ def facts(scene: Scene) -> dict[str, Any]:
 
 
 def _edge(solid: Solid, edge: Edge) -> dict[str, Any]:
-    length = np.linalg.norm(np.subtract(*solid.vertices[list(edge.ends)]))
     ends = [solid.vertex_names[end] for end in edge.ends]
-    return {"name": edge.name, "ends": ends, "length": length, "convex": edge.convex}
+    return {"name": edge.name, "ends": ends, "length": solid.length(edge), "convex": edge.convex}
 
 
 def _face(scene: Scene, f: int) -> dict[str, Any]:
