@@ -14,16 +14,16 @@ from validation.report.terminal import console
 
 commands = commands()
 
-Part = Annotated[Path, typer.Argument(metavar="PART", help="STL, PLY or OBJ file.")]
+Part = Annotated[Path, typer.Argument(metavar="PART", help="STL, PLY, OBJ or STEP file.")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Default: PART.toml here.")]
-Units = Annotated[str, typer.Option(help=f"Unit of the file's numbers: {', '.join(scenes.UNITS)}.")]
+Units = Annotated[str, typer.Option(help=f"Unit of a mesh's numbers and of the scene: {', '.join(scenes.UNITS)}.")]
 Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.png", help="Draw them with their names.")]
 Sensor = Annotated[str | None, typer.Option(metavar="P,A", help="Seen from there; else the first setting's sensor.")]
 
 
 @commands.command("new")
 def new_command(part: Part, output: Output = None, units: Units = "mm", as_json: Json = False) -> None:
-    """Write a commented scene of a part: a camera that sees all of it, a task, a setting. It runs as it is."""
+    """Write a commented scene of a part: camera, light, what could be measured, a setting. It runs as it is."""
     path = output or Path(f"{part.stem}.toml")
     check_file("--output", path, ".toml")
     if path.exists():
@@ -31,10 +31,23 @@ def new_command(part: Part, output: Output = None, units: Units = "mm", as_json:
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
 
-        made = written(part, path, units, shown)
-    facts = {"file": str(path), "edges": len(made.solid.sharp), "circles": len(made.solid.circles)}
-    text = (
-        f"{path}: {facts['edges']} edges, {facts['circles']} circles; ice show {path} lists them, ice plan {path} plans"
+        made, look = written(part, path, units, shown)
+    asked = [] if look is None else look.facts
+    facts = {
+        "file": str(path),
+        "edges": len(made.solid.sharp),
+        "circles": len(made.solid.circles),
+        "measurands": asked,
+        "mended": made.solid.mended,
+    }
+    text = "\n".join(
+        [
+            *(f"Mended: {each}" for each in made.solid.mended),
+            f"{path}: {facts['edges']} edges, {facts['circles']} circles",
+            *(f"  {each['name']}: {each['status']}" for each in asked),
+            f"ice show {path} lists what can be named; "
+            + (f"ice plan {path} finds better poses" if asked else "nothing to measure was found"),
+        ]
     )
     say(facts, as_json, text)
 

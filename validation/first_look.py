@@ -1,0 +1,112 @@
+"""From where a part shows most of what could be measured of it: a setting, and the measurands that are seen there."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import planner
+from imaging.models import DEFAULT_MODEL, variance_model
+from imaging.pictures import Pictures
+from scenes import Measurand, Pose, Scene
+from scenes.status import is_trusted
+
+_MOST = 6  # measurands
+_CLOSELY = 4  # settings, of which the best is taken
+_ASKED = 12  # measurands that are looked at closely
+_CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
+_POLAR, _AZIMUTHS = (20, 40, 60, 120, 140, 160), range(10, 370, 45)
+_LIGHTS = (15, 25), (-10, 60), (5, -70), (-20, 180)  # beside the sensor: polar angle and azimuth, degrees
+_BELOW = 0.5  # what a view from below is worth, for the part lies on something
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """A setting and what can be measured in it.
+
+    Attributes
+    ----------
+    measurands : tuple of Measurand
+        At most six, of different sorts.
+    statuses : tuple of str
+        What is predicted of each; those that are not ``ok`` are there only where none is.
+    sensor, light : Pose
+    """
+
+    measurands: tuple[Measurand, ...]
+    statuses: tuple[str, ...]
+    sensor: Pose
+    light: Pose
+
+    @property
+    def facts(self) -> list[dict[str, str]]:
+        """For JSON: name, kind and status of each."""
+        rows = zip(self.measurands, self.statuses, strict=True)
+        return [{"name": each.name, "kind": each.kind, "status": status} for each, status in rows]
+
+
+def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable[[str, int, int], None]) -> FirstLook:
+    """Look from everywhere at all that could be measured, then closely from where most is seen.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without measurands; with one free light.
+    candidates : tuple of Measurand
+        At least one, each of one number with a tolerance.
+    report : callable
+        Called with what is done, how many steps are done, and of how many.
+    """
+    report("looking from everywhere", 1, 2 + _CLOSELY)
+    sensors, lights, worth = _from_everywhere(scene.with_(measurands=candidates))
+    best = None
+    for step, number in enumerate(_apart(worth.sum(-1)), 2):
+        report("looking closely", step, 2 + _CLOSELY)
+        seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
+        some = _varied([candidates[m] for m in seen], _ASKED) or candidates[:_MOST]
+        sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
+        forecasts = planner.predict(scene.with_(measurands=some), sensor, light).measurands
+        told = {m: forecast.status for m, forecast in zip(some, forecasts, strict=True)}
+        good = [m for m in some if is_trusted(told[m])]
+        if best is None or len(good) > best[0]:
+            shown = tuple(_varied(good or some, _MOST))
+            best = len(good), FirstLook(shown, tuple(told[m] for m in shown), sensor, light)
+        if len(good) >= _MOST:
+            break
+    return best[1]
+
+
+def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sensors and lights (N, 2) of a coarse grid, and what every measurand is worth in each picture, (N, M)."""
+    sensors = np.array(list(itertools.product(_POLAR, _AZIMUTHS)), float)
+    lights = sensors[:, None] + np.array(_LIGHTS, float)
+    lights = np.stack([np.clip(lights[..., 0], 2, 178), lights[..., 1] % 360], -1)
+    pictures = Pictures.of(scene, sensors[:, None], lights)
+    variances = variance_model(DEFAULT_MODEL)(pictures).variances_object
+    half = np.array([quantity.tolerance.half for quantity in scene.quantities])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        worth = np.minimum(_CAPABLE * half / np.sqrt(variances), 1)
+    worth = np.nan_to_num(worth) * np.where(sensors[:, 0] > 90, _BELOW, 1.0)[:, None, None]
+    shape = worth.shape[:-1]
+    wide = np.broadcast_to(sensors[:, None], (*shape, 2)).reshape(-1, 2)
+    return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1])
+
+
+def _apart(worth: np.ndarray) -> list[int]:
+    """Numbers of the best pictures, (N,), no two of one sensor."""
+    best = worth.reshape(-1, len(_LIGHTS))
+    order = np.argsort(-best.max(1), kind="stable")[:_CLOSELY]
+    return [int(sensor * len(_LIGHTS) + best[sensor].argmax()) for sensor in order]
+
+
+def _varied(measurands: list[Measurand], most: int) -> list[Measurand]:
+    """Some of them, one after the other of each kind."""
+    kinds = defaultdict(list)
+    for each in measurands:
+        kinds[each.name.split()[0]].append(each)
+    turns = itertools.zip_longest(*kinds.values())
+    return [each for turn in turns for each in turn if each is not None][:most]
