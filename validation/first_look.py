@@ -15,12 +15,13 @@ from imaging.pictures import Pictures
 from scenes import Measurand, Pose, Scene
 from scenes.status import is_trusted
 
-_MOST = 6  # measurands
-_CLOSELY = 4  # settings, of which the best is taken
-_ASKED = 12  # measurands that are looked at closely
+_MOST, _ENOUGH = 6, 3  # measurands that are proposed; after so many no further setting is looked at
+_CLOSELY = 3  # settings, of which the best is taken
+_ASKED = 8  # measurands that are looked at closely
 _CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
-_POLAR, _AZIMUTHS = (20, 40, 60, 120, 140, 160), range(10, 370, 45)
-_LIGHTS = (15, 25), (-10, 60), (5, -70), (-20, 180)  # beside the sensor: polar angle and azimuth, degrees
+_POLAR, _AZIMUTHS = (160, 140, 120, 60, 40, 20), range(10, 370, 45)
+_LIGHTS = (1, 1), (-1, -1), (0, 2), (1, -3)  # steps of that grid beside the sensor, turned back at its ends
+STEPS = 2 + _CLOSELY  # of reports, with that of reading
 _BELOW = 0.5  # what a view from below is worth, for the part lies on something
 
 
@@ -61,11 +62,11 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
     report : callable
         Called with what is done, how many steps are done, and of how many.
     """
-    report("looking from everywhere", 1, 2 + _CLOSELY)
+    report("looking from everywhere", 1, STEPS)
     sensors, lights, worth = _from_everywhere(scene.with_(measurands=candidates))
     best = None
     for step, number in enumerate(_apart(worth.sum(-1)), 2):
-        report("looking closely", step, 2 + _CLOSELY)
+        report("looking closely", step, STEPS)
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
         some = _varied([candidates[m] for m in seen], _ASKED) or candidates[:_MOST]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
@@ -75,16 +76,18 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
         if best is None or len(good) > best[0]:
             shown = tuple(_varied(good or some, _MOST))
             best = len(good), FirstLook(shown, tuple(told[m] for m in shown), sensor, light)
-        if len(good) >= _MOST:
+        if len(good) >= _ENOUGH:
             break
     return best[1]
 
 
 def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sensors and lights (N, 2) of a coarse grid, and what every measurand is worth in each picture, (N, M)."""
-    sensors = np.array(list(itertools.product(_POLAR, _AZIMUTHS)), float)
-    lights = sensors[:, None] + np.array(_LIGHTS, float)
-    lights = np.stack([np.clip(lights[..., 0], 2, 178), lights[..., 1] % 360], -1)
+    grid = np.array(list(itertools.product(_POLAR, _AZIMUTHS)), float).reshape(len(_POLAR), len(_AZIMUTHS), 2)
+    row, column = np.indices(grid.shape[:2])
+    beside = [(np.where((row + i) // 3 == row // 3, row + i, row - i), column + k) for i, k in _LIGHTS]
+    sensors = grid.reshape(-1, 2)
+    lights = np.stack([grid[i, k % len(_AZIMUTHS)].reshape(-1, 2) for i, k in beside], 1)
     pictures = Pictures.of(scene, sensors[:, None], lights)
     variances = variance_model(DEFAULT_MODEL)(pictures).variances_object
     half = np.array([quantity.tolerance.half for quantity in scene.quantities])

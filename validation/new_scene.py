@@ -18,13 +18,12 @@ from scenes.measurands.proposed import proposed
 from scenes.parts import step
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
-from validation.first_look import FirstLook, first_look
+from validation.first_look import STEPS, FirstLook, first_look
 
 _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
 _FOCAL_MM = (4, 6, 8, 12, 16, 25, 35, 50, 75, 100)
 _FILLS = 0.7  # of the field of view's height, by the part's diagonal
 _NEAR = 8.0  # focal lengths between lens and part, at least
-_STEPS = 6
 
 _TEXT = """\
 # Lengths in {units}, image lengths in px, angles in degrees (polar, azimuth), brightness in grey levels.
@@ -98,12 +97,12 @@ def written(
     """
     if units not in scenes.UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(scenes.UNITS)}, got {units!r}")
-    report("reading", 0, _STEPS)
+    report("reading", 0, STEPS)
     record = _record(part, units)
     text = _text(part, path, units, *_box(record.solid_in(units)))
     scene = _loaded(text, path, record)
     candidates = proposed(scene.all_walls, units)
-    look = first_look(scene, candidates, lambda what, done, _: report(what, done, _STEPS)) if candidates else None
+    look = first_look(scene, candidates, report) if candidates else None
     text += _NOTHING if look is None else _asked(look)
     made = _loaded(text, path, record)
     path.write_text(text, encoding="utf-8")

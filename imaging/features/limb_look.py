@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -111,22 +112,43 @@ def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, se
     scene, found = pictures.scene, clear_of_ends(outline, pictures.scene) & unlent(pictures, outline)
     if scene.bodies.is_convex:
         return found
-    far, at = reach(scene.locator.scale_px, scene.camera.blur_px), np.nan_to_num(outline.at, nan=1e9)
-    for circle in scene.solid.circles:
-        places = circle.centre + circle.radius * radials(circle, equal_angles())
-        there = from_axis(places, pictures.sensors, scene.camera)
-        eye, to = np.broadcast_arrays(pictures.sensor_at[..., None, :], places)
-        _, t = first_face(scene.bodies, eye, to - eye, ())
-        found = found & (to_curve(at, there, t > 1 - _BEFORE) >= far)
-    for edge in scene.solid.sharp:
-        start, stop = scene.solid.vertices[list(edge.ends)]
-        places = start + np.linspace(0, 1, _ALONG)[:, None] * (stop - start)
-        eye, to = np.broadcast_arrays(pictures.sensor_at[..., None, :], places)
-        _, t = first_face(scene.bodies, eye, to - eye, ())
-        near = to_curve(at, from_axis(places, pictures.sensors, scene.camera)) < far
-        found = found & ~(near & (t > 1 - _BEFORE).any(-1, keepdims=True))
+    far = reach(scene.locator.scale_px, scene.camera.blur_px)
+    found = found & ~_disturbed(pictures, outline, far)
     lit = np.where(seen.good, seen.squared, 0.0)
     return found & steady(lit, np.zeros(lit.shape), np.nan_to_num(outline.arc), far)
+
+
+def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarray:
+    """Places nearer than ``far`` px to a rim or a sharp edge that the sensor sees, bool, shape (..., n)."""
+    solid, sensors, eyes = pictures.scene.solid, pictures.sensors, pictures.sensor_at
+    at, found = np.nan_to_num(outline.at, nan=1e9), np.zeros(outline.at.shape[:-1], bool)
+    low = np.nan_to_num(outline.at, nan=np.inf).min(-2) - far
+    high = np.nan_to_num(outline.at, nan=-np.inf).max(-2) + far
+
+    def image(places: np.ndarray, rows: Any = ...) -> np.ndarray:
+        return from_axis(places, sensors[rows], pictures.scene.camera)
+
+    def is_near(curves: np.ndarray) -> np.ndarray:
+        """Of curves (..., C, k, 2): the box about one meets that about the places, (..., C); so where it is unknown."""
+        return ~((curves.max(-2) < low[..., None, :]) | (curves.min(-2) > high[..., None, :])).any(-1)
+
+    def shown(places: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        eye, to = np.broadcast_arrays(eyes[rows][:, None], places)
+        return first_face(pictures.scene.bodies, eye, to - eye, ())[1] > 1 - _BEFORE
+
+    for circle in solid.circles:
+        places = circle.centre + circle.radius * radials(circle, equal_angles())
+        rows = is_near(image(places)[..., None, :, :])[..., 0]
+        if rows.any():
+            found[rows] |= to_curve(at[rows], image(places, rows), shown(places, rows)) < far
+    ends = solid.vertices[np.array([edge.ends for edge in solid.sharp], int)].reshape(-1, 2, 3)
+    near = is_near(image(ends.reshape(-1, 3)).reshape(*at.shape[:-2], -1, 2, 2))
+    for number in np.flatnonzero(near.any(tuple(range(near.ndim - 1)))):
+        rows, (start, stop) = near[..., number], ends[number]
+        places = start + np.linspace(0, 1, _ALONG)[:, None] * (stop - start)
+        beside = to_curve(at[rows], image(places, rows)) < far
+        found[rows] |= beside & shown(places, rows).any(-1, keepdims=True)
+    return found
 
 
 def _free(scene, curved: Curved, start: np.ndarray, points: np.ndarray) -> np.ndarray:

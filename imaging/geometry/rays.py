@@ -258,11 +258,12 @@ class Plates:
 
     @cached_property
     def _heights(self) -> np.ndarray:
-        """Of each corner over the side across, (3, T)."""
-        one, two = 1 / np.linalg.norm(self.duals, axis=-1)
+        """Of each corner over the side across, (3, T); none of a triangle without area."""
         side = np.linalg.norm(self.corners[2] - self.corners[1], axis=-1)
-        across = one * np.linalg.norm(self.corners[2] - self.corners[0], axis=-1)
-        return np.stack([across / side, one, two])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one, two = 1 / np.linalg.norm(self.duals, axis=-1)
+            across = one * np.linalg.norm(self.corners[2] - self.corners[0], axis=-1)
+            return np.nan_to_num(np.stack([across / side, one, two]), posinf=0.0)
 
     def well_within(self, which: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Whether places (n, 3) in the planes of triangles (n,) lie on them, farther within than twice the margin."""

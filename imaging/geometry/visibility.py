@@ -15,6 +15,7 @@ import numpy as np
 from imaging.geometry.projection import above
 from scenes import Edge, Solid
 
+_PAIRS = 20_000  # positions times triangles at once: what hides from one of many is looked for from each of them
 _BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
 
 
@@ -36,13 +37,21 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     """
     if solid.is_convex:
         return np.empty((*positions.shape[:-1], 0, 2))
-    return _hidden(solid, edge, np.ascontiguousarray(positions).tobytes(), positions.shape)
+    different, which = np.unique(positions.reshape(-1, 3), axis=0, return_inverse=True)
+    spans = _hidden(solid, edge, different.tobytes())
+    return spans[which].reshape(*positions.shape[:-1], *spans.shape[1:])
 
 
 @lru_cache(maxsize=128)  # asked for several times of each set of pictures
-def _hidden(solid: Solid, edge: Edge, positions: bytes, shape: tuple[int, ...]) -> np.ndarray:
-    spans = _united(_by_triangle(solid, edge, np.frombuffer(positions).reshape(shape)))
-    spans.flags.writeable = False
+def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
+    """The same for different positions, shape (n, K, 2)."""
+    rows = np.frombuffer(positions).reshape(-1, 3)
+    size = max(1, _PAIRS // len(solid.triangles))
+    parts = [_united(_by_triangle(solid, edge, rows[at : at + size])) for at in range(0, len(rows), size)]
+    spans = np.empty((len(rows), max((part.shape[-2] for part in parts), default=0), 2))
+    spans[:] = 1.0, 0.0
+    for part, at in zip(parts, range(0, len(rows), size), strict=True):
+        spans[at : at + size, : part.shape[-2]] = part
     return spans
 
 
