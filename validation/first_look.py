@@ -16,12 +16,12 @@ from scenes import Measurand, Pose, Scene
 from scenes.status import is_trusted
 
 _MOST, _ENOUGH = 6, 3  # measurands that are proposed; after so many no further setting is looked at
-_CLOSELY = 3  # settings, of which the best is taken
+_CLOSELY = 3, 24  # settings, of which the best is taken: of a large part, of a small one
+_TRIANGLES = 10_000  # about so many in all the settings that are looked at
 _ASKED = 8  # measurands that are looked at closely
 _CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
 _POLAR, _AZIMUTHS = (160, 140, 120, 60, 40, 20), range(10, 370, 45)
 _LIGHTS = (1, 1), (-1, -1), (0, 2), (1, -3)  # steps of that grid beside the sensor, turned back at its ends
-STEPS = 2 + _CLOSELY  # of reports, with that of reading
 _BELOW = 0.5  # what a view from below is worth, for the part lies on something
 
 
@@ -62,11 +62,12 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
     report : callable
         Called with what is done, how many steps are done, and of how many.
     """
-    report("looking from everywhere", 1, STEPS)
+    looks = int(np.clip(_TRIANGLES // len(scene.solid.triangles), *_CLOSELY))
+    report("looking from everywhere", 1, 2 + looks)
     sensors, lights, worth = _from_everywhere(scene.with_(measurands=candidates))
     best = None
-    for step, number in enumerate(_apart(worth.sum(-1)), 2):
-        report("looking closely", step, STEPS)
+    for step, number in enumerate(_apart(worth.sum(-1), looks), 2):
+        report("looking closely", step, 2 + looks)
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
         some = _varied([candidates[m] for m in seen], _ASKED) or candidates[:_MOST]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
@@ -99,10 +100,10 @@ def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1])
 
 
-def _apart(worth: np.ndarray) -> list[int]:
-    """Numbers of the best pictures, (N,), no two of one sensor."""
+def _apart(worth: np.ndarray, most: int) -> list[int]:
+    """Numbers of the best pictures by what each is worth, (N,); no two of one sensor."""
     best = worth.reshape(-1, len(_LIGHTS))
-    order = np.argsort(-best.max(1), kind="stable")[:_CLOSELY]
+    order = np.argsort(-best.max(1), kind="stable")[:most]
     return [int(sensor * len(_LIGHTS) + best[sensor].argmax()) for sensor in order]
 
 

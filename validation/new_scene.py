@@ -18,7 +18,7 @@ from scenes.measurands.proposed import proposed
 from scenes.parts import step
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
-from validation.first_look import STEPS, FirstLook, first_look
+from validation.first_look import FirstLook, first_look
 
 _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
 _FOCAL_MM = (4, 6, 8, 12, 16, 25, 35, 50, 75, 100)
@@ -97,7 +97,7 @@ def written(
     """
     if units not in scenes.UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(scenes.UNITS)}, got {units!r}")
-    report("reading", 0, STEPS)
+    report("reading", 0, 5)
     record = _record(part, units)
     text = _text(part, path, units, *_box(record.solid_in(units)))
     scene = _loaded(text, path, record)

@@ -63,7 +63,7 @@ def _write(block: Block, folder: Path, where: str) -> None:
         path.write_text(path.read_text() + "\n" + block.text)
         return
     table, name = re.fullmatch(r"in place of `\[+(\w+)\]+` in (\S+)", block.caption).groups()
-    path, pattern = folder / name, re.compile(rf"^\[+{table}\]+.*?(?=^\[|\Z)", re.M | re.S)
+    path, pattern = folder / name, re.compile(rf"(?:^\[+{table}\]+.*?(?=^\[|\Z))+", re.M | re.S)
     before = path.read_text()
     assert pattern.search(before), f"{where}: no [{table}] in {name}"
     path.write_text(pattern.sub(lambda _: block.text + "\n", before, count=1))

@@ -12,6 +12,7 @@ import measure
 import planner
 import render
 import scenes
+from imaging.geometry.projection import project
 from tests.parts import Hole, bracket, prism, unevenly
 from validation.cli.main import app
 
@@ -39,24 +40,31 @@ def part(made, monkeypatch):
 
 
 def test_a_new_scene_runs(part):
-    """Its task is seen, lit, sharp and in the picture; its field of view holds the part."""
+    """What it measures is seen, lit, sharp and in the picture; its field of view holds the part."""
     scene = scenes.load("part.toml")
     assert scene.units == "mm"
     assert max(np.ptp(scene.solid.vertices, axis=0)) == pytest.approx(60)
     assert 60 < min(scene.camera.field_of_view) < 180  # margin: the part's 60 mm, less than three times as wide
     (setting,) = scene.settings
     found = planner.predict(scene, setting.sensor, setting.light)
-    assert found.status in ("ok", "clutter")
-    assert np.sqrt(found.variance_object) < 0.05
-    assert (np.abs(found.corners - [639.5, 511.5]) < [640, 512]).all()
+    assert found.status == "ok"
+    assert len(found.measurands) > 2
+    assert {each.kind for each in found.measurands} > {"diameter"}
+    assert found.worst_ratio < 0.1
+    ends = scene.solid.vertices[[end for name in scene.required for end in _ends(scene.solid, name)]]
+    assert (np.abs(project(ends, list(setting.sensor), scene.camera) - [639.5, 511.5]) < [640, 512]).all()
     text = (part.parent / "part.toml").read_text()
     assert text.count("#") > 10
+
+
+def _ends(solid, name):
+    return next((each.ends for each in solid.edges if each.name == name), ())
 
 
 @pytest.mark.render
 @pytest.mark.parametrize("case", range(2))
 def test_random_parts_from_a_file_to_a_measured_value(case, tmp_path):
-    """A plate and a bracket with a hole, their edges' lengths known: read, predicted, rendered, measured to 4 sigma."""
+    """A plate and a bracket with a hole, all sizes known: read, predicted, rendered, measured to 4 sigma."""
     rng = np.random.default_rng(case)
     length, width, height = rng.uniform([40, 25, 6], [120, 80, 20])
     step, low = (0.6 * length, 0.5 * height) if case else (length, height)
@@ -68,11 +76,14 @@ def test_random_parts_from_a_file_to_a_measured_value(case, tmp_path):
     (setting,) = scene.settings
     predicted = planner.predict(scene, setting.sensor, setting.light)
     assert predicted.status == "ok"
-    assert min(abs(predicted.value_object - side) for side in (length, width, step, length - step)) < 1e-4
+    sides = (length, width, height, step, low, length - step, height - low, 2 * hole.radius)
+    for each in predicted.measurands:
+        assert min(abs(each.value_object - side) for side in sides) < 1e-4, each.name
     clean = render.image(scene, setting.sensor, setting.light)
     image = render.expose(clean, scene.noise, rng, 1)[0]
-    found = measure.distance(image, scene, setting.sensor, setting.light, "gradient")
-    assert abs(found.value_px - predicted.value_px) < 4 * np.sqrt(found.variance_px2)
+    found = measure.measure(image, scene, setting.sensor, setting.light, "gradient")
+    for value, each in zip(found.value, predicted.measurands, strict=True):
+        assert abs(value - each.value_object) < 4 * np.sqrt(each.variance_object)
 
 
 @pytest.mark.parametrize("units", ["inch", "m"])

@@ -6,8 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import planner
-from validation import new_scene
 from validation.batch.options import RunOptions
 from validation.cost import sampling, trial
 from validation.cost.model import Rendered
@@ -136,26 +134,3 @@ def test_how_the_variance_of_n_images_scatters(monkeypatch, rng):
 def test_pictures_in_memory():
     assert [at_once(AT_ONCE // 7, 50), at_once(AT_ONCE // 7, 5), at_once(2 * AT_ONCE, 5)] == [7, 5, 1]
     assert list(Watch(math.inf).samples(3, least=1)) == [0, 1, 2]
-
-
-@pytest.mark.parametrize(
-    ("statuses", "clear", "which"),
-    [(["clutter", "ok", "ok"], False, 1), (["clutter"] * 24, True, 0), (["ok"], False, 0)],
-)
-def test_a_new_scenes_setting_is_the_best_that_can_be_trusted(monkeypatch, statuses, clear, which):
-    """Of the 24 least variances the first; where none can, the least."""
-    shape = len(new_scene._SENSORS), len(new_scene._LIGHTS)
-    variance = 10.0 + np.random.default_rng(3).permutation(np.prod(shape)).reshape(shape)
-    monkeypatch.setattr(planner, "variances", lambda *_, **__: variance)
-    asked, left = [], list(statuses)
-
-    def predict(scene, sensor, light):
-        asked.append((sensor, light))
-        return SimpleNamespace(status=left.pop(0))
-
-    monkeypatch.setattr(planner, "predict", predict)
-    found, poses = new_scene._setting(None)
-    assert found == (clear, 10.0 + which)
-    sensor, light = (int(i[0]) for i in np.nonzero(variance == 10.0 + which))
-    assert poses == {"sensor": list(new_scene._SENSORS[sensor]), "light": list(new_scene._LIGHTS[light])}
-    assert len(asked) == (which + 1 if not clear else 24)

@@ -38,6 +38,8 @@ def new_command(part: Part, output: Output = None, units: Units = "mm", as_json:
         "edges": len(made.solid.sharp),
         "circles": len(made.solid.circles),
         "measurands": asked,
+        "sensor": look and list(look.sensor),
+        "light": look and list(look.light),
         "mended": made.solid.mended,
     }
     text = "\n".join(

@@ -1,0 +1,139 @@
+"""What `ice new` proposes to measure of a part, and from where it looks."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import scenes
+from scenes.measurands.proposed import proposed
+from scenes.parts import mesh
+from scenes.parts.part_file import with_walls
+from scenes.parts.walls import recognised_walls
+from tests.parts import Hole, bracket, prism, unevenly
+from validation import first_look
+from validation.first_look import FirstLook
+from validation.new_scene import written
+
+
+def plate(rng):
+    """A plate of 90 x 60 x 8 mm with two holes of 12 and 8 mm, 40 mm and 10 mm apart."""
+    holes = [Hole(x, y, r, unevenly(rng, 40), 0.0, 8.0) for x, y, r in ((25, 20, 6), (65, 30, 4))]
+    return prism([(0, 0), (90, 0), (90, 8), (0, 8)], 60, holes, seed=int(rng.integers(100)))
+
+
+def true_value(solid, measurand):
+    """Of a proposed measurand, from the places of its features alone."""
+    ends = []
+    for feature in measurand.features:
+        kind = type(feature).__name__
+        if kind == "Centre":
+            circle = solid.circle(feature.circle)
+            if measurand.kind == "diameter":
+                return 2 * circle.radius
+            ends.append(circle.centre)
+        elif kind == "Corner":
+            ends.append(solid.vertex(feature.vertex))
+        elif kind == "Wall":
+            return 2 * solid.round(feature.surface).radius
+        else:
+            ends.append(solid.vertices[list(solid.edge(feature.edge).ends)])
+    if measurand.kind == "width":
+        (a, b), (c, d) = ends
+        along = (d - c) / np.linalg.norm(d - c)
+        away = (a + b) / 2 - c
+        return float(np.linalg.norm(away - away @ along * along))
+    return float(np.linalg.norm(np.subtract(*ends)))
+
+
+def test_a_plates_sizes_bores_and_their_distance_are_proposed():
+    solid = mesh.solid(plate(np.random.default_rng(4)))
+    found = proposed(solid, "mm")
+    values = {each.name: true_value(solid, each) for each in found}
+    sorts = {name: sorted({round(v, 4) for n, v in values.items() if n.startswith(name)}) for name in (
+        "diameter", "distance", "width", "length")}  # fmt: skip
+    assert sorts == {
+        "diameter": [8, 12],
+        "distance": [round(float(np.hypot(40, 10)), 4)],
+        "width": [8, 60, 90],
+        "length": [60, 90],
+    }
+    names = [each.name for each in found]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "tolerance"),
+    [
+        ("mm", 0.3, 0.06), ("mm", 5.9, 0.1), ("mm", 6.1, 0.2), ("mm", 31, 0.3), ("mm", 121, 0.5), ("mm", 401, 0.8),
+        ("mm", 1001, 1.2), ("mm", 2001, 2.0), ("cm", 3.1, 0.03), ("inch", 1.0, 0.0079),
+    ],
+)  # fmt: skip
+def test_tolerances_are_those_of_iso_2768_m_in_the_parts_unit(unit, size, tolerance):
+    solid = mesh.solid(trimesh.creation.box((size, size, size)))
+    assert {each.tolerance.plus for each in proposed(solid, unit)} == {tolerance}
+
+
+def test_a_shaft_is_proposed_by_its_wall_and_its_ends():
+    solid = mesh.solid(trimesh.creation.cylinder(4.0, 30.0, sections=48))
+    solid = with_walls(solid, recognised_walls(solid))
+    assert sorted(each.name for each in proposed(solid, "mm")) == ["diameter c1", "diameter c2", "diameter k1"]
+
+
+def test_circles_on_one_axis_have_no_distance():
+    """Rims of a step around one another lie in one plane; so do the ends of different bores."""
+    ring = trimesh.creation.annulus(5.0, 9.0, 4.0, sections=48)
+    assert not [m for m in proposed(mesh.solid(ring), "mm") if m.kind == "distance"]
+
+
+def test_nothing_to_measure_is_a_scene_all_the_same(tmp_path):
+    trimesh.creation.icosphere(2, 10.0).export(tmp_path / "ball.stl")
+    scene, look = written(tmp_path / "ball.stl", tmp_path / "ball.toml", "mm")
+    again = scenes.load(tmp_path / "ball.toml")
+    assert (look is None) == (again.measurands == ()) == (scene.measurands == ())
+
+
+def test_what_is_written_is_what_was_predicted(tmp_path):
+    """The scene of the file has the measurands, poses and statuses that were told; every value is the part's own."""
+    bracket(24).export(tmp_path / "part.stl")
+    _, look = written(tmp_path / "part.stl", tmp_path / "part.toml", "mm")
+    scene = scenes.load(tmp_path / "part.toml")
+    assert scene.measurands == look.measurands
+    assert (scene.settings[0].sensor, scene.settings[0].light) == (look.sensor, look.light)
+    predicted = first_look.planner.predict(scene, look.sensor, look.light)
+    assert tuple(each.status for each in predicted.measurands) == look.statuses
+    for each, measurand in zip(predicted.measurands, scene.measurands, strict=True):
+        assert each.value_object == pytest.approx(true_value(scene.all_walls, measurand), rel=1e-9)
+
+
+def test_setting_where_most_can_be_relied_on_is_taken(monkeypatch):
+    """Of those looked at the one with most `ok`; the first, whatever it shows, where none has any."""
+    scene = scenes.load("task1").with_(settings=[])
+    scene = scenes.Scene.model_validate({**scene.model_dump(), "task": None})
+    candidates = proposed(scene.solid, "cm")
+    for goods in ([0, 1, 2, 1], [0, 0, 0, 0], [1, 5, 6, 2]):
+        asked = []
+
+        def predict(told, sensor, light, goods=goods, asked=asked):
+            good = goods[len(asked)] if len(asked) < len(goods) else 0
+            asked.append((sensor, light))
+            return _Told([_Forecast("ok" if i < good else "clutter") for i in range(len(told.measurands))])
+
+        monkeypatch.setattr(first_look.planner, "predict", predict)
+        found = first_look.first_look(scene, candidates, lambda *_: None)
+        assert isinstance(found, FirstLook)
+        best = next((i for i, good in enumerate(goods) if good >= 3), int(np.argmax(goods)))
+        assert (found.sensor, found.light) == asked[best]
+        assert len({sensor for sensor, _ in asked}) == len(asked)
+        wanted = {"ok"} if goods[best] else {"clutter"}
+        assert set(found.statuses) == wanted
+        assert len(found.measurands) == (goods[best] or 6)
+
+
+class _Told:
+    def __init__(self, measurands):
+        self.measurands = measurands
+
+
+class _Forecast:
+    def __init__(self, status):
+        self.status = status
