@@ -7,6 +7,7 @@ import typer
 from tests.proofs.affine_fits import affine_fits
 from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
+from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
 from tests.proofs.fits import fits
 from tests.proofs.installed import installed
@@ -26,6 +27,7 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 app.command()(affine_fits)
 app.command()(boards)
 app.command()(conditions)
+app.command()(corpus)
 app.command()(crowded)
 app.command()(fits)
 app.command()(installed)

@@ -1,0 +1,178 @@
+"""A folder of parts' files through every command: new, show, plan, render, measure, validate; a table at the end.
+
+Each command runs as a user would start it, in a process of its own, with its time and memory. What has been done stands
+in a log and is not done again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenes.parts import mesh, step
+
+KINDS = (*mesh.FORMATS, *step.FORMATS)
+MOST_SECONDS = 200.0  # of a command
+VALIDATED = 3  # measurands
+FAR = 4.0  # standard deviations that a value may be from the part's own
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command on a part.
+
+    Attributes
+    ----------
+    command : str
+    status : int
+        Its exit status; -9 where it ran out of time.
+    seconds : float
+        Of its processor.
+    mebibytes : float
+        Most that it held.
+    told : str
+        Its result in short, or the line by which it refused.
+    """
+
+    command: str
+    status: int
+    seconds: float
+    mebibytes: float
+    told: str
+
+
+def run(command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
+    """An ``ice`` command, and the document that it prints; empty where it prints none."""
+    line = [sys.executable, "-P", "-m", "validation.cli.main", "-q", command, *map(str, arguments), "--json"]
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        process = subprocess.Popen(line, stdout=out, stderr=err)
+        watch = threading.Timer(MOST_SECONDS, process.kill)
+        watch.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        watch.cancel()
+        process.returncode = os.waitstatus_to_exitcode(status)  # or it would be waited for again
+        texts = [stream.seek(0) or stream.read() for stream in (out, err)]
+    try:
+        document = json.loads(texts[0])
+    except ValueError:
+        document = {}
+    told = (texts[1].strip().splitlines() or [""])[-1]
+    seconds, size = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return Step(command, process.returncode, seconds, size, told), document
+
+
+def steps(part: Path, folder: Path, renders: int) -> Iterator[Step]:
+    """All of a part, as far as it goes."""
+    scene, picture, few = folder / "part.toml", folder / "part.png", folder / "few.toml"
+    made, facts = run("new", part, "-o", scene)
+    asked = facts.get("measurands", [])
+    good = sum(each["status"] == "ok" for each in asked)
+    yield _told(made, f"{good} of {len(asked)} ok")
+    if made.status:
+        return
+    shown, _ = run("show", scene, "-o", folder / "names.png")
+    yield _told(shown, "")
+    if not asked:
+        return
+    planned, plan = run("plan", scene, "--step", 15, "--no-check")
+    yield _told(planned, f"worst {_worst(plan)}")
+    if planned.status:
+        return
+    poses = [",".join(map(repr, plan[role])) for role in ("sensor", "light")]
+    rendered, _ = run("render", scene, "--sensor", poses[0], "--light", poses[1], "--noise-seed", 1, "-o", picture)
+    yield _told(rendered, "")
+    measured, values = run("measure", picture, scene, "--sensor", poses[0], "--light", poses[1])
+    yield _told(measured, _measured(values.get("measurands", [])))
+    few.write_text(_only(scene.read_text("utf-8"), plan), "utf-8")
+    judged, verdict = run("validate", few, "--renders", renders, "--out", folder / "run", "--estimators", "gradient")
+    yield _told(judged, verdict.get("verdict", "").split(":")[0])
+
+
+def _told(step_: Step, told: str) -> Step:
+    """A command's result in short where it has one."""
+    return step_ if step_.status == 2 or step_.told.startswith("internal") or not told else _with(step_, told)
+
+
+def _with(step_: Step, told: str) -> Step:
+    return Step(step_.command, step_.status, step_.seconds, step_.mebibytes, told)
+
+
+def _worst(plan: dict[str, Any]) -> str:
+    statuses = Counter(each["status"] for each in plan.get("measurands", []))
+    return ", ".join(f"{count} {status}" for status, count in statuses.items())
+
+
+def _measured(rows: list[dict[str, Any]]) -> str:
+    """How many values are ok, and how many of these are too far from the part's own."""
+    good = [row for row in rows if row["status"] == "ok"]
+    far = sum(abs(row["value"] - row["nominal"]) > FAR * row["sigma"] for row in good)
+    return f"{len(good)} of {len(rows)} ok, {far} more than {FAR:g} sigma off"
+
+
+def _only(text: str, plan: dict[str, Any]) -> str:
+    """A scene's text with its first measurands, at the poses of a plan."""
+    count = iter(range(len(text)))
+    text = re.sub(
+        r"^\[\[measurands\]\]\n(?:.+\n)+\n?",
+        lambda found: found[0] if next(count) < VALIDATED else "",
+        text,
+        flags=re.M,
+    )
+    for role in ("sensor", "light"):
+        text = re.sub(rf"^{role} = .*$", f"{role} = {plan[role]}", text, flags=re.M)
+    return text
+
+
+def corpus(
+    folder: Annotated[Path, typer.Argument(help="Of files of parts; those within its folders, too.")],
+    renders: Annotated[int, typer.Option(help="Of the first three measurands.")] = 200,
+    every: Annotated[int, typer.Option(help="Only every so manieth file.")] = 1,
+    log: Annotated[Path, typer.Option(help="What is done; begun anew where it is not there.")] = Path("corpus.jsonl"),
+) -> None:
+    """Parts from files through new, show, plan, render, measure and validate; resumable."""
+    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS)[::every]
+    known = {row["part"] for row in map(json.loads, log.read_text("utf-8").splitlines())} if log.exists() else set()
+    for number, part in enumerate(files, 1):
+        name = str(part.relative_to(folder))
+        if name in known:
+            continue
+        with tempfile.TemporaryDirectory() as place:
+            rows = [asdict(each) for each in steps(part, Path(place), renders)]
+        with log.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"part": name, "steps": rows}) + "\n")
+        print(f"{number}/{len(files)} {name}: " + "; ".join(map(_line, rows)), flush=True)
+    print(table([json.loads(line) for line in log.read_text("utf-8").splitlines()]))
+
+
+def _line(row: dict[str, Any]) -> str:
+    return f"{row['command']} {row['seconds']:.1f} s" + (f" ({row['told']})" if row["told"] else "")
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """How many parts came through each command, in which time and memory; and why the others did not."""
+    lines = [f"{len(rows)} parts", f"{'command':<10}{'parts':>6}{'done':>6}{'median s':>10}{'95 % s':>8}{'MiB':>7}"]
+    for command in ("new", "show", "plan", "render", "measure", "validate"):
+        found = [each for row in rows for each in row["steps"] if each["command"] == command]
+        if found:
+            seconds = sorted(each["seconds"] for each in found)
+            done = sum(each["status"] == 0 for each in found)
+            late, most = seconds[int(0.95 * (len(seconds) - 1))], max(each["mebibytes"] for each in found)
+            middle = seconds[len(seconds) // 2]
+            lines.append(f"{command:<10}{len(found):>6}{done:>6}{middle:>10.1f}{late:>8.1f}{most:>7.0f}")
+    for row in rows:
+        for each in row["steps"]:
+            if each["status"]:
+                lines.append(f"  {row['part']}: {each['command']} ended with {each['status']}: {each['told'][:160]}")
+    return "\n".join(lines)
