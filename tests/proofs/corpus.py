@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from scenes.parts import mesh, step
@@ -97,7 +98,7 @@ def steps(part: Path, folder: Path, renders: int) -> Iterator[Step]:
     yield _told(measured, _measured(values.get("measurands", [])))
     few.write_text(_only(scene.read_text("utf-8"), plan), "utf-8")
     judged, verdict = run("validate", few, "--renders", renders, "--out", folder / "run", "--estimators", "gradient")
-    yield _told(judged, verdict.get("verdict", "").split(":")[0])
+    yield _told(judged, verdict.get("verdict", "").split(";")[0])
 
 
 def _told(step_: Step, told: str) -> Step:
@@ -166,10 +167,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     for command in ("new", "show", "plan", "render", "measure", "validate"):
         found = [each for row in rows for each in row["steps"] if each["command"] == command]
         if found:
-            seconds = sorted(each["seconds"] for each in found)
-            done = sum(each["status"] == 0 for each in found)
-            late, most = seconds[int(0.95 * (len(seconds) - 1))], max(each["mebibytes"] for each in found)
-            middle = seconds[len(seconds) // 2]
+            middle, late = np.quantile([each["seconds"] for each in found], [0.5, 0.95])
+            done, most = sum(each["status"] == 0 for each in found), max(each["mebibytes"] for each in found)
             lines.append(f"{command:<10}{len(found):>6}{done:>6}{middle:>10.1f}{late:>8.1f}{most:>7.0f}")
     for row in rows:
         for each in row["steps"]:
