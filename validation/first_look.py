@@ -22,6 +22,7 @@ _ASKED = 8  # measurands that are looked at closely
 _CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
 _POLAR, _AZIMUTHS = (160, 140, 120, 60, 40, 20), range(10, 370, 45)
 _LIGHTS = (1, 1), (-1, -1), (0, 2), (1, -3)  # steps of that grid beside the sensor, turned back at its ends
+_PLACES = 6  # what a measurand is worth is told apart by, or rounding would choose between views that are alike
 _BELOW = 0.5  # what a view from below is worth, for the part lies on something
 
 
@@ -97,7 +98,7 @@ def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     worth = np.nan_to_num(worth) * np.where(sensors[:, 0] > 90, _BELOW, 1.0)[:, None, None]
     shape = worth.shape[:-1]
     wide = np.broadcast_to(sensors[:, None], (*shape, 2)).reshape(-1, 2)
-    return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1])
+    return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1]).round(_PLACES)
 
 
 def _apart(worth: np.ndarray, most: int) -> list[int]:

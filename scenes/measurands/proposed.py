@@ -21,6 +21,7 @@ _GENERAL = (6, 0.1), (30, 0.2), (120, 0.3), (400, 0.5), (1000, 0.8), (2000, 1.2)
 """ISO 2768-1, class m: lengths up to, mm, and how far they may be off."""
 _SHARE = 0.2  # of a length: more than that no drawing tolerates
 _SAME = 1e-6  # of the part's size: in one plane; rad: parallel
+_DIGITS = 9  # by which lengths are put in order: what differs by rounding alone stays in the part's own order
 _MOST = {"diameter": 16, "holes": 8, "width": 16, "shaft": 4, "corners": 8}  # of each sort
 
 
@@ -38,7 +39,7 @@ def proposed(solid: Solid, unit: Unit) -> tuple[Measurand, ...]:
     --------
     >>> from scenes.parts.solid import block
     >>> [(m.name, m.kind, m.tolerance.plus) for m in proposed(block((60, 40, 4)), "mm")][:3]
-    [('width e2 e3', 'width', 0.3), ('width e1 e4', 'width', 0.3), ('width e9 e11', 'width', 0.3)]
+    [('width e1 e5', 'width', 0.3), ('width e10 e12', 'width', 0.3), ('width e4 e7', 'width', 0.3)]
     """
     sorts = {
         "diameter": _diameters(solid),
@@ -64,8 +65,13 @@ def _tolerance(value: float, unit: Unit) -> float:
     return float(f"{in_unit(min(allowed, _SHARE * length), 'mm', unit):.2g}")
 
 
+def _largest(size: float) -> float:
+    """The key that puts the largest first, on any machine in the same order."""
+    return -float(f"{size:.{_DIGITS}g}")
+
+
 def _diameters(solid: Solid) -> Iterator[_Row]:
-    for circle in sorted(solid.circles, key=lambda each: -each.radius):
+    for circle in sorted(solid.circles, key=lambda each: _largest(each.radius)):
         yield f"diameter {circle.name}", "diameter", (Centre(circle=circle.name),), 2 * circle.radius
 
 
@@ -78,9 +84,9 @@ def _hole_distances(solid: Solid) -> Iterator[_Row]:
     pairs = [
         (float(np.linalg.norm(one.centre - other.centre)), one, other)
         for group in groups.values()
-        for one, other in combinations(sorted(group, key=lambda each: -each.radius)[:8], 2)
+        for one, other in combinations(sorted(group, key=lambda each: _largest(each.radius))[:8], 2)
     ]
-    for apart, one, other in sorted(pairs, key=lambda pair: -pair[0]):
+    for apart, one, other in sorted(pairs, key=lambda pair: _largest(pair[0])):
         if apart > near:
             features = Centre(circle=one.name), Centre(circle=other.name)
             yield f"distance {one.name} {other.name}", "distance", features, apart
@@ -102,7 +108,7 @@ def _widths(solid: Solid) -> Iterator[_Row]:
             around[face].append(edge)
     rows = [row for edges in around.values() for row in _parallel(solid, edges)]
     told = set()
-    for _, apart, one, other in sorted(rows, key=lambda row: -row[0]):
+    for _, apart, one, other in sorted(rows, key=lambda row: _largest(row[0])):
         if (pair := frozenset((one.name, other.name))) not in told:
             told.add(pair)
             yield f"width {one.name} {other.name}", "width", (Side(edge=one.name), Side(edge=other.name)), apart
@@ -118,20 +124,20 @@ def _parallel(solid: Solid, edges: list[Edge]) -> Iterator[tuple[float, float, E
             start, stop = (solid.vertices[edge.ends[0]] for edge in (edges[i], edges[k]))
             apart = float(np.linalg.norm(np.cross(stop - start, along[i])))
             worth = apart * min(solid.length(edges[i]), solid.length(edges[k]))
-            if apart > _SAME * solid.extent and worth > best.get(direction[i], (0.0,))[0]:
+            if apart > _SAME * solid.extent and worth > best.get(direction[i], (0.0,))[0] * (1 + _SAME):
                 best[direction[i]] = worth, apart, edges[i], edges[k]
     yield from best.values()
 
 
 def _shafts(solid: Solid) -> Iterator[_Row]:
-    for wall in sorted(solid.curved, key=lambda each: -each.radius):
+    for wall in sorted(solid.curved, key=lambda each: _largest(each.radius)):
         yield f"diameter {wall.name}", "diameter", (Wall(surface=wall.name),), 2 * wall.radius
 
 
 def _corner_distances(solid: Solid) -> Iterator[_Row]:
     """Between the ends of the longest outer edges, where other edges meet them."""
     corners = set(solid.corner_names)
-    for edge in sorted(solid.sharp, key=solid.length, reverse=True):
+    for edge in sorted(solid.sharp, key=lambda each: _largest(solid.length(each))):
         names = [solid.vertex_names[end] for end in edge.ends]
         if edge.convex and corners.issuperset(names):
             features = tuple(_corner(solid, name, edge) for name in names)
@@ -140,5 +146,7 @@ def _corner_distances(solid: Solid) -> Iterator[_Row]:
 
 def _corner(solid: Solid, vertex: str, edge: Edge) -> Corner:
     """An edge's end with the longest of the other edges there."""
-    other = max((each for each in solid.edges_at(vertex) if each is not edge), key=solid.length)
+    other = min(
+        (each for each in solid.edges_at(vertex) if each is not edge), key=lambda each: _largest(solid.length(each))
+    )
     return Corner(vertex=vertex, edges=(edge.name, other.name))

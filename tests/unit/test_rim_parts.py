@@ -126,7 +126,7 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
         return None, seen_edge
 
     def image(places, sensors, camera):
-        return np.broadcast_to(places[:, :2], (2, len(places), 2))
+        return np.broadcast_to(places[:, :2], (len(sensors), len(places), 2))
 
     for name, stand_in in {
         "clear_of_ends": lambda outline, scene: np.array([[True, True, True, True], [True, False, True, True]]),
@@ -139,7 +139,7 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
     )
     scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False), camera=SimpleNamespace(blur_px=1.0),
                             locator=SimpleNamespace(scale_px=1.0))  # fmt: skip
-    pictures = SimpleNamespace(scene=scene, sensor_at=np.array([[0, 0, 90.0], [0, 0, 80.0]]), sensors=None)
+    pictures = SimpleNamespace(scene=scene, sensor_at=np.array([[0, 0, 90.0], [0, 0, 80.0]]), sensors=np.zeros((2, 2)))
     outline = SimpleNamespace(at=at, arc=np.array([1.0, 2.0, np.nan, 3.0]))
     look = SimpleNamespace(good=np.array([[True, False, True, True]] * 2), squared=np.full((2, 4), 9.0))
     found = limb_look.clear_of_others(pictures, None, outline, look)
