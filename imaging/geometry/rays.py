@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from scenes import Solid
 
@@ -24,8 +25,10 @@ _MANY, _FEW = 2000, 64  # triangles from which on rays are sorted, and bundles o
 _LEAST = 16  # rays from one place that are a bundle of their own
 _CELLS = 32  # a bundle's rays end in one of so many strips across the part
 _ROUND = 1e-9  # of the farthest coordinate: what rounding may make of a place
+_HAIR = 1e-13  # the same, of a place on a plane: no ray passes between two triangles
 _STEP = 1e-9  # of the ray's vector: a surface that the ray starts on is not met
 _PAST = 1e-6  # of the part's size: how far behind what a ray has met from inside it is followed on
+_BENT = 1e-4  # of the part's size: how far triangles stand off the plane of their face where they turn away from it
 _MOST_PASSED = 10_000  # triangles that a ray passes from inside
 
 
@@ -84,7 +87,6 @@ def by_embree(
     lengths = np.linalg.norm(vectors, axis=1)
     at, rays = _entries(plates, origins, vectors, lengths)
     passed, last = np.isin(plates.faces, own), np.full(len(origins), -1)
-    doubtful = np.zeros(len(origins), bool)
     step = np.full(len(origins), _PAST * plates.radius)
     for _ in range(_MOST_PASSED):
         if not rays.size:
@@ -94,20 +96,19 @@ def by_embree(
         found = plates.tree.run(starts.astype(np.float32), ways.astype(np.float32), query="INTERSECT", output=1)
         met = found["primID"] >= 0
         rays, which, away = rays[met], found["primID"][met], found["tfar"][met]
-        fall = np.einsum("ni,ni->n", vectors[rays], plates.normals[which])
-        over = np.einsum("ni,ni->n", origins[rays], plates.normals[which]) - plates.heights[which]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            place = -over / fall
-        if plates.margin:
-            doubtful[rays] |= ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
-        outside = (fall < 0) & (over > 0) & (place > _STEP) & ~passed[which]
-        face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
-        rays, which, away = rays[~outside], which[~outside], away[~outside]
         step[rays] = np.where(which == last[rays], 2 * step[rays], _PAST * plates.radius)
         last[rays] = which
         at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
-    if doubtful.any():
-        face[doubtful], t[doubtful] = by_trial(plates, origins[doubtful], vectors[doubtful], own)
+        outside, place = plates.met(which, origins[rays], vectors[rays])
+        outside &= ~passed[which]
+        if plates.margin:
+            near = ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
+            some = rays[near]
+            most = np.maximum(at[some], np.where(outside, place, 0.0)[near]) + _BENT * plates.radius / lengths[some]
+            which[near], place[near] = plates.met_beside(which[near], origins[some], vectors[some], most, passed)
+            outside[near] = np.isfinite(place[near])
+        face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
+        rays = rays[~outside]
     return face, t
 
 
@@ -267,12 +268,56 @@ class Plates:
 
     def well_within(self, which: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Whether places (n, 3) in the planes of triangles (n,) lie on them, farther within than twice the margin."""
+        return (self._shares(which, places) * self._heights[:, which]).min(0) > 2 * self.margin * self.radius
+
+    def _shares(self, which: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Of the three corners in places (n, 3) of triangles' planes (n,), (3, n); none is negative on a triangle."""
         one, two = (
             np.einsum("ni,ni->n", places, dual[which]) - shift[which]
             for dual, shift in zip(self.duals, self.shifts, strict=True)
         )
-        within = np.stack([1 - one - two, one, two]) * self._heights[:, which]
-        return within.min(0) > 2 * self.margin * self.radius
+        return np.stack([1 - one - two, one, two])
+
+    def met(self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether rays (n, 3) meet the planes of triangles (n,) from outside, and t."""
+        fall = np.einsum("ni,ni->n", vectors, self.normals[which])
+        over = np.einsum("ni,ni->n", origins, self.normals[which]) - self.heights[which]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = -over / fall
+            return (fall < 0) & (over > 0) & (place > _STEP), place
+
+    def met_beside(
+        self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray, most: np.ndarray, passed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What rays (n, 3) meet first, in double precision, of triangles (n,) and those that share a corner with them.
+
+        The triangle, (n,), and t, (n,): at most ``most``, infinite where nothing is; ``passed``, (T,), are not met.
+        """
+        triangle, place = which.copy(), np.full(len(which), np.inf)
+        starts, corners = self._at_corners, self._corner_numbers[which].ravel()
+        counts = starts.indptr[corners + 1] - starts.indptr[corners]
+        ray = np.repeat(np.arange(len(corners)) // 3, counts)
+        onward = np.arange(len(ray)) - np.repeat(np.cumsum(counts) - counts, counts)
+        other = starts.indices[np.repeat(starts.indptr[corners], counts) + onward]
+        hit, t = self.met(other, origins[ray], vectors[ray])
+        with np.errstate(invalid="ignore"):
+            within = self._shares(other, origins[ray] + t[:, None] * vectors[ray]) * self._heights[:, other]
+            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray]) & ~passed[other]
+        ray, other, t = ray[hit], other[hit], t[hit]
+        order = np.lexsort((other, t, ray))[::-1]  # the first of each ray is written last
+        triangle[ray[order]], place[ray[order]] = other[order], t[order]
+        return triangle, place
+
+    @cached_property
+    def _corner_numbers(self) -> np.ndarray:
+        """Of each triangle's corners among the different places, (T, 3)."""
+        return np.unique(self.corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(3, -1).T
+
+    @cached_property
+    def _at_corners(self) -> csr_array:
+        """Which triangles have which of the different places for a corner, (places, T)."""
+        place = self._corner_numbers
+        return coo_array((np.ones(place.size), (place.ravel(), np.repeat(np.arange(len(place)), 3)))).tocsr()
 
     def some(self, which: np.ndarray) -> Plates:
         """Those of them."""

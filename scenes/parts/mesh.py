@@ -214,9 +214,47 @@ def _planes(mesh: trimesh.Trimesh) -> np.ndarray:
         )
         for k in (0, 1)
     ]  # of slivers the normal is uncertain in single precision, the height over the other triangle is not
-    flat = (mesh.face_adjacency_angles < _FLAT) | (np.abs(heights).min(0) < _SINGLE * np.abs(mesh.vertices).max())
-    graph = coo_array((np.ones(flat.sum()), pairs[flat].T), shape=(len(mesh.faces),) * 2)
+    flat = mesh.face_adjacency_angles < _FLAT
+    group = _connected(pairs[flat], len(mesh.faces))
+    thin = (np.abs(heights).min(0) < _SINGLE * np.abs(mesh.vertices).max()) & (group[pairs[:, 0]] != group[pairs[:, 1]])
+    return group if not thin.any() else _connected(_in_plane(mesh, group, group[pairs[thin]]), group.max() + 1)[group]
+
+
+def _connected(pairs: np.ndarray, count: int) -> np.ndarray:
+    """Number of the group of each of ``count`` things of which pairs (n, 2) belong together."""
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
     return connected_components(graph, directed=False)[1]
+
+
+def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Which pairs (n, 2) of groups of triangles belong together: all of the smaller one lies in the larger one's plane.
+
+    A sliver in the crease between two faces lies in both their planes; it becomes part of one, the larger.
+    """
+    normals, areas = _normals(mesh, group)
+    middles = np.zeros_like(normals)
+    np.add.at(middles, group, mesh.triangles_center * mesh.area_faces[:, None])
+    middles /= np.bincount(group, mesh.area_faces)[:, None]
+    order = np.argsort(group, kind="stable")
+    corners = dict(enumerate(np.split(mesh.triangles[order], np.cumsum(np.bincount(group))[:-1])))
+    owner, kept = np.arange(len(areas)), []
+
+    def whole(number: int) -> int:
+        while owner[number] != number:
+            number = owner[number] = owner[owner[number]]
+        return number
+
+    for one, other in pairs[np.argsort(-areas[pairs].max(1), kind="stable")]:
+        large, small = sorted((whole(one), whole(other)), key=lambda number: -areas[number])
+        if large == small:
+            continue
+        away = corners[small] - middles[large]
+        near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
+        if (np.abs(away @ normals[large]) <= near).all():
+            owner[small] = large
+            corners[large] = np.concatenate([corners[large], corners.pop(small)])
+            kept.append((one, other))
+    return np.array(kept, int).reshape(-1, 2)
 
 
 def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

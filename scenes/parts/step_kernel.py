@@ -3,8 +3,8 @@
     python -P scenes/parts/step_kernel.py SEGMENTS MOST_FACES < part.step > part.json
 
 The kernel is C++, and a hostile file may end its process: then only this one ends. Lengths are mm, whatever the file's
-unit. One body: several solids are told apart by nothing here. Exit status 2 with one line on standard error where the
-file cannot be used.
+unit. One body: several solids are told apart by nothing here, and surfaces beside them (datum targets) are left
+out. Exit status 2 with one line on standard error where the file cannot be used.
 """
 
 from __future__ import annotations
@@ -30,16 +30,19 @@ def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
 
     reader, shape = _read(data)
-    faces = _parts(shape, "TopAbs_FACE", "Face")
+    solids = _parts([shape], "TopAbs_SOLID", "Solid")
+    faces = _parts(solids, "TopAbs_FACE", "Face")
     if len(faces) > most_faces:
         raise Unusable(f"of at most {most_faces} faces, got {len(faces)}")
-    if not faces or not _parts(shape, "TopAbs_SOLID", "Solid"):
+    if not faces:
         raise Unusable("of a solid body, got none")
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
     BRepMesh_IncrementalMesh(shape, _LINEAR, True, 4 * math.pi / pieces, False)
     found = [{"name": _name(reader, face), **_surface(face), **_triangles(face)} for face in faces]
-    return {"format": FORMAT, "unit": "mm", "segments": pieces, "faces": found, "edges": _edges(shape, faces)}
+    for face in _parts([*solids, shape], "TopAbs_FACE", "Face")[len(faces) :]:
+        _triangles(face)  # or the file is broken, and this one may be missing in a solid
+    return {"format": FORMAT, "unit": "mm", "segments": pieces, "faces": found, "edges": _edges(faces)}
 
 
 def _read(data: bytes) -> tuple[Any, Any]:
@@ -54,20 +57,21 @@ def _read(data: bytes) -> tuple[Any, Any]:
     return reader, reader.OneShape()
 
 
-def _parts(shape: Any, kind: str, cast: str) -> list[Any]:
-    """All different faces, edges or solids, in the file's order."""
+def _parts(shapes: list[Any], kind: str, cast: str) -> list[Any]:
+    """All different faces, edges or solids of shapes, in the file's order."""
     from OCP import TopAbs, TopExp, TopoDS
 
-    explorer = TopExp.TopExp_Explorer(shape, getattr(TopAbs.TopAbs_ShapeEnum, kind))
     found: list[Any] = []
     seen: dict[int, list[Any]] = {}
-    while explorer.More():
-        here = getattr(TopoDS.TopoDS, cast)(explorer.Current())
-        known = seen.setdefault(hash(here), [])
-        if not any(here.IsSame(other) for other in known):
-            known.append(here)
-            found.append(here)
-        explorer.Next()
+    for shape in shapes:
+        explorer = TopExp.TopExp_Explorer(shape, getattr(TopAbs.TopAbs_ShapeEnum, kind))
+        while explorer.More():
+            here = getattr(TopoDS.TopoDS, cast)(explorer.Current())
+            known = seen.setdefault(hash(here), [])
+            if not any(here.IsSame(other) for other in known):
+                known.append(here)
+                found.append(here)
+            explorer.Next()
     return found
 
 
@@ -131,11 +135,11 @@ def _triangles(face: Any) -> dict[str, Any]:
     return {"nodes": nodes, "triangles": corners}
 
 
-def _edges(shape: Any, faces: list[Any]) -> list[dict[str, Any]]:
+def _edges(faces: list[Any]) -> list[dict[str, Any]]:
     """Edges with their curves and the numbers of the faces that meet in them; seams left out."""
     owners: dict[int, list[tuple[Any, set[int]]]] = {}
     for number, face in enumerate(faces):
-        for edge in _parts(face, "TopAbs_EDGE", "Edge"):
+        for edge in _parts([face], "TopAbs_EDGE", "Edge"):
             known = owners.setdefault(hash(edge), [])
             for other, numbers in known:
                 if edge.IsSame(other):

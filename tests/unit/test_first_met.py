@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import scenes
 from imaging.geometry import rays
 from imaging.geometry.rays import by_embree, by_trial, first_face
+from scenes.parts import mesh
 from scenes.parts.solid import block
 
 pytestmark = pytest.mark.skipif(rays.rtcore_scene is None, reason="Embree has no wheel here")
@@ -129,3 +131,59 @@ def test_triangles_are_wider_by_the_margin(margin):
                 origin = (start + stop) / 2 + share * margin * outward + 0.5 * alone.normals[0]
                 ray = np.float32([origin]), np.float32([-alone.normals[0]])
                 assert (alone.tree.run(*ray, query="INTERSECT", output=1)["primID"][0] >= 0) == met
+
+
+@pytest.mark.parametrize("sections", [5, 300])
+def test_no_ray_passes_between_triangles(sections):
+    """Of a closed convex part: rays at sides and corners of triangles, and close by, meet it there or before."""
+    rod = trimesh.creation.cylinder(1.0, 3.0, sections=sections)
+    rod.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0.3, 0.6, 0.8]))
+    body, rng, count = mesh.solid(rod), np.random.default_rng(5), 3000
+    shares = rng.dirichlet([1, 1, 1], count)
+    shares[: count // 2, 0] = 0.0
+    shares[: count // 4, 1] = 0.0
+    ends = np.einsum("nk,nki->ni", shares / shares.sum(1, keepdims=True), body.triangles[rng.integers(
+        len(body.triangles), size=count)])  # fmt: skip
+    ways = body.vertices.mean(0) + 0.3 * rng.permutation(ends - ends.mean(0)) - ends  # to inside, so from outside
+    starts = ends - rng.choice([0.1, 1.0, 30.0], count)[:, None] * ways
+    beside = 3e-7 * body.extent * rng.standard_normal((count, 3)) * (np.arange(count) % 2)[:, None]
+    _, t = by_embree(rays._plates(body, 1e-6), starts, ends + beside - starts, ())
+    past = (t - 1) * np.linalg.norm(ends - starts, axis=1) / body.extent
+    assert past.max() < 1e-4  # of those beside an edge, that run along a face: 4e-6 measured
+    assert np.abs(past[::2]).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["bracket_mm", "flange", "plate"])
+def test_what_passes_a_side_closely_is_met_as_by_trial(name):
+    """Rays at places of which most are near a side of their triangle."""
+    body, rng, count = scenes.load(name).bodies, np.random.default_rng(8), 3000
+    origins, _ = directed(body, rng, count)
+    corners = body.triangles[rng.integers(len(body.triangles), size=count)]
+    places = np.einsum("nk,nki->ni", rng.dirichlet([0.08, 0.5, 0.5], count), corners)
+    asked = rays._plates(body, 1e-6), origins, places - origins, ()
+    (face, t), (expected, at) = by_embree(*asked), by_trial(*asked)
+    clear = (np.abs(at - 1) > 1e-9) & (np.abs(t - 1) > 1e-9)  # what is aimed at may count for either of two faces
+    assert 0.1 < clear.mean() < 0.9
+    assert (face != expected)[clear].sum() <= 1  # margin: none is measured
+    assert t[face == expected] == pytest.approx(at[face == expected], rel=1e-9)
+
+
+def test_what_is_met_beside_a_triangle():
+    """Of the triangles around it the nearest that is not passed, no farther than asked; against each by itself."""
+    body, rng = scenes.load("bracket_mm").bodies, np.random.default_rng(3)
+    plates, count = rays._plates(body, 1e-6), 400
+    which = rng.integers(len(plates.faces), size=count)
+    places = plates.corners[:, which].mean(0) + 0.02 * body.extent * rng.standard_normal((count, 3))
+    origins = places + 0.5 * body.extent * plates.normals[which]
+    vectors = places - origins
+    passed, most = rng.random(len(plates.faces)) < 0.2, rng.choice([0.9, 1.0, 3.0], count)
+    triangle, t = plates.met_beside(which, origins, vectors, most, passed)
+    assert 0.2 < np.isfinite(t).mean() < 0.8
+    for i in range(count):
+        same = (plates.corners[:, :, None] == plates.corners[:, which[i]]).all(-1).any((0, 2))
+        around = np.flatnonzero(same & ~passed)
+        assert len(around) > 1
+        _, ts = rays._meet(plates.some(around), origins[i : i + 1], vectors[i : i + 1])
+        ts = ts[ts <= most[i]]
+        assert t[i] == pytest.approx(ts.min(initial=np.inf), rel=1e-9)
+        assert triangle[i] in around or not np.isfinite(t[i])

@@ -112,7 +112,7 @@ def plain(name, parts=(), kind="Other"):
 
 
 def body(*faces, solid=True):
-    return Shape("body", [*faces, *([Shape("solid", kind="solid")] if solid else [])])
+    return Shape("body", [*faces, *([Shape("solid", faces, kind="solid")] if solid else [])])
 
 
 def triangles(count=1):
@@ -126,8 +126,9 @@ def triangles(count=1):
 def test_parts_are_told_apart_by_what_they_are_not_by_their_hash(kernel):
     """In the file's order, each once, of one kind."""
     faces = [plain("b"), plain("a"), plain("b"), plain("c")]
-    found = step_kernel._parts(Shape("all", [*faces, Shape("e", kind="edge")]), "TopAbs_FACE", "Face")
-    assert [face.name for face in found] == ["b", "a", "c"]
+    some, more = Shape("all", [*faces, Shape("e", kind="edge")]), Shape("more", [plain("d"), plain("a")])
+    found = step_kernel._parts([some, more], "TopAbs_FACE", "Face")
+    assert [face.name for face in found] == ["b", "a", "c", "d"]
 
 
 def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel):
@@ -138,9 +139,9 @@ def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel):
         plain("g", [edges["w"]]),
         plain("h", [again, edges["u"], edges["x"]]),
     ]
-    found = step_kernel._edges(None, [*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
+    found = step_kernel._edges([*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
     assert [edge["faces"] for edge in found] == [[0, 2, 3], [0, 2], [1, 3], [2, 3]]
-    assert step_kernel._edges(None, [plain("f", [edges["u"], edges["u"]])]) == []
+    assert step_kernel._edges([plain("f", [edges["u"], edges["u"]])]) == []
 
 
 def test_curves_are_recorded_as_they_are(kernel):

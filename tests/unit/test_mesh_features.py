@@ -131,3 +131,33 @@ def test_a_mesh_of_many_triangles_has_few_faces(tmp_path):
     made.export(path)
     solid = mesh.read(path)
     assert (len(solid.faces), len(solid.sharp)) == (6, 12)
+
+
+@pytest.mark.parametrize("angle", [30.0, 90.0, 150.0])
+@pytest.mark.parametrize("off", [1e-8, 1e-7])
+def test_a_sliver_in_a_crease_does_not_make_one_face_of_two(angle, off):
+    """As CAD systems leave them where they write single precision: it lies in both planes, and belongs to one."""
+    turn = np.radians(angle)
+    profile = np.array([[0, 0], [4, 0], [4 + 3 * np.cos(np.pi - turn), 3 * np.sin(turn)], [0, 3 * np.sin(turn)]])
+    low, high = (np.column_stack([profile[:, 0], np.full(4, y), profile[:, 1]]) for y in (0.0, 5.0))
+    beside = np.array([[4.0 + off, 2.5, -off]])  # on the crease at x = 4, between the face below and the slanted one
+    corners = np.concatenate([low, high, beside])
+    faces = [
+        (0, 1, 2),
+        (0, 2, 3),
+        (4, 6, 5),
+        (4, 7, 6),
+        (1, 5, 2),
+        (5, 6, 2),
+        (2, 6, 3),
+        (6, 7, 3),
+        (3, 7, 0),
+        (7, 4, 0),
+    ]
+    faces += [(0, 4, 8), (4, 5, 8), (0, 8, 1), (1, 8, 5)]  # the last one is the sliver
+    body = trimesh.Trimesh(corners, faces, process=False)
+    body.fix_normals()
+    solid = mesh.solid(body)
+    assert (len(solid.faces), len(solid.sharp)) == (6, 12)
+    heights = np.einsum("tki,ti->tk", solid.triangles, solid.normals[solid.triangle_faces])
+    assert np.abs(heights - solid.offsets[solid.triangle_faces][:, None]).max() < 5 * off

@@ -196,3 +196,24 @@ def test_circles_of_the_mesh_are_those_of_the_edges_that_they_stand_for():
     assert found[1:] == (far, small)
     bare = step.StepPart((), (), edges[:1], np.zeros((0, 3, 3)), np.zeros(0, int))
     assert bare._exact(SimpleNamespace(circles=circles, extent=10.0)) is circles
+
+
+@kernel
+def test_a_surface_beside_the_solid_is_none_of_its_faces(tmp_path):
+    """As datum targets and construction geometry stand in files of CAD systems."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+    from OCP.gp import gp_Dir, gp_Pln, gp_Pnt
+    from OCP.TopoDS import TopoDS_Compound
+
+    from tests.step_parts import drilled, written
+
+    plate, both, builder = drilled(*PLATE), TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(both)
+    builder.Add(both, plate)
+    builder.Add(both, BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(10, 10, 10), gp_Dir(0, 0, 1)), -4, 4, -3, 3).Face())
+    alone, beside = (
+        step.read(written(shape, tmp_path / f"{name}.step")) for name, shape in (("a", plate), ("b", both))
+    )
+    assert len(beside.surfaces) == len(alone.surfaces) == 8
+    np.testing.assert_allclose(beside.solid.triangles, alone.solid.triangles, atol=1e-12)
