@@ -96,7 +96,8 @@ def validate_command(
     With --photos nothing is rendered: repeated photographs are measured instead. Sub-folders of DIR are named as
     sensor_30_90_light_15_270, or DIR holds photos.toml: [[settings]] with sensor, light and files.
 
-    Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements
+    Writes run.sqlite, report.html (one page that shows all), report.md, table.csv, measurands.csv, result.json and
+    pictures to DIR. Exit status 1 if the measurements
     contradict the predictions.
     """
     started = time.perf_counter()
@@ -198,7 +199,7 @@ def _goal(accuracy: float | None, budget: str | None, started: float) -> Goal | 
 
 def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> None:
     from validation.batch.store import RunFile
-    from validation.report import export, figures
+    from validation.report import export, figures, page
 
     export.write_csv(found, directory / "table.csv")
     export.write_measurands(found, directory / "measurands.csv")
@@ -206,5 +207,6 @@ def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> Non
     store = RunFile.reopen(directory)
     try:
         figures.draw(loaded, found, store, directory / "figures")
+        page.write(loaded, found, store, directory)
     finally:
         store.close()

@@ -56,7 +56,10 @@ def budget_command(
     ] = None,
     csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write budget.json, budget.csv and budget.png.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Write budget.html (one page that shows all), budget.json, budget.csv and budget.png."
+        ),
     ] = None,
     seed: Seed = DEFAULT_SEED,
     as_json: Json = False,
@@ -88,7 +91,7 @@ def budget_command(
         return
     _show(found, drawn, shown, reach)
     if out:
-        console().print(f"budget.json, budget.csv and budget.png: {out}", highlight=False)
+        console().print(f"budget.html, budget.json, budget.csv and budget.png: {out}", highlight=False)
 
 
 def _check(stations: int, reach: float | None) -> None:
@@ -101,12 +104,14 @@ def _check(stations: int, reach: float | None) -> None:
 
 def _write(found: SceneBudget, facts: dict, out: Path) -> None:
     """All that is known, as files of a directory."""
-    from validation.report import budget_figure
+    from validation.report import budget_figure, page, station
 
+    scene = found.picture.scene
     out.mkdir(parents=True, exist_ok=True)
     (out / "budget.json").write_text(dumps(facts), encoding="utf-8")
     write_csv(found, out / "budget.csv")
-    budget_figure.draw(found.measurands, out / "budget.png")
+    budget_figure.draw(found, out / "budget.png")
+    page.write_station(station.of_budget(found), scene.title or scene.name, out / "budget.html")
 
 
 def _poses(sensor: str | None, light: str | None) -> tuple[Any, Any]:
