@@ -148,11 +148,13 @@ def _settings(campaign: Campaign, found: Validation, station: Station) -> Sectio
 def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
     lines = proof_figures.lines_of(found, halves_of(campaign))
     forest, bias = proof_figures.forest(lines), proof_figures.bias(lines)
+    many = proof_figures.grouped_told(lines)
     some = "" if len(found.rows) <= proof_figures.MOST else f" Of {proof_figures.MOST} of {len(found.rows)} settings."
+    read = many + some
     plots = [
         Plot(forest, "Scatter of the measured values against the predicted one. Dots: 1 lies inside the interval; "
-             "diamonds: it does not, as happens by chance in one of 20; crosses: not proven, so not judged." + some),
-        Plot(bias, proof_figures.bias_told(lines)),
+             "diamonds: it does not, as happens by chance in one of 20; crosses: not proven, so not judged." + read),
+        Plot(bias, proof_figures.bias_told(lines) + many),
         Plot(proof_figures.distributions(found, store),
              "All measured values of each requirement (bars) against what is predicted (line)."),
     ]  # fmt: skip

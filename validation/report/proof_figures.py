@@ -98,6 +98,13 @@ def forest(lines: Sequence[Line]) -> Markup:
     return inline(figure, "forest", _forest_told(known))
 
 
+def grouped_told(lines: Sequence[Line]) -> str:
+    """How a plot of many lines is read; empty of few."""
+    if len(lines) <= _SINGLE:
+        return ""
+    return f" Bar: 90 % of a requirement's settings, line: all of them, dot: their median; below, the {_FAR} farthest."
+
+
 def _farthest(known: Sequence[Line]) -> list[Line]:
     return sorted(known, key=lambda line: (-round(abs(math.log(max(line.ratio, 1e-300))), 9), line.number))[:_FAR]
 
@@ -135,16 +142,19 @@ def _forest_told(known: Sequence[Line]) -> str:
 
 def bias(lines: Sequence[Line]) -> Markup:
     """Mean error of each line with its 95 % interval, in per cent of half the tolerance zone, or in sigmas of one
-    picture where no requirement has a tolerance; of many lines the largest of each requirement."""
+    picture where no requirement has a tolerance; of many the spread of each requirement, and the largest."""
     known = [line for line in lines if line.bias is not None and math.isfinite(line.error)]
     toleranced = any(line.half for line in known)
     known = [line for line in known if line.half] if toleranced else known
-    shown = known
-    if len(known) > _SINGLE:
-        key = {id(line): round(abs(_biased(line, toleranced)[0]), 9) for line in known}
-        shown = [max(some, key=lambda line: key[id(line)]) for _, some in _groups(known)]
-    figure, axis = _rows(len(shown))
-    for y, line in enumerate(shown):
+    grouped = len(known) > _SINGLE
+    key = {id(line): round(abs(_biased(line, toleranced)[0]), 9) for line in known}
+    shown = sorted(known, key=lambda line: -key[id(line)])[:_FAR] if grouped else known
+    groups = _groups(known) if grouped else []
+    figure, axis = _rows(len(shown) + len(groups))
+    for y, (name, some) in enumerate(groups):
+        _group(axis, y, np.array([_biased(line, toleranced)[0] for line in some]))
+        _name(axis, y, f"{name}, {len(some)} settings")
+    for y, line in enumerate(shown, len(groups)):
         value, spread = _biased(line, toleranced)
         trusted = is_trusted(line.status)
         colour = _GOOD if trusted else _BAD
