@@ -96,7 +96,7 @@ def test_predictions_are_printed_by_their_names(several):
                         "status"]  # fmt: skip
     for row, each in zip(rows, found.measurands, strict=True):
         assert row == [
-            "(35, 320)", "(20, 260)", each.name, f"{each.value_object:.6g}", f"{each.variance_object**0.5:.3g}",
+            "(35.0, 320.0)", "(20.0, 260.0)", each.name, f"{each.value_object:.6g}", f"{each.variance_object**0.5:.3g}",
             f"{each.bias_object:.2g}", each.unit, f"{each.value_image:.6g}", f"{each.variance_image**0.5:.3g}",
             each.status,
         ]  # fmt: skip
@@ -242,12 +242,16 @@ def test_the_plan_s_tables_are_its_json(planned):
     made = plan_table.report(planned, check, safe, 1.25)
     text = words(made)
     headings, rows = titled(made, "Clearly different")
-    assert headings == ["sensor", "light", "edges", "limited by", "worst ratio^2", "over best"]
-    for row, c in zip(rows, planned.candidates, strict=True):
-        over = f"{c.variance / planned.candidates[0].variance:.3f}"
-        assert row == [pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
-    headings, rows = titled(made, "Alternating")
-    assert headings == ["fixed", "", "found", "", "worst ratio^2"]
+    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over best"]
+    assert rows[0][:4] == ["best", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required)]
+    assert rows[0][4:] == [planned.limiting, f"{planned.variance:.4g}", "1.000"]
+    first = planned.candidates[0]
+    itself = (first.sensor, first.light) == (planned.sensor, planned.light)
+    for row, c in zip(rows[1:], planned.candidates[itself:], strict=True):
+        over = f"{c.variance / planned.variance:.3f}"
+        assert row == ["", pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
+    headings, rows = titled(made, "The paper's search")
+    assert headings == ["held fixed", "", "found", "", "largest ratio^2"]
     for row, s in zip(rows, planned.trace, strict=True):
         assert row == [s.fixed, pose(s.fixed_pose), s.found, pose(s.found_pose), f"{s.variance:.4g}"]
     headings, rows = titled(made.renderables[-2], "The best settings")
@@ -267,10 +271,11 @@ def test_the_plan_s_tables_are_its_json(planned):
     assert "-33.3 % against the plan" in text
     assert f"sensor {pose(planned.sensor)}, light {pose(planned.light)}" in text
     p = planned.prediction
-    assert f"Limited by {planned.limiting}: sigma is {p.worst_ratio:.3g} of its tolerance" in text
+    assert f"Limited by {planned.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance" in text
     for each in p.measurands:
         assert (
-            f"sigma {each.variance_object**0.5:.3g} {each.unit}, {each.ratio:.3g} of +-{each.tolerance.half:g}" in text
+            f"sigma {each.variance_object**0.5:.3g} {each.unit}, {100 * each.ratio:.3g} % of +-{each.tolerance.half:g}"
+            in text
         )
     assert f"{pose(check.proposed.sensor)}, light {pose(check.proposed.light)}, ok: -4.2 % variance" in text
 
@@ -279,13 +284,14 @@ def test_the_plan_of_one_measurand_is_told_in_object_and_image(task1):
     found = planner.plan(task1, step_deg=30, refined=False)
     made = plan_table.report(found, None, None, 1.0)
     headings, rows = titled(made, "Clearly different")
-    assert headings == ["sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
+    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
     for row, c in zip(rows, found.candidates, strict=True):
-        assert row[3:5] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
+        assert row[0] == ("best" if c is found.candidates[0] else "")
+        assert row[4:6] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
     again = planner.predict(task1, found.sensor, found.light)
     text = words(made)
-    assert f"standard deviation {again.variance_object**0.5:.3g} cm of {again.value_object:.4g} cm" in text
-    assert f"{again.variance_image**0.5:.3g} px of {again.value_image:.4g} px in the image" in text
+    assert f"One picture's sigma is {again.variance_object**0.5:.3g} cm of {again.value_object:.4g} cm" in text
+    assert f"in the image {again.variance_image**0.5:.3g} px of {again.value_image:.4g} px" in text
 
 
 # --- several pictures

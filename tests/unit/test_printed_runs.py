@@ -220,7 +220,7 @@ def interval(each):
 
 def poses(index):
     setting = _scene().settings[index]
-    return [f"({pose.polar_deg:g}, {pose.azimuth_deg:g})" for pose in (setting.sensor, setting.light)]
+    return [f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})" for pose in (setting.sensor, setting.light)]
 
 
 def shifts(main):

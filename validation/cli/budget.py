@@ -139,7 +139,7 @@ def write_csv(found: SceneBudget, path: Path) -> None:
 
 def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: float | None) -> None:
     from validation import budgets
-    from validation.report import budget_table
+    from validation.report import budget_table, station, station_text
 
     terminal = console()
     for each, quantity, status in zip(found, found.picture.scene.quantities, found.statuses, strict=True):
@@ -153,6 +153,7 @@ def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
     if shown:
         for line in budgets.said_of_pictures(shown):
             terminal.print(line, highlight=False)
+    terminal.print(station_text.report(station.of_budget(found).requirements, "\nAll requirements"), highlight=False)
 
 
 def _further(found: SceneBudget, each: Budget, drawn: list[dict], reach: float | None) -> list[str]:

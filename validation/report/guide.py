@@ -5,10 +5,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenes.status import legend
 from validation.batch.result import Validation
+from validation.report.cells import pose
 from validation.statistics import LEVEL
+
+if TYPE_CHECKING:
+    from validation.report.station import Station
 
 _LOCATORS = {
     "gradient": "zero of the second derivative",
@@ -143,6 +148,14 @@ def _expected(rows: int) -> str:
     ('about 19', 'nearly all')
     """
     return f"about {0.95 * rows:.0f}" if 0.05 * rows >= 0.5 else "nearly all"
+
+
+def station_title(found: Validation, station: Station) -> str:
+    """Of the table of a run's best setting."""
+    lights = station.picture.lights
+    where = f"sensor {pose(station.picture.sensor)}" + (f", light {pose(lights)}" if lights else "")
+    best = f", the best of {len(found.rows)}" if len(found.rows) > 1 else ""
+    return f"\nHow well each requirement is measured in setting {station.number}{best}: {where}"
 
 
 def directory_line(directory: Path) -> str:

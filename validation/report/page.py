@@ -29,7 +29,7 @@ from validation.report import (
 from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
 from validation.report.requirements import next_step, sentence
-from validation.report.station import Station, halves_of, of_run
+from validation.report.station import Station, halves_of
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,8 @@ class Section:
     folded: list[Table] = field(default_factory=list)
 
 
-def write(campaign: Campaign, found: Validation, store: RunFile, directory: Path) -> list[Path]:
+def write(campaign: Campaign, found: Validation, store: RunFile, station: Station, directory: Path) -> list[Path]:
     """Write report.html and report.md of a run to a directory; their paths."""
-    station = of_run(campaign, found, store)
     sections = [_proof(campaign, found, store), *_budget(station.budget)]
     if len(found.rows) > 1:
         sections.insert(0, _settings(campaign, found, station))

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenes import Tolerance
 from scenes.status import MEANINGS
+from validation.report import cells
 from validation.report.budget_table import decimals
 from validation.report.grades import LOOKS, Look
 from validation.report.page_tables import Table
@@ -51,7 +51,7 @@ def _cells(each: Requirement) -> tuple[str, ...]:
     percent = "-" if each.ratio is None else f"{100 * each.ratio:.2g} %" if each.ratio < 10 else f"{each.ratio:.2g} x"
     result = f"{each.grade}: {each.status}" if each.grade == Grade.DOUBT else str(each.grade)
     return (
-        each.name, _nominal(each), zone(each.tolerance),
+        each.name, _nominal(each), cells.zone(each.tolerance),
         "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}",
         _bias(each, places), "-" if each.U is None or each.grade == Grade.DOUBT else f"{each.U:.{decimals(each.U)}f}",
         percent, result, each.limits or "-",
@@ -68,16 +68,3 @@ def _bias(each: Requirement, places: int) -> str:
     beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}"
     told = f"{each.bias:+.{places}f}"
     return ("0" if float(told) == 0 else told) + beside
-
-
-def zone(tolerance: Tolerance | None) -> str:
-    """A tolerance as on a drawing.
-
-    >>> zone(Tolerance(plus=0.02, minus=0.02)), zone(Tolerance(plus=0.02, minus=0.0)), zone(None)
-    ('±0.02', '+0.02 -0', '-')
-    """
-    if tolerance is None:
-        return "-"
-    if tolerance.plus == tolerance.minus:
-        return f"±{tolerance.plus:g}"
-    return f"+{tolerance.plus:g} -{tolerance.minus:g}"

@@ -38,6 +38,7 @@ from validation.report import (
     precision_figure,
     proof_figures,
     run_cells,
+    station,
     vary_table,
 )
 
@@ -156,8 +157,9 @@ def _page():
     campaign, found = _uneven_run()
     store = RunFile.reopen(run_folder() / "run")
     try:
+        best = station.of_run(campaign, found, store)
         with folder() as here:
-            paths, drawn = figures(lambda: page.write(campaign, found, store, here))
+            paths, drawn = figures(lambda: page.write(campaign, found, store, best, here))
             texts = [path.read_text(encoding="utf-8") for path in paths]
     finally:
         store.close()
