@@ -112,7 +112,7 @@ def draw(found: SceneBudget, path: Path) -> Path:
     return save(_drawn(found), path)
 
 
-def drawn(found: SceneBudget) -> Markup:
+def drawn(found: SceneBudget, key: str = "budget") -> Markup:
     """The chart as SVG within a page."""
     names = ", ".join(f"{each.name} {each.U:.2g} {each.unit}" for each in found)
-    return inline(_drawn(found), "budget", f"Expanded uncertainties by source: {names}.")
+    return inline(_drawn(found), key, f"Expanded uncertainties by source: {names}.")

@@ -78,7 +78,7 @@ def lines_of(found: Validation, halves: dict[str, float]) -> list[Line]:
     return sorted(lines, key=lambda line: (line.number, line.setting))
 
 
-def forest(lines: Sequence[Line]) -> Markup:
+def forest(lines: Sequence[Line], key: str = "forest") -> Markup:
     """Ratio of variances with its interval, a line each; of many the spread of each requirement, and the farthest."""
     known = [line for line in lines if line.ratio is not None]
     grouped = len(known) > _SINGLE
@@ -95,7 +95,7 @@ def forest(lines: Sequence[Line]) -> Markup:
         _name(axis, y, _label(line, lines))
     axis.axvline(1, color="black", lw=0.9, zorder=0)
     _ratio_axis(axis, known)
-    return inline(figure, "forest", _forest_told(known))
+    return inline(figure, key, _forest_told(known))
 
 
 def grouped_told(lines: Sequence[Line]) -> str:

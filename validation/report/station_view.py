@@ -109,13 +109,17 @@ def _seen(picture: Picture, points: np.ndarray) -> np.ndarray:
     return project(points, np.array(list(picture.sensor)), picture.scene.camera)
 
 
-def draw(picture: Picture, found: Sequence[Requirement], image: np.ndarray | None, label: str) -> Markup:
+def draw(
+    picture: Picture, found: Sequence[Requirement], image: np.ndarray | None, label: str, key: str = "view"
+) -> Markup:
     """The picture as SVG, a balloon for each requirement around it.
 
     Parameters
     ----------
     image : ndarray, shape (height, width), or None
         Grey levels of the whole image; None: drawn from the model, without shadows.
+    label, key : str
+        As of `canvas.inline`.
     """
     part = preview.window(picture.scene, picture)
     grey = preview.drawn(picture.scene, picture, part) if image is None else _cut(picture, image, part)
@@ -132,11 +136,11 @@ def draw(picture: Picture, found: Sequence[Requirement], image: np.ndarray | Non
         """Inches in the figure of px in the image."""
         return (points + 0.5 - [part.left, part.top]) * scale + [left, _BAND]
 
-    drawn = marks(picture)
+    drawn = marks(picture) if found else []
     spots, anchors = balloons([placed(mark.anchors) for mark in drawn], size, np.array([left, _BAND]))
     for each, mark, anchor, spot in zip(found, drawn, anchors, spots, strict=True):
         _requirement(axis, each, [placed(line) for line in mark.lines], anchor, spot)
-    return inline(figure, "view", label)
+    return inline(figure, key, label)
 
 
 def _cut(picture: Picture, image: np.ndarray, part: preview.Window) -> np.ndarray:
@@ -163,6 +167,8 @@ def balloons(anchors: list[np.ndarray], size: np.ndarray, corner: np.ndarray) ->
     spots, tied : ndarray, shape (n, 2)
         Of all ways the one whose leaders are shortest in sum: then they do not cross.
     """
+    if not anchors:
+        return np.empty((0, 2)), np.empty((0, 2))
     outer = size + _BAND
     around = 2 * outer.sum()
     count = max(int(around / _PITCH), len(anchors))
