@@ -15,9 +15,10 @@ from markupsafe import Markup
 from scipy.optimize import linear_sum_assignment
 
 from imaging.geometry.projection import project, sensor_position
-from scenes import Centre, Picture, Side, Wall
+from scenes import Centre, Curved, Picture, Side, Wall
 from scenes.measurands.features import point_of
 from scenes.measurands.measurands import Quantity
+from scenes.parts.surfaces import Sphere
 from validation.explore import preview
 from validation.report.canvas import TEXT, WIDTH, inline
 from validation.report.grades import LOOKS
@@ -49,7 +50,7 @@ def _mark(picture: Picture, quantity: Quantity) -> Mark:
     places = [_place(picture, feature) for feature in quantity.features] or [np.array(picture.scene.camera.look_at)]
     lines = [line for feature in quantity.features for line in _outline(picture, feature)]
     if len(quantity.features) == 1:
-        return Mark(tuple(lines), np.concatenate(lines))
+        return Mark(tuple(lines), lines[-1] if len(lines[-1]) > 2 else _between(*lines[-1]))
     if quantity.is_angle:
         return Mark(tuple(lines), _nearest_ends(*lines[:2])[None])
     for i, feature in enumerate(quantity.features):
@@ -57,7 +58,12 @@ def _mark(picture: Picture, quantity: Quantity) -> Mark:
             ends = solid.vertices[list(solid.edge(feature.edge).ends)]
             places[i] = _foot(places[1 - i], ends) if len(places) == 2 else ends.mean(0)
     start, stop = _seen(picture, np.array([places[0], places[-1]]))
-    return Mark((*lines, np.stack([start, stop])), start + _TIED[:, None] * (stop - start))
+    return Mark((*lines, np.stack([start, stop])), _between(start, stop))
+
+
+def _between(start: np.ndarray, stop: np.ndarray) -> np.ndarray:
+    """Points of a line to which a balloon may be tied, (k, 2)."""
+    return start + _TIED[:, None] * (stop - start)
 
 
 def _nearest_ends(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -90,11 +96,21 @@ def _outline(picture: Picture, feature) -> list[np.ndarray]:
         return [_seen(picture, _round(circle.centre, circle.axis, circle.radius))]
     if isinstance(feature, Wall):
         eye = sensor_position(picture.scene.camera, np.array(list(picture.sensor)))
-        round_ = solid.round(feature.surface)
-        across = np.cross(round_.axis, eye - round_.centre)
-        across *= round_.radius / np.linalg.norm(across)
-        return [_seen(picture, np.array([round_.centre - across, round_.centre + across]))]
+        return [_seen(picture, line) for line in _limb(solid.round(feature.surface), eye)]
     return []
+
+
+def _limb(wall: Curved, eye: np.ndarray) -> list[np.ndarray]:
+    """What an eye sees a curved surface end at, about: a circle of a sphere; of others a line on both sides, and what
+    is between them."""
+    one, two = wall.sideways(eye)
+    if isinstance(wall.surface, Sphere):
+        turn = np.linspace(0, 2 * np.pi, _CHORDS + 1)[:, None]
+        return [wall.centre + wall.radius * (np.cos(turn) * one + np.sin(turn) * two)]
+    along = np.array(wall.surface.ends)[:, None]
+    radii = wall.radius + getattr(wall.surface, "slope", 0.0) * along
+    sides = [wall.centre + along * wall.surface.axis + side * radii * one for side in (-1, 1)]
+    return [*sides, wall.centre + np.array([[-1], [1]]) * wall.radius * one]
 
 
 def _round(centre: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
