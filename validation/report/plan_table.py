@@ -9,7 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from planner.search.setting_up import how_far
 from render import Tolerance
+from scenes import Scene
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
@@ -84,6 +86,8 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if not found.steady:
+        lines.append(f"  Hard to set up: {_how_far(found.scene)} degrees off something cannot be measured any more.")
     if found.shares:
         lines.insert(
             0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
@@ -95,6 +99,10 @@ def _searched(found: planner.Plan, seconds: float) -> str:
             " of what is minimised: there more of what is measured is clutter."
         )
     return "\n".join(lines)
+
+
+def _how_far(scene: Scene) -> str:
+    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
 
 
 def _alone(found: planner.Plan) -> str:
@@ -128,19 +136,21 @@ def _minimised(found: planner.Plan, units: tuple[str, str]) -> str:
 
 def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     names = (f"object, 1e-6 {units[0]}^2", f"image, 1e-6 {units[1]}^2")
-    best, several = found.candidates[0], len(found.prediction.measurands) > 1
+    several = len(found.prediction.measurands) > 1
     if several:
         names = ("limited by", _minimised(found, units))
-    table = _table("\nClearly different settings, the best first", "sensor", "light", "edges", *names, "over best")
-    for c in found.candidates:
-        ratio = c.variance / best.variance
+    title = "\nThe plan, and clearly different settings of the grid, the best first"
+    table = _table(title, "", "sensor", "light", "edges", *names, "over plan", words=("",))
+    for row in (found, *found.candidates):
+        first = "plan" if row is found else ""
+        shown = first, _pose(row.sensor), _pose(row.light), " ".join(row.scene.required if row is found else row.edges)
+        ratio = f"{row.variance / found.variance:.3f}"
         if several:
-            table.add_row(
-                _pose(c.sensor), _pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", f"{ratio:.3f}"
-            )
+            table.add_row(*shown, row.limiting, f"{row.variance:.4g}", ratio)
             continue
-        values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
-        table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
+        variances = found.prediction if row is found else row
+        values = (f"{1e6 * each:.4g}" for each in (variances.variance_object, variances.variance_image))
+        table.add_row(*shown, *values, ratio)
     return table
 
 
@@ -150,7 +160,7 @@ def _reading(found: planner.Plan) -> str:
     what = "what is minimised" if several else "its variance in the object and in the image"
     return (
         "  Poses are (polar angle, azimuth), degrees. Beside them "
-        f"{what}; over best: over that of the first row.\n"
+        f"{what}; over plan: over the plan's.\n"
         "  Where the best place is taken, another row will do; `--sensor P,A` or `--light P,A` holds one fixed, "
         "`--map FILE.png` draws."
     )
