@@ -17,7 +17,8 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
-from scenes.parts.facets import Chain, Facets, facets
+from scenes.parts.facets import Chain, facets
+from scenes.parts.joined import joined
 from scenes.parts.mend import mended
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
@@ -119,17 +120,20 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     loops = _loops(mesh, group, chains, normals)
     circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
     known = facets(mesh.vertices, chains, normals, areas, circular)
-    plain = _assembled(mesh, group, chains, loops, circular, known)
+    whole = joined(mesh.vertices, chains, normals, known.region, known.kinds == "sharp")
+    pieces = [(chain, "sharp") for chain in whole]
+    pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
+    used = np.unique([end for chain in chains for end in chain[0]])
+    plain = _assembled(mesh, group, used, pieces, loops, circular)
     return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"])
 
 
-def _assembled(mesh, group: np.ndarray, chains: list[Chain], loops, circular: list[Rim], known: Facets) -> Solid:
+def _assembled(mesh, group: np.ndarray, used: np.ndarray, pieces, loops, circular: list[Rim]) -> Solid:
     """The solid, its parts numbered and named."""
-    used = np.unique([end for chain in chains for end in chain[0]])
     used = used[np.lexsort(np.round(mesh.vertices[used] / mesh.extents.max(), 7).T[::-1])]
     number = np.full(len(mesh.vertices), -1)
     number[used] = np.arange(len(used))
-    edges = _edges(chains, number, circular, known)
+    edges = _edges(pieces, number, circular)
     corners = {v for v, many in Counter(end for e in edges if e.kind == "sharp" for end in e.ends).items() if many > 1}
     names = {"v": count(1), "p": count(1)}
     bare = Solid(
@@ -159,14 +163,13 @@ def _face_names(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[str, ...]:
     return tuple(names.tolist())
 
 
-def _edges(chains: list[Chain], number: np.ndarray, circular: list[Rim], known: Facets) -> tuple[Edge, ...]:
+def _edges(pieces: list[tuple[Chain, str]], number: np.ndarray, circular: list[Rim]) -> tuple[Edge, ...]:
     """The edges in the order of their ends, the sharp ones first."""
     piece = {frozenset(ends): (i, j) for i, rim in enumerate(circular, 1) for j, ends in enumerate(rim.pieces, 1)}
-    kinds = np.where(known.smooth, "smooth", np.where(known.rim, "rim", "sharp"))
     found: dict[str, list] = {"sharp": [], "rim": [], "smooth": []}
-    for (ends, faces, convex), kind in zip(chains, kinds, strict=True):
+    for (ends, faces, convex), kind in pieces:
         here = tuple(sorted(number[list(ends)].tolist()))
-        found[str(kind)].append((here, faces, convex, piece.get(frozenset(ends))))
+        found[kind].append((here, faces, convex, piece.get(frozenset(ends))))
     edges = []
     for kind, letter in (("sharp", "e"), ("rim", "r"), ("smooth", "s")):
         numbers = count(1)

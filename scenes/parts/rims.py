@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
+_STEP = 2 * np.sin(np.pi / MIN_SEGMENTS) / 2  # radii: half that of so many
+_WIDEST = 5.0  # of the middle step of a circle
 _ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
 
 
@@ -78,9 +80,15 @@ def rims(loops: list[list[tuple[int, ...]]], vertices: np.ndarray, normals: np.n
         for loop in boundaries_:
             if len(loop) >= MIN_SEGMENTS:
                 centre, radius, off = circle_through(vertices[list(loop)], normals[face])
-                if off <= _ROUND * radius:
+                if off <= _ROUND * radius and _stepped(vertices[list(loop)], radius):
                     found.append(Rim(face, loop, centre, radius))
     return found
+
+
+def _stepped(points: np.ndarray, radius: float) -> bool:
+    """Whether the way from each to the next is a step around a circle, not a chord that cuts a part of it off."""
+    step = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1) / radius
+    return bool(step.max() <= max(_WIDEST * np.median(step), _STEP))
 
 
 def circle_through(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, float, float]:

@@ -44,22 +44,22 @@ class Match:
         return f"{self.matched} of {self.there}, {len(self.false)} false"
 
 
-def matched(there: np.ndarray, offered: np.ndarray) -> Match:
-    """Features (n, k) and (m, k) that differ by at most `SAME` in each number, one to one."""
+def matched(there: np.ndarray, offered: np.ndarray, signs: np.ndarray | None = None) -> Match:
+    """Features (n, k) and (m, k) that differ by at most `SAME` in each number; ``signs`` (k,) make the same one."""
     if not len(there) or not len(offered):
         return Match(len(there), 0, there, offered)
-    near = KDTree(offered).query(there, p=np.inf)
+    both = offered if signs is None else np.concatenate([offered, offered * signs])
+    near = KDTree(both).query(there, p=np.inf)
     found = near[0] <= SAME
     taken = np.zeros(len(offered), bool)
-    taken[near[1][found]] = True
+    taken[near[1][found] % len(offered)] = True
     return Match(len(there), int(found.sum()), there[~found], offered[~taken])
 
 
-def in_order(ends: np.ndarray) -> np.ndarray:
-    """Straight edges (n, 2, 3) as numbers (n, 6): their middles, and half their way from one end, pointing upwards."""
-    middle, half = ends.mean(1), (ends[:, 1] - ends[:, 0]) / 2
-    main = np.take_along_axis(half, np.abs(half).argmax(1)[:, None], 1)
-    return np.concatenate([middle, half * np.where(main < 0, -1.0, 1.0)], 1)
+def matched_lines(there: np.ndarray, offered: np.ndarray) -> Match:
+    """Straight edges (n, 2, 3) and (m, 2, 3): their middles, and half their way from either end."""
+    numbers = [np.concatenate([ends.mean(1), (ends[:, 1] - ends[:, 0]) / 2], 1) for ends in (there, offered)]
+    return matched(*numbers, np.repeat([1.0, -1.0], 3))
 
 
 def offered(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
@@ -132,9 +132,9 @@ def compared(exact: Path, tessellated: Path) -> Pair:
         exact.stem,
         share,
         placed,
-        matched(in_order(there.lines), in_order(lines)),
+        matched_lines(there.lines, lines),
         matched(there.circles, circles),
-        matched(in_order(there_lines), in_order(found[0])),
+        matched_lines(there_lines, found[0]),
         matched(there_circles, found[1]),
     )
 
