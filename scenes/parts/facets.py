@@ -24,6 +24,9 @@ _WIDER = 5.0  # than its neighbours: the steps of a curve may be unequal
 _TANGENT = 1.25  # of the largest bend between facets: what continues a curve smoothly
 _TANGENT_BEND = np.radians(1.0)  # faces that bend by less are joined smoothly, whatever they stand for
 _SLIGHT = np.radians(12.0)
+_TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be unequal
+_FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
+_LAST = 1.5  # widths of the facet before
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
 _LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
@@ -78,6 +81,8 @@ def facets(
     facet[crossed] = True
     inner &= facet[shape.faces].all(1)
     smooth = around | slight | inner | _continued(shape, linked & ~inner, inner)
+    smooth |= _dangling(shape, ~smooth)
+    facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, _components(len(normals), joins), -1)
     open_ = ~smooth & ~edging
@@ -219,11 +224,51 @@ def _pairs_of(face: np.ndarray) -> np.ndarray:
 
 
 def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,)."""
+    """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,).
+
+    Beside the largest bend of a facet and the next: between triangles of a curve every second one is nearly flat.
+    """
     largest = np.zeros(len(shape.areas))
-    for i in np.flatnonzero(inner):
-        np.maximum.at(largest, shape.faces[i], shape.bend[i])
-    return ends & (shape.bend <= _TANGENT * largest[shape.faces].max(1))
+    for side in (0, 1):
+        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+    next_ = largest.copy()
+    for side in (0, 1):
+        np.maximum.at(next_, shape.faces[inner, side], largest[shape.faces[inner, 1 - side]])
+    most = np.where(shape.bend <= _SLIGHT, _TANGENT_SLIGHT, _TANGENT)
+    return ends & (shape.bend <= most * next_[shape.faces].max(1))
+
+
+def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
+    """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
+
+    Only those that bend no more than the facets of a curve do: an edge ends where others do.
+    """
+    left, size = edges.copy(), shape.ends.max(initial=0) + 1
+    within = np.bincount(shape.ends.ravel(), minlength=size) > 2
+    while True:
+        alone = (np.bincount(shape.ends[left].ravel(), minlength=size) == 1) & within
+        loose = left & alone[shape.ends].any(1) & (shape.bend <= _BEND)
+        if not loose.any():
+            return edges & ~left
+        left &= ~loose
+
+
+def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Faces at the end of a curved surface that are its last facets, as wide as the one before; bool, shape (F,)."""
+    width = shape.areas[shape.faces] / shape.length[:, None]
+    found = facet.copy()
+    bent = smooth & (shape.bend > _TANGENT_BEND) & (shape.bend <= _SLIGHT)
+    largest = np.zeros(len(shape.areas))
+    inner = bent & facet[shape.faces].all(1)
+    once = np.bincount(shape.faces[bent].ravel(), minlength=len(facet)) == 1
+    for side in (0, 1):
+        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+    for side in (0, 1):
+        here, before = shape.faces[:, side], shape.faces[:, 1 - side]
+        full = shape.bend >= _FULL * largest[before]
+        rows = bent & facet[before] & ~facet[here] & once[here] & full & (width[:, side] <= _LAST * width[:, 1 - side])
+        found[here[rows]] = True
+    return found
 
 
 def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
