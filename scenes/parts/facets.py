@@ -284,7 +284,8 @@ def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
         for i, j in combinations(chains, 2):
             one, two = (shape.along[k] * (1 if shape.ends[k][0] == end else -1) for k in (i, j))
             if -(one @ two) >= _CURVE * shape.length[i] * shape.length[j]:
-                found[[i, j]] = True
+                found[i] |= shape.length[i] <= _LONGER * shape.length[j]
+                found[j] |= shape.length[j] <= _LONGER * shape.length[i]
     return found
 
 
@@ -301,10 +302,16 @@ def _passing(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray
     away = shape.along[chain] * np.where(first, 1.0, -1.0)[..., None]
     length = shape.length[chain]
     turns = -(away[:, 0] * away[:, 1]).sum(1) >= _CURVE * length.prod(1)
-    curved = (region[shape.faces[chain]] >= 0).any(2) & turns[:, None]
+    curved = (region[shape.faces[chain]] >= 0).any(2)
+    turn = np.arccos(np.clip(-(away[:, 0] * away[:, 1]).sum(1) / length.prod(1), -1, 1))
+    before = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece
+    before[chain, np.where(first, 0, 1)] = turn[:, None]
     found = np.zeros(len(shape.bend), bool)
     for k in (0, 1):
-        found[chain[curved[:, k] & (length[:, k] <= _LONGER * length[:, 1 - k]), k]] = True
+        beyond = before[chain[:, 1 - k], np.where(first[:, 1 - k], 1, 0)]
+        full = curved[:, 1 - k] & (turn >= _FULL * beyond)
+        most = np.where(curved[:, k], _LONGER, _LAST * full)
+        found[chain[turns & (length[:, k] <= most * length[:, 1 - k]), k]] = True
     return found
 
 
