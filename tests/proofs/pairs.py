@@ -6,20 +6,25 @@ What is there is asked of OpenCASCADE's own edges and faces (`tests.cad_edges`),
 from __future__ import annotations
 
 import itertools
+import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from scipy.spatial import KDTree
 
+import planner
+from scenes import Measurand
 from scenes.errors import InvalidInput
 from scenes.parts import mesh, step
 from scenes.parts.solid import Solid
 from tests.cad_edges import SAME, Sharp, sharp_edges
+from validation import new_scene
 
+SIGMA = 0.01  # of a standard deviation
 _SAME_PART = 0.98  # of the corners of its sharp edges: those of another revision are elsewhere
 
 
@@ -29,8 +34,10 @@ class Match:
 
     Attributes
     ----------
-    there, matched, missed : int
-        Those of the file; of them offered, and not.
+    there, matched : int
+        Those of the file; of them offered.
+    missed : ndarray, shape (k, ...)
+        Those that are not.
     false : ndarray, shape (n, ...)
         Offered ones that are none.
     """
@@ -139,10 +146,73 @@ def compared(exact: Path, tessellated: Path) -> Pair:
     )
 
 
+def names(exact: Solid, tessellated: Solid) -> dict[str, str]:
+    """For edges, circles and vertices of a part as the STEP file names them the mesh's names, where it has them."""
+    found: dict[str, str] = {}
+    rows = [
+        (
+            {each.name: [*each.centre, each.radius, *each.axis] for each in solid.circles},
+            {each.name: np.sort(solid.vertices[list(each.ends)], 0).ravel() for each in solid.sharp},
+            dict(zip(solid.vertex_names, solid.vertices, strict=True)),
+        )
+        for solid in (exact, tessellated)
+    ]
+    for one, other in zip(*rows, strict=True):
+        if one and other:
+            away, which = KDTree(np.array(list(other.values()))).query(np.array(list(one.values())), p=np.inf)
+            called = [list(other)[k] for k in which]
+            found |= {name: to for name, to, off in zip(one, called, away, strict=True) if off <= SAME}
+    return found
+
+
+def told_by(measurand: Measurand, names: dict[str, str]) -> Measurand | None:
+    """The same by other names; None where it needs one that there is not."""
+
+    def renamed(value: Any) -> Any:
+        if isinstance(value, (list, tuple)):
+            return [renamed(each) for each in value]
+        return names[value]
+
+    try:
+        features = [
+            {key: renamed(value) for key, value in each.model_dump(exclude_none=True).items()}
+            for each in measurand.features
+        ]
+    except KeyError:
+        return None
+    said = {"name": measurand.name, "kind": measurand.kind, "tolerance": measurand.tolerance.plus}
+    return Measurand(**said, features=features)
+
+
+def sigmas(exact: Path, tessellated: Path) -> dict[str, float]:
+    """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene, look = new_scene.written(exact, Path(folder) / "exact.toml", "mm")
+        other, _ = new_scene.written(tessellated, Path(folder) / "mesh.toml", "mm")
+    if look is None:
+        return {}
+    called = names(scene.solid, other.solid)
+    pairs_ = [(each, told_by(each, called)) for each in look.measurands]
+    known = [(one, two) for one, two in pairs_ if two is not None]
+    if not known:
+        return {}
+    camera = scene.camera
+    predicted = [
+        planner.predict(each.with_(camera=camera, measurands=asked), look.sensor, look.light).measurands
+        for each, asked in ((scene, [one for one, _ in known]), (other, [two for _, two in known]))
+    ]
+    return {
+        one.name: float(np.sqrt(two.variance_object / one.variance_object))
+        for one, two in zip(*predicted, strict=True)
+        if one.variance_object and two.variance_object
+    }
+
+
 def pairs(
     steps: Annotated[Path, typer.Argument(help="Folder of STEP files.")],
     meshes: Annotated[Path, typer.Argument(help="Folder of STL files of the same names.")],
     only: Annotated[str, typer.Option(help="Names that begin so.")] = "",
+    sigma: Annotated[bool, typer.Option(help="Compare predicted standard deviations, too.")] = False,
     details: Annotated[bool, typer.Option(help="Where what is missed and what is false is.")] = False,
 ) -> None:
     """STEP and STL of the same parts: straight edges and circles that both offer, beside those that there are."""
@@ -158,6 +228,11 @@ def pairs(
             totals["refused"] += 1
             continue
         print(pair, flush=True)
+        if sigma and pair.same and not pair.placed:
+            ratios = sigmas(exact, tessellated)
+            print("    sigma of the mesh over that of STEP: " + ", ".join(f"{n} {r:.4f}" for n, r in ratios.items()))
+            totals["sigma compared"] += len(ratios)
+            totals["sigma same"] += sum(abs(ratio - 1) <= SIGMA for ratio in ratios.values())
         if details:
             print(_details(pair))
         totals += _counted(pair)
@@ -180,6 +255,8 @@ def _total(totals: Counter[str]) -> str:
         counts = [totals[f"{name} {key}"] for key in ("matched", "there", "false")]
         told = name.replace("step_", "STEP ") if name.startswith("step") else f"STL {name}"
         lines.append("{}: {} of {} offered, {} that are none".format(told, *counts))
+    if totals["sigma compared"]:
+        lines.append(f"sigma within {SIGMA:.0%}: {totals['sigma same']} of {totals['sigma compared']}")
     return "\n".join(lines)
 
 
