@@ -132,7 +132,7 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])
     plain = _assembled(mesh, group, used, pieces, loops, circular)
-    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"])
+    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
 
 
 def _told(told: Told, mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], circular: list[Rim]) -> Facets:

@@ -105,7 +105,8 @@ class StepPart:
             As `mesh.solid`.
         """
         body = trimesh.Trimesh(self.triangles.reshape(-1, 3), np.arange(self.triangles.size // 3).reshape(-1, 3))
-        found = mesh.solid(body, self._facets)
+        with np.errstate(all="ignore"):  # triangles of no area
+            found = mesh.solid(body, self._facets)
         return replace(found, face_names=self._face_names(found), circles=self._exact(found))
 
     def _facets(self, ends: np.ndarray, sources: np.ndarray, of_faces: np.ndarray) -> Facets:
