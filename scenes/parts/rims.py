@@ -50,19 +50,30 @@ def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, no
     for a, b in halves.tolist():
         if (b, a) not in there:
             after.setdefault(a, []).append(b)
+    loops = [tuple(v for v in loop if kept[v]) for loop in _simple(after)]
+    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+
+
+def _simple(after: dict[int, list[int]]) -> list[list[int]]:
+    """Loops along the ways from each vertex, which are used up; two that touch in a vertex are told apart there."""
     loops = []
     while after:
-        loop, here = [], next(iter(after))
-        while here in after:
-            loop.append(here)
+        path = [next(iter(after))]
+        at = {path[0]: 0}
+        while path[-1] in after:
+            here = path[-1]
             onward = after[here].pop()
             if not after[here]:
                 del after[here]
-            here = onward
-            if here == loop[0]:
-                break
-        loops.append(tuple(v for v in loop if kept[v]))
-    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+            if onward in at:
+                loops.append(path[at[onward] :])
+                for vertex in path[at[onward] + 1 :]:
+                    del at[vertex]
+                del path[at[onward] + 1 :]
+            else:
+                at[onward] = len(path)
+                path.append(onward)
+    return loops
 
 
 def _area(points: np.ndarray, normal: np.ndarray) -> float:
