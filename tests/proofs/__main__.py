@@ -16,6 +16,7 @@ from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
 from tests.proofs.mixed import mixed
+from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
 from tests.proofs.processed import processed
@@ -36,6 +37,7 @@ app.command()(large)
 app.command()(lights)
 app.command()(limbs)
 app.command()(mixed)
+app.command()(pairs)
 app.command()(parts)
 app.command()(photographs)
 app.command()(processed)
