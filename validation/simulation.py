@@ -1,0 +1,208 @@
+"""The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
+
+Light between faces is the whole render less one of direct light. With all reflectances known to a part d, it is known
+to d (1 + r), r the light between faces over direct light: a geometric series, cut off at r = 1. Lights that stand
+elsewhere, a floor and faces of other materials change the direct light, which is rendered anew with the same random
+numbers; of plain scenes the closed form of the bias tells what lights do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+import measure
+import render
+from imaging.light.appearance import is_plain
+from imaging.models.bias import bias
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
+from measure import Correction, Images
+from measure.correction import RENDERING, TEXTURE
+from measure.propagation import PropagatedValues
+from render import Quality, Tolerance
+from scenes import Picture, Pose, Scene
+from validation.remeasured import Method
+
+REFLECTANCE, LIGHT = "reflectance", "light_place"
+_BETWEEN = "interreflection"
+_LEAST, _MOST = 2, 6  # renders of other rays
+_QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
+_SERIES = 1.0  # largest light between faces over direct light that the geometric series is taken at
+_LEAST_SINE = 1e-3  # of a light's polar angle
+
+
+@dataclass(frozen=True)
+class How:
+    """How noise-free images are made: as `render.image` takes it."""
+
+    quality: Quality = Quality()
+    variant: str | None = None
+    effects: str = "auto"
+    tolerance: Tolerance = Tolerance()
+
+    def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
+        """With rays of another seed, counted from the quality's."""
+        return self._rendered(picture, self.effects, seed)
+
+    def active(self, picture: Picture) -> frozenset[str]:
+        """The effects that are simulated."""
+        return render.choose(picture.scene, self.effects, self.tolerance, picture).active
+
+    def direct(self, picture: Picture, active: frozenset[str]) -> np.ndarray:
+        """Without light between faces."""
+        return self._rendered(picture, active - {_BETWEEN}, 0)
+
+    def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
+        quality = replace(self.quality, seed=self.quality.seed + seed)
+        return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
+
+
+def independent(
+    picture: Picture,
+    methods: tuple[Method, ...],
+    beside: np.ndarray,
+    propagated: tuple[PropagatedValues, ...],
+    how: How = How(),
+) -> tuple[Correction, ...]:
+    """Corrections by each method from a render of other rays than a given one, whose noisy copies are corrected.
+
+    Parameters
+    ----------
+    beside : ndarray, shape (height, width)
+        The noise-free image that is measured.
+    propagated : tuple of PropagatedValues
+        What `measure.propagate` says of it, by method.
+    """
+    other = how.image(picture, 1)
+    images = _completed(picture, (other,), (beside,), how)
+    return tuple(
+        measure.correction(images, picture, each.locator, each.threshold, told)
+        for each, told in zip(methods, propagated, strict=True)
+    )
+
+
+@lru_cache(maxsize=64)
+def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
+    """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
+
+    Renders of other rays are added until their noise is below a tenth of sigma or a hundredth of the tolerance, six at
+    most.
+    """
+    alike = picture.with_scene(_without_textures(picture.scene))
+    renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
+    images = _completed(alike, renders, (), how)
+    found = measure.correction(images, alike, method.locator, method.threshold)
+    while len(renders) < _MOST and not _is_quiet(found):
+        renders = (*renders, how.image(alike, len(renders)))
+        images = replace(images, renders=renders)
+        found = measure.correction(images, alike, method.locator, method.threshold)
+    if alike is picture or alike.scene == picture.scene:
+        return found
+    spread = texture_errors(Pictures.of(picture)).variances
+    image, plane = (np.where(np.isfinite(each), np.sqrt(each), np.inf) for each in spread)
+    return replace(
+        found,
+        sources={**found.sources, TEXTURE: plane},
+        sources_image={**found.sources_image, TEXTURE: image},
+    )
+
+
+def _is_quiet(found: Correction) -> bool:
+    tolerances = np.array([0.0 if q.tolerance is None else q.tolerance.half for q in found.quantities])
+    limit = np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
+    noise = found.sources[RENDERING]
+    return bool((noise <= limit)[np.isfinite(noise) & np.isfinite(found.sigma)].all())
+
+
+def _without_textures(scene: Scene) -> Scene:
+    kept = tuple(each for each in scene.textures if each.kind != "statistical")
+    return scene if kept == scene.textures else scene.tried(textures=kept)
+
+
+def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[np.ndarray, ...], how: How) -> Images:
+    """With the images, or numbers, of what the scene is not sure of."""
+    if is_plain(picture.scene):
+        known = {LIGHT: _light_in_closed_form(picture)}
+        parts = tuple(_of_other_faces(picture))
+        changed = {REFLECTANCE: _direct_steps(picture, parts, renders[0], how)} if parts else {}
+        return Images(renders, changed, beside, known)
+    first, active, u = renders[0], how.active(picture), _u(picture.scene.uncertainty.reflectance)
+    direct = how.direct(picture, active)
+    reflected = list(_direct_steps(picture, tuple(_of_other_faces(picture)), first, how, direct))
+    if _BETWEEN in active:
+        dark = picture.scene.noise.dark_level
+        lent, lit = first - direct, np.maximum(direct - dark, np.finfo(float).tiny)
+        reflected.append(first + u * lent * (1 + np.clip(lent / lit, 0, _SERIES)))
+    lights = tuple(_with_lights_moved(picture))
+    changed = {REFLECTANCE: tuple(reflected), LIGHT: _direct_steps(picture, lights, first, how, direct)}
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside)
+
+
+def _direct_steps(
+    picture: Picture, others: tuple[Picture, ...], first: np.ndarray, how: How, direct: np.ndarray | None = None
+) -> tuple[np.ndarray, ...]:
+    """The first render with the direct light of other pictures in the place of this one's."""
+    if not others:
+        return ()
+    active = how.active(picture)
+    here = how.direct(picture, active) if direct is None else direct
+    return tuple(first + how.direct(other, active) - here for other in others)
+
+
+def _of_other_faces(picture: Picture) -> Iterator[Picture]:
+    """The picture with the floor, and with each material of some faces, reflecting less by its standard uncertainty."""
+    scene, part = picture.scene, _u(picture.scene.uncertainty.reflectance)
+    if scene.floor is not None and scene.floor.reflectance > 0:
+        floor = scene.floor.tried(reflectance=(1 - part) * scene.floor.reflectance)
+        yield picture.with_scene(scene.tried(floor=floor))
+    for i, each in enumerate(scene.materials):
+        dimmed = each.dimmed(part)
+        if dimmed is not None:
+            yield picture.with_scene(scene.tried(materials=(*scene.materials[:i], dimmed, *scene.materials[i + 1 :])))
+
+
+def _with_lights_moved(picture: Picture) -> Iterator[Picture]:
+    """The picture with each light moved by its standard uncertainty: away, along the meridian, and across it."""
+    u = _u(picture.scene.uncertainty.light_place)
+    for i, light in enumerate(picture.scene.lights):
+        if light.faces_sensor or u == 0:
+            continue
+        yield picture.with_scene(_with_light(picture.scene, i, light.tried(distance=(1 + u) * light.distance)))
+        for pose in _beside(picture.lights[i], math.degrees(u)):
+            yield replace(picture, lights=(*picture.lights[:i], pose, *picture.lights[i + 1 :]))
+
+
+def _with_light(scene: Scene, which: int, light) -> Scene:
+    if scene.light is not None:
+        return scene.tried(light=light)
+    several = scene.several_lights
+    return scene.tried(several_lights=(*several[:which], light, *several[which + 1 :]))
+
+
+def _beside(pose: Pose, step: float) -> Iterator[Pose]:
+    """Poses a step away, degrees, along the meridian and across it."""
+    yield Pose(pose.polar_deg + step if pose.polar_deg + step <= 180 else pose.polar_deg - step, pose.azimuth_deg)
+    sine = abs(math.sin(math.radians(pose.polar_deg)))
+    if sine < _LEAST_SINE:
+        yield Pose(step if pose.polar_deg < 90 else 180 - step, pose.azimuth_deg + 90)
+    else:
+        yield Pose(pose.polar_deg, pose.azimuth_deg + step / sine)
+
+
+def _light_in_closed_form(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
+    """Standard uncertainties (M,) of the classic locators' bias by lights' places, in the object and in the image."""
+    here, found = bias(Pictures.of(picture)), []
+    for other in _with_lights_moved(picture):
+        moved = bias(Pictures.of(other))
+        found.append((moved.values_object - here.values_object, moved.values - here.values))
+    squares = np.square(found).sum(0) if found else np.zeros((2, len(picture.scene.quantities)))
+    return tuple(np.sqrt(squares.reshape(2, -1)))
+
+
+def _u(told) -> float:
+    return 0.0 if told is None else told.u
