@@ -17,7 +17,7 @@ from measure.find.ellipse import find_ellipse
 from measure.find.search import find
 from measure.fitting.fit import fit
 from measure.fitting.result import Fit
-from measure.measurands import Measurements, measure, measure_by
+from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
@@ -52,6 +52,7 @@ __all__ = [
     "bound",
     "calibrate_camera",
     "chessboard",
+    "corrected",
     "correction",
     "distance",
     "distances",

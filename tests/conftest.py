@@ -1,7 +1,10 @@
 import os
+import tempfile
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: each of the tests' processes has one core
+_CACHE = tempfile.TemporaryDirectory(prefix="ice-vision-")
+os.environ["XDG_CACHE_HOME"] = _CACHE.name  # and nothing that a user has kept
 
 import numpy as np
 import pytest

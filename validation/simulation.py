@@ -33,7 +33,6 @@ _BETWEEN = "interreflection"
 _LEAST, _MOST = 2, 6  # renders of other rays
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _SERIES = 1.0  # largest light between faces over direct light that the geometric series is taken at
-_LEAST_SINE = 1e-3  # of a light's polar angle
 
 
 @dataclass(frozen=True)
@@ -187,11 +186,10 @@ def _with_light(scene: Scene, which: int, light) -> Scene:
 def _beside(pose: Pose, step: float) -> Iterator[Pose]:
     """Poses a step away, degrees, along the meridian and across it."""
     yield Pose(pose.polar_deg + step if pose.polar_deg + step <= 180 else pose.polar_deg - step, pose.azimuth_deg)
-    sine = abs(math.sin(math.radians(pose.polar_deg)))
-    if sine < _LEAST_SINE:
-        yield Pose(step if pose.polar_deg < 90 else 180 - step, pose.azimuth_deg + 90)
-    else:
-        yield Pose(pose.polar_deg, pose.azimuth_deg + step / sine)
+    (p, a), s = np.radians(list(pose)), math.radians(step)
+    here = np.array([math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)])
+    x, y, z = math.cos(s) * here + math.sin(s) * np.array([-math.sin(a), math.cos(a), 0.0])
+    yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
 
 
 def _light_in_closed_form(picture: Picture) -> tuple[np.ndarray, np.ndarray]:

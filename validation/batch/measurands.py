@@ -182,7 +182,8 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
 def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:
     name, kind, unit = texts[record["about"]]
     known = {
-        key: None if np.isnan(record[key]) else float(record[key]) for key in ("empirical", "ratio", "bias", "texture", "u_bias")
+        key: None if np.isnan(record[key]) else float(record[key])
+        for key in ("empirical", "ratio", "bias", "texture", "u_bias")
     }
     known["u"] = None if known["u_bias"] is None else float(np.hypot(np.sqrt(record["predicted"]), known["u_bias"]))
     return JudgedMeasurand(
