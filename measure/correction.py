@@ -81,9 +81,9 @@ class Correction:
     def status_of(self, found: Sequence[str]) -> list[str]:
         """The same of values whose statuses as measured are ``found``, (M,).
 
-        Textures scatter by what a closed form tells, and count in `u_bias` alone.
+        Textures scatter by what a closed form tells, and where it does, count in `u_bias` alone.
         """
-        doubts = {name: u for name, u in self.sources.items() if name != TEXTURE}
+        doubts = {name: np.where(np.isfinite(u) & (name == TEXTURE), 0.0, u) for name, u in self.sources.items()}
         told = zip(found, self.simulated, _together(doubts, self.bias), self.sigma, self.quantities, strict=True)
         return [
             status_corrected(str(state), simulated, float(u), float(sigma), _half(quantity))

@@ -1,8 +1,9 @@
 """Corrections kept on disk, so that the next picture of the same setting waits for no render.
 
-One small JSON file a picture and method, in the user's folder for what can be made anew: ``$XDG_CACHE_HOME/ice-vision``,
-``~/.cache/ice-vision`` where that is not set. Its name is a digest of all that the numbers depend on, the program's code
-included. A file that is not as it was written is made anew; a folder that cannot be written to keeps nothing.
+One small JSON file a picture and method, in the user's folder for what can be made anew: ``ice-vision`` in
+``$XDG_CACHE_HOME``, or in ``~/.cache`` where that is not set. Its name is a digest of all that the numbers depend on,
+the program's code included. A file that is not as it was written is made anew; a folder that cannot be written to keeps
+nothing.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def correction(picture: Picture, method: Method, how: How = How()) -> Correction
 
 def folder() -> Path:
     """Where they are kept."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    return Path(given if os.path.isabs(given) else Path.home() / ".cache") / "ice-vision" / "corrections"
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (given if given.is_absolute() else Path.home() / ".cache") / "ice-vision" / "corrections"
 
 
 def _digest(picture: Picture, method: Method, how: How) -> str:
@@ -134,7 +135,7 @@ def _write(file: Path, found: Correction) -> None:
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         part.write_text(json.dumps(_plain(facts)), encoding="utf-8")
-        os.replace(part, file)
+        part.replace(file)
 
 
 def _plain(value):

@@ -26,6 +26,7 @@ from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from render import Quality, Tolerance
 from scenes import Picture, Pose, Scene
+from scenes.materials import Brdf
 from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = "reflectance", "light_place"
@@ -129,7 +130,7 @@ def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[
         known = {LIGHT: _light_in_closed_form(picture)}
         parts = tuple(_of_other_faces(picture))
         changed = {REFLECTANCE: _direct_steps(picture, parts, renders[0], how)} if parts else {}
-        return Images(renders, changed, beside, known)
+        return Images(renders, changed, beside, known | _of_unknown_kinds(picture))
     first, active, u = renders[0], how.active(picture), _u(picture.scene.uncertainty.reflectance)
     direct = how.direct(picture, active)
     reflected = list(_direct_steps(picture, tuple(_of_other_faces(picture)), first, how, direct))
@@ -139,7 +140,7 @@ def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[
         reflected.append(first + u * lent * (1 + np.clip(lent / lit, 0, _SERIES)))
     lights = tuple(_with_lights_moved(picture))
     changed = {REFLECTANCE: tuple(reflected), LIGHT: _direct_steps(picture, lights, first, how, direct)}
-    return Images(renders, {name: some for name, some in changed.items() if some}, beside)
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside, _of_unknown_kinds(picture))
 
 
 def _direct_steps(
@@ -160,9 +161,17 @@ def _of_other_faces(picture: Picture) -> Iterator[Picture]:
         floor = scene.floor.tried(reflectance=(1 - part) * scene.floor.reflectance)
         yield picture.with_scene(scene.tried(floor=floor))
     for i, each in enumerate(scene.materials):
-        dimmed = each.dimmed(part)
+        dimmed = each.dimmed(part) if isinstance(each, Brdf) else None
         if dimmed is not None:
             yield picture.with_scene(scene.tried(materials=(*scene.materials[:i], dimmed, *scene.materials[i + 1 :])))
+
+
+def _of_unknown_kinds(picture: Picture) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Infinite where a material of some faces is of a kind that does not say how it reflects less."""
+    if all(isinstance(each, Brdf) and each.dimmed(0.5) is not None for each in picture.scene.materials):
+        return {}
+    unknown = np.full(len(picture.scene.quantities), np.inf)
+    return {REFLECTANCE: (unknown, unknown)}
 
 
 def _with_lights_moved(picture: Picture) -> Iterator[Picture]:

@@ -74,8 +74,8 @@ def test_validate_judges_each(tmp_path):
     for setting in document["settings"]:
         assert [each["name"] for each in setting["measurands"]] == NAMES
         for each in setting["measurands"]:
-            assert {"kind", "unit", "value", "predicted", "empirical", "n", "failed", "ratio", "ratio_interval", "bias", "u",
-                    "u_bias", "correction", "bound", "status"} <= each.keys()  # fmt: skip
+            assert {"kind", "unit", "value", "predicted", "empirical", "n", "failed", "ratio", "ratio_interval", "bias",
+                    "u", "u_bias", "correction", "bound", "status"} <= each.keys()  # fmt: skip
             assert each["ratio"] == pytest.approx(each["empirical"] / each["predicted"])
             assert each["bound"] < each["predicted"]  # margin: a bound is below any variance, by its kind
             assert (each["n"], each["failed"]) == (60, 0)

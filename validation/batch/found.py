@@ -43,9 +43,8 @@ class Found:
     def scatter(self, true: float) -> dict[str, float]:
         """Variance and mean error of the corrected values (NaN of too little), number of images, of failed ones."""
         sample = Sample.of(self.distances)
-        return {
-            "empirical": sample.variance, "bias": sample.mean - self.correction - true, "n": sample.n, "failed": sample.failed,
-        }  # fmt: skip
+        left = sample.mean - self.correction - true
+        return {"empirical": sample.variance, "bias": left, "n": sample.n, "failed": sample.failed}
 
 
 def ratios(empirical: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -63,7 +63,8 @@ class JudgedMeasurand:
 
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
     ``ratio`` and its interval, ``bias`` (mean of the corrected values less the object's), ``correction``, ``u_bias``,
-    ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a value is told with. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a value is told with.
+    ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
     ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
     """
 
@@ -115,6 +116,9 @@ _NUMBERS = (
 _RECORD = np.dtype(
     [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
 )
+
+
+_PLAIN = ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction")
 
 
 class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
@@ -190,7 +194,7 @@ def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasura
         name=name, kind=kind, unit=unit, n=int(record["n"]), failed=int(record["failed"]),
         status=STATUSES[record["status"]],
         ratio_interval=None if known["ratio"] is None else (float(record["low"]), float(record["high"])),
-        **{key: float(record[key]) for key in ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction")},
+        **{key: float(record[key]) for key in _PLAIN},
         **known,
     )  # fmt: skip
 

@@ -25,6 +25,7 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     for k, quantity in enumerate(found.quantities):
         zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
         state, good, known = str(found.status[k]), bool(np.isfinite(value)), bool(np.isfinite(combined[k]))
+        told = combined[k] if known else spread
         rows.append({
             "name": quantity.name,
             "kind": quantity.kind,
@@ -38,7 +39,7 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
             "sigma_image": sigma_image[k] if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(float(value), float(combined[k] if known else spread), nominal, zone, status=state),
+            "decision": zone and decide(float(value), float(told), nominal, zone, status=state),
             "status": state,
         })  # fmt: skip
     return plain(rows)
@@ -89,8 +90,8 @@ def _decision(row: dict[str, Any]) -> str:
 
 
 _CAPTION = (
-    "u: combined standard uncertainty, of noise and of the bias that a simulation tells and that is taken off; of noise "
-    "alone where there is no light to simulate. pass, fail: by more than 2 u within or beyond the tolerance (ISO "
+    "u: combined standard uncertainty, of noise and of the bias that a simulation tells and that is taken off; of "
+    "noise alone where there is no light to simulate. pass, fail: by more than 2 u within or beyond the tolerance (ISO "
     "14253-1); only a value whose status is ok is decided."
 )
 
