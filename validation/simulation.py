@@ -1,17 +1,17 @@
 """The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
 
-Light between faces is the whole render less one of direct light. With all reflectances known to a part d, it is known
-to d (1 + r), r the light between faces over direct light: a geometric series, cut off at r = 1. Lights that stand
-elsewhere, a floor and faces of other materials change the direct light, which is rendered anew with the same random
-numbers; of plain scenes the closed form of the bias tells what lights do.
+Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
+rays, and subtracted from the same render of the scene as it is, whose paths are the same ones. Lights that stand
+elsewhere change the direct light, which is rendered anew alone; of plain scenes the closed form of the bias tells what
+lights do.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -33,7 +33,7 @@ REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
 _LEAST, _MOST = 2, 6  # renders of other rays
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
-_SERIES = 1.0  # largest light between faces over direct light that the geometric series is taken at
+_FEW, _RANDOM = 16, 4  # rays of a fine pixel that an edge crosses, and of others, in renders that are subtracted
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,11 @@ class How:
     def active(self, picture: Picture) -> frozenset[str]:
         """The effects that are simulated."""
         return render.choose(picture.scene, self.effects, self.tolerance, picture).active
+
+    def roughly(self, picture: Picture) -> np.ndarray:
+        """With few rays, for differences of renders whose paths are the same."""
+        few = {"samples": 1, "edge_samples": _FEW, "random_samples": _RANDOM}
+        return replace(self, quality=replace(self.quality, **few)).image(picture)
 
     def direct(self, picture: Picture, active: frozenset[str]) -> np.ndarray:
         """Without light between faces."""
@@ -126,37 +131,32 @@ def _without_textures(scene: Scene) -> Scene:
 
 def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[np.ndarray, ...], how: How) -> Images:
     """With the images, or numbers, of what the scene is not sure of."""
+    first, known = renders[0], _of_unknown_kinds(picture)
+    changed = {REFLECTANCE: _steps(first, how.roughly(picture), map(how.roughly, _of_other_surfaces(picture)))}
     if is_plain(picture.scene):
-        known = {LIGHT: _light_in_closed_form(picture)}
-        parts = tuple(_of_other_faces(picture))
-        changed = {REFLECTANCE: _direct_steps(picture, parts, renders[0], how)} if parts else {}
-        return Images(renders, changed, beside, known | _of_unknown_kinds(picture))
-    first, active, u = renders[0], how.active(picture), _u(picture.scene.uncertainty.reflectance)
-    direct = how.direct(picture, active)
-    reflected = list(_direct_steps(picture, tuple(_of_other_faces(picture)), first, how, direct))
-    if _BETWEEN in active:
-        dark = picture.scene.noise.dark_level
-        lent, lit = first - direct, np.maximum(direct - dark, np.finfo(float).tiny)
-        reflected.append(first + u * lent * (1 + np.clip(lent / lit, 0, _SERIES)))
-    lights = tuple(_with_lights_moved(picture))
-    changed = {REFLECTANCE: tuple(reflected), LIGHT: _direct_steps(picture, lights, first, how, direct)}
-    return Images(renders, {name: some for name, some in changed.items() if some}, beside, _of_unknown_kinds(picture))
+        known |= {LIGHT: _light_in_closed_form(picture)}
+    else:
+        direct = partial(how.direct, active=how.active(picture))
+        changed[LIGHT] = _steps(first, direct(picture), map(direct, _with_lights_moved(picture)))
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
 
 
-def _direct_steps(
-    picture: Picture, others: tuple[Picture, ...], first: np.ndarray, how: How, direct: np.ndarray | None = None
-) -> tuple[np.ndarray, ...]:
-    """The first render with the direct light of other pictures in the place of this one's."""
-    if not others:
-        return ()
-    active = how.active(picture)
-    here = how.direct(picture, active) if direct is None else direct
-    return tuple(first + how.direct(other, active) - here for other in others)
+def _steps(first: np.ndarray, here: np.ndarray, others: Iterable[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """The first render with what other pictures differ by from this one, both of the same random numbers."""
+    return tuple(first + (other - here) for other in others)
 
 
-def _of_other_faces(picture: Picture) -> Iterator[Picture]:
-    """The picture with the floor, and with each material of some faces, reflecting less by its standard uncertainty."""
+def _of_other_surfaces(picture: Picture) -> Iterator[Picture]:
+    """The picture with each material, and the floor, reflecting less by its standard uncertainty.
+
+    One material of one convex body is not among them: it changes nothing but the scale of brightness.
+    """
     scene, part = picture.scene, _u(picture.scene.uncertainty.reflectance)
+    if part == 0 or (is_plain(scene) and not scene.materials):
+        return
+    dimmed = scene.material.dimmed(part)
+    if dimmed is not None:
+        yield picture.with_scene(scene.tried(material=dimmed))
     if scene.floor is not None and scene.floor.reflectance > 0:
         floor = scene.floor.tried(reflectance=(1 - part) * scene.floor.reflectance)
         yield picture.with_scene(scene.tried(floor=floor))
@@ -167,8 +167,10 @@ def _of_other_faces(picture: Picture) -> Iterator[Picture]:
 
 
 def _of_unknown_kinds(picture: Picture) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Infinite where a material of some faces is of a kind that does not say how it reflects less."""
-    if all(isinstance(each, Brdf) and each.dimmed(0.5) is not None for each in picture.scene.materials):
+    """Infinite where a material that matters is of a kind that does not say how it reflects less."""
+    scene = picture.scene
+    used = (*scene.materials, *((scene.material,) if scene.materials or not is_plain(scene) else ()))
+    if all(isinstance(each, Brdf) and each.dimmed(0.5) is not None for each in used):
         return {}
     unknown = np.full(len(picture.scene.quantities), np.inf)
     return {REFLECTANCE: (unknown, unknown)}

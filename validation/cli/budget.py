@@ -45,7 +45,9 @@ def budget_command(
     sensor: Pair = None,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
     p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95,
-    render: Annotated[bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")] = False,
+    render: Annotated[
+        bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")
+    ] = False,
     monte_carlo: Annotated[
         bool, typer.Option("--monte-carlo", help="Draw all inputs, and compare as JCGM 101 clause 8 asks.")
     ] = False,
