@@ -5,6 +5,7 @@ Only those in `MEASURED` come with a value, and only what `is_trusted` may be de
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from typing import Any
@@ -47,13 +48,14 @@ REMEDIES = {
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
-    CLUTTER: "move lamp or sensor (`ice plan`), or measure by `arrangement`, which knows what lies around an edge",
+    CLUTTER: "move lamp or sensor (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
     OK: "",
 }
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
 MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+OF_SIGMA, OF_TOLERANCE = 1.0, 0.1  # what u(bias) may be of noise, and of the tolerance to one side
 
 
 def worst(*statuses: str) -> str:
@@ -80,6 +82,40 @@ def is_trusted(status: Any) -> Any:
     (True, False)
     """
     return status == OK
+
+
+def corrected(
+    found: str, simulated: str, u_bias: float, sigma: float, tolerance: float = 0.0, *, modelled: bool = True
+) -> str:
+    """Status of a value whose bias a simulation told and that was taken off; the one rule for all that do.
+
+    What lies around an edge biases a simulated picture as it does the real one, so ``clutter`` is what the correction
+    leaves: ``ok`` where its standard uncertainty is small beside the noise or the tolerance, ``clutter`` where not.
+
+    Parameters
+    ----------
+    found, simulated : str
+        Of the value as measured, and in the simulated noise-free picture.
+    u_bias, sigma : float
+        Standard uncertainties (not variances) of the correction and by noise, of one unit; infinite: not known.
+    tolerance : float
+        To one side, of the same unit; 0 where there is none.
+    modelled : bool
+        Whether ``misfit`` of the picture may be what the simulated one has, too.
+
+    Examples
+    --------
+    >>> corrected("clutter", "clutter", 0.5, 1.0), corrected("clutter", "clutter", 2.0, 1.0)
+    ('ok', 'clutter')
+    >>> corrected("ok", "short", 0.5, 1.0), corrected("misfit", "ok", 0.0, 1.0), corrected("misfit", "misfit", 0.0, 1.0)
+    ('short', 'misfit', 'ok')
+    """
+    if simulated not in MEASURED or found not in (OK, CLUTTER, MISFIT):
+        return worst(found, simulated) if simulated not in MEASURED else found
+    if found == MISFIT and not (modelled and simulated == MISFIT):
+        return MISFIT
+    small = math.isfinite(u_bias) and u_bias <= max(OF_SIGMA * sigma, OF_TOLERANCE * tolerance)
+    return OK if small else CLUTTER
 
 
 def doubt(status: str) -> str:

@@ -22,7 +22,15 @@ _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
 _LEAST_BENDS = 4
 _WIDER = 5.0  # than its neighbours: the steps of a curve may be unequal
 _TANGENT = 1.25  # of the largest bend between facets: what continues a curve smoothly
+_TANGENT_BEND = np.radians(1.0)  # faces that bend by less are joined smoothly, whatever they stand for
+_SLIGHT = np.radians(12.0)
+_TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be unequal
+_FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
+_LAST = 1.5  # widths of the facet before
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
+_LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
+_COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
+_SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a place
 _MANY = 64  # bends of one face; a plane with more is no facet
 
 
@@ -42,6 +50,11 @@ class Facets:
     smooth: np.ndarray
     rim: np.ndarray
 
+    @property
+    def kinds(self) -> np.ndarray:
+        """``smooth``, ``rim`` or ``sharp`` of each chain, shape (C,)."""
+        return np.where(self.smooth, "smooth", np.where(self.rim, "rim", "sharp"))
+
 
 def facets(
     vertices: np.ndarray, chains: list[Chain], normals: np.ndarray, areas: np.ndarray, rims: Iterable[Rim]
@@ -59,16 +72,21 @@ def facets(
     """
     shape = _Shape.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
-    linked = _linked(shape, ~around & ~edging)
+    linked, crossed = _linked(shape, ~around & ~edging)
+    slight = shape.slight(vertices) & ~edging
+    linked |= slight
     inner = linked.copy()
     facet = np.zeros(len(normals), bool)
     facet[shape.faces[around].ravel()] = True
-    facet[_crossed(shape, linked)] = True
+    facet[crossed] = True
     inner &= facet[shape.faces].all(1)
-    smooth = around | inner | _continued(shape, linked & ~inner, inner)
+    smooth = around | slight | inner | _continued(shape, linked & ~inner, inner)
+    smooth |= _dangling(shape, ~smooth)
+    facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, _components(len(normals), joins), -1)
-    return Facets(region, smooth, edging | _curved(shape, region, ~smooth & ~edging))
+    open_ = ~smooth & ~edging
+    return Facets(region, smooth, edging | _curved(shape, region, open_) | _passing(shape, region, open_))
 
 
 @dataclass(frozen=True)
@@ -93,10 +111,18 @@ class _Shape:
         bend = np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
         return cls(ends, faces, np.array([chain[2] for chain in chains], bool), along, length, bend, areas)
 
-    def beyond(self, chain: int, face: int) -> int:
-        """The face on the other side of a chain."""
-        one, two = self.faces[chain]
-        return two if one == face else one
+    @property
+    def height(self) -> np.ndarray:
+        """Of a curve over its chords (sagitta), were each chain a bend of one, shape (C,)."""
+        return self.bend * self.areas[self.faces].min(1) / self.length / 8
+
+    def slight(self, vertices: np.ndarray) -> np.ndarray:
+        """Chains at which faces bend by nothing that counts, but for what single precision makes of slivers; (C,)."""
+        longest = np.zeros(len(self.areas))
+        for side in (0, 1):
+            np.maximum.at(longest, self.faces[:, side], self.length)
+        unsure = _SINGLE * np.abs(vertices).max() * longest / self.areas
+        return self.bend - unsure[self.faces].sum(1) <= _TANGENT_BEND
 
 
 def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
@@ -115,41 +141,134 @@ def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.n
     return around, edging & ~around
 
 
-def _linked(shape: _Shape, free: np.ndarray) -> np.ndarray:
-    """Chains of which at least four follow each other across narrow faces, bending alike; bool, shape (C,)."""
-    links = np.array(list(_links(shape, free)), int).reshape(-1, 3)
-    group = _components(len(shape.bend), links[:, :2])
-    many = np.bincount(group) >= _LEAST_BENDS
-    return many[group] & free
+def _linked(shape: _Shape, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Chains of which at least four follow each other across narrow faces, bending alike (bool, (C,)); these faces."""
+    for _ in range(2):  # what polygons there are is told from the curves found first
+        links = _links(shape, free)
+        group = _components(len(shape.bend), links[:, :2])
+        linked = (np.bincount(group) >= _LEAST_BENDS)[group] & free
+        polygonal = linked & (_polygonal(shape, group, linked) | _standing_out(shape, links[:, :2]))
+        if not polygonal.any():
+            break
+        free = free & ~polygonal
+    linked &= free
+    return linked, links[linked[links[:, :2]].all(1), 2]
 
 
-def _links(shape: _Shape, free: np.ndarray):
-    """Pairs of chains that follow each other across a facet, and that face."""
-    at: dict[int, list[int]] = {}
-    for i in np.flatnonzero(free & (shape.bend <= _BEND)):
-        for face in shape.faces[i]:
-            at.setdefault(int(face), []).append(int(i))
-    for face, chains in at.items():
-        if len(chains) > _MANY:
-            continue
-        for i, j in combinations(chains, 2):
-            width = shape.areas[face] / max(shape.length[i], shape.length[j])
-            others = [shape.areas[shape.beyond(k, face)] / shape.length[k] for k in (i, j)]
-            if shape.convex[i] == shape.convex[j] and width <= _WIDER * max(others):
-                yield i, j, face
+def _polygonal(shape: _Shape, group: np.ndarray, linked: np.ndarray) -> np.ndarray:
+    """Which chains are those of polygons, among curves that are divided much more finely; bool, shape (C,).
+
+    By the height of a curve over its chords (sagitta), by which files are divided: of a chain against the others of its
+    surface, of a coarse surface against the fine ones.
+    """
+    rows = np.flatnonzero(linked)
+    if not rows.size:
+        return np.zeros(linked.size, bool)
+    height = shape.height
+    number = np.unique(group[rows], return_inverse=True)[1]
+    order = np.lexsort([height[rows], number])
+    count = np.bincount(number)
+    first = np.cumsum(count) - count
+    middle, high = (height[rows][order][first + (part * count).astype(int)] for part in (0.5, 0.75))
+    largest = np.zeros(count.size)
+    np.maximum.at(largest, number, shape.bend[rows])
+    coarse = largest > _SLIGHT
+    limit = _COARSER * middle[~coarse].max(initial=0.0) if (~coarse).any() else np.inf
+    found = np.zeros(linked.size, bool)
+    alone = (height[rows] > 2 * _COARSER * high[number]) & (shape.bend[rows] > _SLIGHT)
+    found[rows] = alone | (coarse & (middle > limit))[number]
+    return found
 
 
-def _crossed(shape: _Shape, linked: np.ndarray) -> list[int]:
-    """The faces across which linked chains follow each other."""
-    return [face for *_, face in _links(shape, linked)]
+def _standing_out(shape: _Shape, links: np.ndarray) -> np.ndarray:
+    """Chains of which the height is larger by far than those of all that follow, and of the next; bool, shape (C,)."""
+    height = shape.height
+    here, there = np.concatenate([links, links[:, ::-1]]).T
+    order = np.lexsort([-height[there], here])
+    here, there = here[order], there[order]
+    start = np.flatnonzero(np.diff(here, prepend=-1))
+    second = np.minimum(start + 1, len(here) - 1)
+    highest, which, next_ = (np.zeros(len(height)) for _ in range(3))
+    highest[here[start]], which[here[start]] = height[there[start]], there[start]
+    next_[here[start]] = np.where(here[second] == here[start], height[there[second]], 0.0) * (second > start)
+    beyond = highest.copy()
+    np.maximum.at(beyond, here, np.where(which[there] == here, next_[there], highest[there]))
+    return height > 2 * _COARSER * beyond
+
+
+def _links(shape: _Shape, free: np.ndarray) -> np.ndarray:
+    """Pairs of chains that follow each other across a facet, and that face, (n, 3)."""
+    rows = np.flatnonzero(free & (shape.bend <= _BEND))
+    chain, face, other = np.tile(rows, 2), shape.faces[rows].T.ravel(), shape.faces[rows][:, ::-1].T.ravel()
+    pairs = _pairs_of(face)
+    one, two = chain[pairs].T
+    here = face[pairs[:, 0]]
+    width = shape.areas[here] / np.maximum(shape.length[one], shape.length[two])
+    beyond = (shape.areas[other] / shape.length[chain])[pairs].max(1)
+    alike = (shape.convex[one] == shape.convex[two]) | (np.maximum(shape.bend[one], shape.bend[two]) <= _SLIGHT)
+    return np.column_stack([one, two, here])[alike & (width <= _WIDER * beyond)]
+
+
+def _pairs_of(face: np.ndarray) -> np.ndarray:
+    """Pairs (n, 2) of places at which the same face stands; none of one that stands at more than `_MANY`."""
+    order = np.argsort(face, kind="stable")
+    count = np.bincount(face)
+    first = np.cumsum(count) - count
+    found = [np.zeros((0, 2), int)]
+    for size in range(2, _MANY + 1):
+        starts = first[count == size]
+        if starts.size:
+            one, two = np.triu_indices(size, 1)
+            found.append(np.stack([order[starts[:, None] + one].ravel(), order[starts[:, None] + two].ravel()], 1))
+    return np.concatenate(found)
 
 
 def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,)."""
+    """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,).
+
+    Beside the largest bend of a facet and the next: between triangles of a curve every second one is nearly flat.
+    """
     largest = np.zeros(len(shape.areas))
-    for i in np.flatnonzero(inner):
-        np.maximum.at(largest, shape.faces[i], shape.bend[i])
-    return ends & (shape.bend <= _TANGENT * largest[shape.faces].max(1))
+    for side in (0, 1):
+        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+    next_ = largest.copy()
+    for side in (0, 1):
+        np.maximum.at(next_, shape.faces[inner, side], largest[shape.faces[inner, 1 - side]])
+    most = np.where(shape.bend <= _SLIGHT, _TANGENT_SLIGHT, _TANGENT)
+    return ends & (shape.bend <= most * next_[shape.faces].max(1))
+
+
+def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
+    """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
+
+    Only those that bend no more than the facets of a curve do: an edge ends where others do.
+    """
+    left, size = edges.copy(), shape.ends.max(initial=0) + 1
+    within = np.bincount(shape.ends.ravel(), minlength=size) > 2
+    while True:
+        alone = (np.bincount(shape.ends[left].ravel(), minlength=size) == 1) & within
+        loose = left & alone[shape.ends].any(1) & (shape.bend <= _BEND)
+        if not loose.any():
+            return edges & ~left
+        left &= ~loose
+
+
+def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Faces at the end of a curved surface that are its last facets, as wide as the one before; bool, shape (F,)."""
+    width = shape.areas[shape.faces] / shape.length[:, None]
+    found = facet.copy()
+    bent = smooth & (shape.bend > _TANGENT_BEND) & (shape.bend <= _SLIGHT)
+    largest = np.zeros(len(shape.areas))
+    inner = bent & facet[shape.faces].all(1)
+    once = np.bincount(shape.faces[bent].ravel(), minlength=len(facet)) == 1
+    for side in (0, 1):
+        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+    for side in (0, 1):
+        here, before = shape.faces[:, side], shape.faces[:, 1 - side]
+        full = shape.bend >= _FULL * largest[before]
+        rows = bent & facet[before] & ~facet[here] & once[here] & full & (width[:, side] <= _LAST * width[:, 1 - side])
+        found[here[rows]] = True
+    return found
 
 
 def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
@@ -165,7 +284,34 @@ def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
         for i, j in combinations(chains, 2):
             one, two = (shape.along[k] * (1 if shape.ends[k][0] == end else -1) for k in (i, j))
             if -(one @ two) >= _CURVE * shape.length[i] * shape.length[j]:
-                found[[i, j]] = True
+                found[i] |= shape.length[i] <= _LONGER * shape.length[j]
+                found[j] |= shape.length[j] <= _LONGER * shape.length[i]
+    return found
+
+
+def _passing(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
+    """Which chains are pieces of a curved edge that passes through a vertex in which no other edge ends; bool, (C,).
+
+    The surfaces on both sides are then smooth there. A straight edge that continues a curve is much longer than pieces.
+    """
+    ends = shape.ends[open_].ravel()
+    two = np.bincount(ends, minlength=shape.ends.max(initial=0) + 1) == 2
+    order = np.argsort(ends, kind="stable")
+    order = order[two[ends[order]]].reshape(-1, 2)
+    chain, first = np.flatnonzero(open_)[order // 2], order % 2 == 0
+    away = shape.along[chain] * np.where(first, 1.0, -1.0)[..., None]
+    length = shape.length[chain]
+    turns = -(away[:, 0] * away[:, 1]).sum(1) >= _CURVE * length.prod(1)
+    curved = (region[shape.faces[chain]] >= 0).any(2)
+    turn = np.arccos(np.clip(-(away[:, 0] * away[:, 1]).sum(1) / length.prod(1), -1, 1))
+    before = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece
+    before[chain, np.where(first, 0, 1)] = turn[:, None]
+    found = np.zeros(len(shape.bend), bool)
+    for k in (0, 1):
+        beyond = before[chain[:, 1 - k], np.where(first[:, 1 - k], 1, 0)]
+        full = curved[:, 1 - k] & (turn >= _FULL * beyond)
+        most = np.where(curved[:, k], _LONGER, _LAST * full)
+        found[chain[turns & (length[:, k] <= most * length[:, 1 - k]), k]] = True
     return found
 
 

@@ -6,6 +6,7 @@ import io
 import re
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -18,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
 from scenes.parts.facets import Chain, Facets, facets
+from scenes.parts.joined import joined
 from scenes.parts.mend import mended
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
@@ -85,7 +87,10 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
         raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g}, got others in {path}")
 
 
-def solid(mesh: trimesh.Trimesh) -> Solid:
+Told = Callable[[np.ndarray, np.ndarray, np.ndarray], Facets]
+
+
+def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     """Solid from a mesh, mended where it is clear how (`scenes.parts.mend`).
 
     Coplanar triangles become faces, collinear pieces one edge. Vertices where sharp edges meet are named v1, v2, ... in
@@ -118,18 +123,39 @@ def solid(mesh: trimesh.Trimesh) -> Solid:
     normals, areas = _normals(mesh, group)
     loops = _loops(mesh, group, chains, normals)
     circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
-    known = facets(mesh.vertices, chains, normals, areas, circular)
-    plain = _assembled(mesh, group, chains, loops, circular, known)
-    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"])
-
-
-def _assembled(mesh, group: np.ndarray, chains: list[Chain], loops, circular: list[Rim], known: Facets) -> Solid:
-    """The solid, its parts numbered and named."""
+    if told is None:
+        known = facets(mesh.vertices, chains, normals, areas, circular)
+    else:
+        known = _told(told, mesh, group, chains, circular)
+    whole = joined(mesh.vertices, chains, normals, known.region, known.kinds == "sharp")
+    pieces = [(chain, "sharp") for chain in whole]
+    pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])
+    plain = _assembled(mesh, group, used, pieces, loops, circular)
+    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
+
+
+def _told(told: Told, mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], circular: list[Rim]) -> Facets:
+    """What is told of the chains; pieces of circles are none of straight edges."""
+    beside = {}
+    for (a, b), pair in zip(mesh.face_adjacency_edges.tolist(), mesh.face_adjacency.tolist(), strict=True):
+        faces = tuple(sorted(group[pair].tolist()))
+        beside[a, faces] = beside[b, faces] = pair
+    source = mesh.face_attributes["source"]
+    sources = source[np.array([beside[ends[0], faces] for ends, faces, _ in chains])]
+    first = np.unique(group, return_index=True)[1]
+    found = told(mesh.vertices[np.array([chain[0] for chain in chains])], sources, source[first])
+    of_circles = {frozenset(piece) for rim in circular for piece in rim.pieces}
+    rim = np.array([frozenset(chain[0]) in of_circles for chain in chains])
+    return replace(found, rim=found.rim | rim & ~found.smooth)
+
+
+def _assembled(mesh, group: np.ndarray, used: np.ndarray, pieces, loops, circular: list[Rim]) -> Solid:
+    """The solid, its parts numbered and named."""
     used = used[np.lexsort(np.round(mesh.vertices[used] / mesh.extents.max(), 7).T[::-1])]
     number = np.full(len(mesh.vertices), -1)
     number[used] = np.arange(len(used))
-    edges = _edges(chains, number, circular, known)
+    edges = _edges(pieces, number, circular)
     corners = {v for v, many in Counter(end for e in edges if e.kind == "sharp" for end in e.ends).items() if many > 1}
     names = {"v": count(1), "p": count(1)}
     bare = Solid(
@@ -159,14 +185,13 @@ def _face_names(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[str, ...]:
     return tuple(names.tolist())
 
 
-def _edges(chains: list[Chain], number: np.ndarray, circular: list[Rim], known: Facets) -> tuple[Edge, ...]:
+def _edges(pieces: list[tuple[Chain, str]], number: np.ndarray, circular: list[Rim]) -> tuple[Edge, ...]:
     """The edges in the order of their ends, the sharp ones first."""
     piece = {frozenset(ends): (i, j) for i, rim in enumerate(circular, 1) for j, ends in enumerate(rim.pieces, 1)}
-    kinds = np.where(known.smooth, "smooth", np.where(known.rim, "rim", "sharp"))
     found: dict[str, list] = {"sharp": [], "rim": [], "smooth": []}
-    for (ends, faces, convex), kind in zip(chains, kinds, strict=True):
+    for (ends, faces, convex), kind in pieces:
         here = tuple(sorted(number[list(ends)].tolist()))
-        found[str(kind)].append((here, faces, convex, piece.get(frozenset(ends))))
+        found[kind].append((here, faces, convex, piece.get(frozenset(ends))))
     edges = []
     for kind, letter in (("sharp", "e"), ("rim", "r"), ("smooth", "s")):
         numbers = count(1)
@@ -231,27 +256,24 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
 
     A sliver in the crease between two faces lies in both their planes; it becomes part of one, the larger.
     """
+    from scipy.cluster.hierarchy import DisjointSet  # slow to load, and rarely needed
+
     normals, areas = _normals(mesh, group)
     middles = np.zeros_like(normals)
     np.add.at(middles, group, mesh.triangles_center * mesh.area_faces[:, None])
     middles /= np.bincount(group, mesh.area_faces)[:, None]
     order = np.argsort(group, kind="stable")
     corners = dict(enumerate(np.split(mesh.triangles[order], np.cumsum(np.bincount(group))[:-1])))
-    owner, kept = np.arange(len(areas)), []
-
-    def whole(number: int) -> int:
-        while owner[number] != number:
-            number = owner[number] = owner[owner[number]]
-        return number
-
+    sets, largest, kept = DisjointSet(range(len(areas))), np.arange(len(areas)), []
     for one, other in pairs[np.argsort(-areas[pairs].max(1), kind="stable")]:
-        large, small = sorted((whole(one), whole(other)), key=lambda number: -areas[number])
+        large, small = sorted((int(largest[sets[each]]) for each in (one, other)), key=lambda number: -areas[number])
         if large == small:
             continue
         away = corners[small] - middles[large]
         near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
         if (np.abs(away @ normals[large]) <= near).all():
-            owner[small] = large
+            sets.merge(large, small)
+            largest[sets[large]] = large
             corners[large] = np.concatenate([corners[large], corners.pop(small)])
             kept.append((one, other))
     return np.array(kept, int).reshape(-1, 2)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
 from scenes.parts.rims import circle_through
 from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cylinder, axes_beside
@@ -68,20 +65,19 @@ def cylinders(solid: Solid) -> tuple[Recognised, ...]:
 
 
 def _regions(solid: Solid) -> list[np.ndarray]:
-    """Faces that smooth edges join, at least `_LEAST_FACETS` each, in the order of their first face."""
-    pairs = np.array([edge.faces for edge in solid.edges if edge.kind == "smooth"], int).reshape(-1, 2)
-    count = len(solid.faces)
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    group = connected_components(graph, directed=False)[1]
-    sizes = np.bincount(group)
-    return [np.flatnonzero(group == g) for g in dict.fromkeys(group.tolist()) if sizes[g] >= _LEAST_FACETS]
+    """Facets of each curved surface, at least `_LEAST_FACETS`, in the order of their first face."""
+    if solid.regions is None:
+        return []
+    found = dict.fromkeys(solid.regions[solid.regions >= 0].tolist())
+    sizes = np.bincount(solid.regions[solid.regions >= 0])
+    return [np.flatnonzero(solid.regions == g) for g in found if sizes[g] >= _LEAST_FACETS]
 
 
 def _fitted(solid: Solid, faces: np.ndarray) -> tuple | None:
     """Cylinder, faces, residuals and turn; None where they are no cylinder's."""
     normals = solid.normals[faces]
     points = solid.vertices[np.unique(np.concatenate([solid.faces[f] for f in faces]))]
-    axis = np.linalg.svd(normals, full_matrices=True)[2][2]
+    axis = np.linalg.svd(normals, full_matrices=len(normals) < 3)[2][2]
     if np.abs(normals @ axis).max() > 0.1 or len(points) < 6:
         return None
     centre, radius, _ = circle_through(points - (points @ axis)[:, None] * axis, axis)

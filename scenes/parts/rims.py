@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
+_STEP = 2 * np.sin(np.pi / MIN_SEGMENTS) / 2  # radii: half that of so many
+_WIDEST = 5.0  # of the middle step of a circle
 _ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
 
 
@@ -48,19 +50,30 @@ def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, no
     for a, b in halves.tolist():
         if (b, a) not in there:
             after.setdefault(a, []).append(b)
+    loops = [tuple(v for v in loop if kept[v]) for loop in _simple(after)]
+    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+
+
+def _simple(after: dict[int, list[int]]) -> list[list[int]]:
+    """Loops along the ways from each vertex, which are used up; two that touch in a vertex are told apart there."""
     loops = []
     while after:
-        loop, here = [], next(iter(after))
-        while here in after:
-            loop.append(here)
+        path = [next(iter(after))]
+        at = {path[0]: 0}
+        while path[-1] in after:
+            here = path[-1]
             onward = after[here].pop()
             if not after[here]:
                 del after[here]
-            here = onward
-            if here == loop[0]:
-                break
-        loops.append(tuple(v for v in loop if kept[v]))
-    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+            if onward in at:
+                loops.append(path[at[onward] :])
+                for vertex in path[at[onward] + 1 :]:
+                    del at[vertex]
+                del path[at[onward] + 1 :]
+            else:
+                at[onward] = len(path)
+                path.append(onward)
+    return loops
 
 
 def _area(points: np.ndarray, normal: np.ndarray) -> float:
@@ -78,9 +91,15 @@ def rims(loops: list[list[tuple[int, ...]]], vertices: np.ndarray, normals: np.n
         for loop in boundaries_:
             if len(loop) >= MIN_SEGMENTS:
                 centre, radius, off = circle_through(vertices[list(loop)], normals[face])
-                if off <= _ROUND * radius:
+                if off <= _ROUND * radius and _stepped(vertices[list(loop)], radius):
                     found.append(Rim(face, loop, centre, radius))
     return found
+
+
+def _stepped(points: np.ndarray, radius: float) -> bool:
+    """Whether the way from each to the next is a step around a circle, not a chord that cuts a part of it off."""
+    step = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1) / radius
+    return bool(step.max() <= max(_WIDEST * np.median(step), _STEP))
 
 
 def circle_through(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, float, float]:

@@ -90,6 +90,9 @@ class Solid:
         Numbers of the file's triangles of which they are pieces.
     mended : tuple of str
         What was done to a file's triangles to make them a closed surface.
+    regions : ndarray of int, shape (F,), optional
+        Number of the curved surface that each face is a facet of, those that continue it smoothly among them; -1 for
+        plane faces. Where not given, faces at a smooth edge are facets.
     """
 
     vertex_names: tuple[str, ...]
@@ -104,6 +107,7 @@ class Solid:
     curved: tuple[Curved, ...] = ()
     triangle_sources: np.ndarray | None = None
     mended: tuple[str, ...] = ()
+    regions: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if not self.face_names:
@@ -121,6 +125,12 @@ class Solid:
         normal = np.zeros((len(self.faces), 3))
         np.add.at(normal, self.triangle_faces, areas)
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+    @cached_property
+    def triangle_corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """The different corners of all triangles, (P, 3), and which of them each triangle has, (T, 3)."""
+        points, number = np.unique(self.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        return points, number.reshape(-1, 3)
 
     @cached_property
     def offsets(self) -> np.ndarray:
@@ -188,9 +198,29 @@ class Solid:
 
     @cached_property
     def plane(self) -> np.ndarray:
-        """Faces that are no facets of a curved surface: none of their edges lies inside one; bool, shape (F,)."""
+        """Faces that are no facets of a curved surface; bool, shape (F,)."""
+        if self.regions is not None:
+            return self.regions < 0
         found = np.ones(len(self.faces), bool)
         found[[face for edge in self.edges if edge.kind == "smooth" for face in edge.faces]] = False
+        return found
+
+    @cached_property
+    def meeting(self) -> dict[int, tuple[Edge, ...]]:
+        """Of each vertex's number all edges that end there, those of curved surfaces too, in their order."""
+        found: dict[int, list[Edge]] = {}
+        for edge in self.edges:
+            for end in edge.ends:
+                found.setdefault(end, []).append(edge)
+        return {end: tuple(edges) for end, edges in found.items()}
+
+    @cached_property
+    def faces_at(self) -> dict[int, set[int]]:
+        """Of each vertex's number the faces whose outline has it."""
+        found: dict[int, set[int]] = {}
+        for face, loop in enumerate(self.faces):
+            for vertex in loop:
+                found.setdefault(vertex, set()).add(face)
         return found
 
     def edges_at(self, vertex: str) -> tuple[Edge, ...]:
@@ -282,7 +312,7 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         return first
     names, vertices, faces, edges = list(first.vertex_names), [first.vertices], list(first.faces), list(first.edges)
     face_names = list(first.face_names)
-    triangles, owners = [first.triangles], [first.triangle_faces]
+    triangles, owners, regions = [first.triangles], [first.triangle_faces], [_numbers(first)]
     for number, other in enumerate(others, 1):
         corner, face = sum(map(len, vertices)), len(faces)
         names += [f"{name}@{number}" for name in other.vertex_names]
@@ -301,6 +331,8 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         vertices.append(other.vertices)
         triangles.append(other.triangles)
         owners.append(other.triangle_faces + face)
+        here, most = _numbers(other), max(part.max(initial=-1) for part in regions)
+        regions.append(np.where(here < 0, -1, here + most + 1))
     return Solid(
         vertex_names=tuple(names),
         vertices=np.concatenate(vertices),
@@ -311,4 +343,10 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         circles=first.circles,
         curved=first.curved,
         face_names=tuple(face_names),
+        regions=np.concatenate(regions),
     )
+
+
+def _numbers(solid: Solid) -> np.ndarray:
+    """Of the curved surfaces that faces are facets of."""
+    return np.where(solid.plane, -1, 0) if solid.regions is None else solid.regions

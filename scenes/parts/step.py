@@ -6,7 +6,6 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -15,12 +14,15 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
 from scenes.parts.curved import Curved
-from scenes.parts.solid import Edge, Solid
+from scenes.parts.facets import Facets
+from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Surface, Torus
 from scenes.parts.walls import exact_walls
 from scenes.units import Unit, in_unit
@@ -30,6 +32,7 @@ MOST_BYTES = 32 << 20
 MOST_SECONDS = 120
 SEGMENTS = 96  # pieces of a full turn; fewer where there are many curved faces
 MOST_FACES = 20_000  # of the file's; then so many plane ones, about, of all of them
+TANGENT = math.radians(1.0)  # faces that meet at less join smoothly
 _SAME = 1e-6  # of the part's size: a circle of the mesh is that of an edge
 _MISSING = (
     "object.file must be of a kind that can be read: a STEP file needs OpenCASCADE, pip install 'ice-vision[step]'"
@@ -51,6 +54,8 @@ class StepEdge:
         Of a circle or an ellipse.
     radii : tuple of float
         One of a circle, both half axes of an ellipse, none otherwise.
+    bend : float
+        Angle between the normals of its faces in the middle of it, rad.
     """
 
     kind: str
@@ -59,6 +64,14 @@ class StepEdge:
     centre: np.ndarray | None
     axis: np.ndarray | None
     radii: tuple[float, ...]
+    bend: float = math.pi / 2
+
+    def holds(self, points: np.ndarray, near: float) -> bool:
+        """Whether it is straight and points (n, 3) lie on its line."""
+        start, way = self.ends[0], self.ends[1] - self.ends[0]
+        if self.kind != "line" or not way.any():
+            return False
+        return bool(np.linalg.norm(np.cross(points - start, way / np.linalg.norm(way)), axis=1).max() <= near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +105,33 @@ class StepPart:
             As `mesh.solid`.
         """
         body = trimesh.Trimesh(self.triangles.reshape(-1, 3), np.arange(self.triangles.size // 3).reshape(-1, 3))
-        found = mesh.solid(body)
-        edges = tuple(self._known(found))
-        return replace(found, face_names=self._face_names(found), circles=self._exact(found), edges=edges)
+        with np.errstate(all="ignore"):  # triangles of no area
+            found = mesh.solid(body, self._facets)
+        return replace(found, face_names=self._face_names(found), circles=self._exact(found))
 
-    def _known(self, solid: Solid) -> Iterator[Edge]:
-        """The edges; those between facets of one face are none of the part, however unevenly it was divided."""
-        owners = self._owners(solid)
-        for edge in solid.edges:
-            one, two = owners[list(edge.faces)]
-            yield replace(edge, kind="smooth") if one == two and edge.kind == "sharp" else edge
+    def _facets(self, ends: np.ndarray, sources: np.ndarray, of_faces: np.ndarray) -> Facets:
+        """What chains (C, 2, 3) between triangles ``sources`` (C, 2) are; faces by a triangle each, (F,)."""
+        owners = np.sort(self.triangle_faces[sources], 1)
+        smooth, straight = owners[:, 0] == owners[:, 1], np.zeros(len(ends), bool)
+        known: dict[tuple[int, ...], list[StepEdge]] = {}
+        for edge in self.edges:
+            known.setdefault(edge.faces[:2], []).append(edge)
+        near = _SAME * float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
+        for row in np.flatnonzero(~smooth):
+            there = known.get(tuple(owners[row].tolist()), [])
+            smooth[row] = bool(there) and all(edge.bend < TANGENT for edge in there)
+            straight[row] = any(edge.bend >= TANGENT and edge.holds(ends[row], near) for edge in there)
+        surface = self._continued[self.triangle_faces[of_faces]]
+        flat = np.array([isinstance(each, Plane) for each in self.surfaces])[self.triangle_faces[of_faces]]
+        return Facets(np.where(flat, -1, surface), smooth, ~smooth & ~straight)
+
+    @cached_property
+    def _continued(self) -> np.ndarray:
+        """A number for each face, the same for curved ones that continue each other smoothly, shape (F,)."""
+        curved = [not isinstance(surface, Plane) for surface in self.surfaces]
+        pairs = [e.faces[:2] for e in self.edges if e.bend < TANGENT and all(curved[f] for f in e.faces[:2])]
+        graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(curved),) * 2)
+        return connected_components(graph, directed=False)[1]
 
     @cached_property
     def curved(self) -> tuple[Curved, ...]:
@@ -241,4 +271,5 @@ def _edge(edge: dict[str, Any], scale: float) -> StepEdge:
         centre=scale * np.array(edge["point"]) if round_ else None,
         axis=np.array(edge["axis"]) if round_ else None,
         radii=tuple(scale * r for r in radii),
+        bend=edge["bend"],
     )

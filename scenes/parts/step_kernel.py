@@ -16,8 +16,9 @@ import os
 import sys
 from typing import Any
 
-FORMAT = 1
+FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
+_ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
 
 
@@ -147,7 +148,34 @@ def _edges(faces: list[Any]) -> list[dict[str, Any]]:
                     break
             else:
                 known.append((edge, {number}))
-    return [_curve(edge) | {"faces": sorted(on)} for known in owners.values() for edge, on in known if len(on) > 1]
+    found = [(edge, sorted(on)) for known in owners.values() for edge, on in known if len(on) > 1]
+    return [_curve(edge) | {"faces": on, "bend": _bend(edge, [faces[i] for i in on[:2]])} for edge, on in found]
+
+
+def _bend(edge: Any, faces: list[Any]) -> float:
+    """Angle between the normals of two faces along their edge, rad: the middle one of several."""
+    angles = []
+    for one, other in zip(*(_normals(edge, face) for face in faces), strict=True):
+        across = [one[i - 2] * other[i - 1] - one[i - 1] * other[i - 2] for i in range(3)]
+        angles.append(math.atan2(math.hypot(*across), sum(a * b for a, b in zip(one, other, strict=True))))
+    return sorted(angles)[len(angles) // 2]
+
+
+def _normals(edge: Any, face: Any) -> list[list[float]]:
+    """Outward normals of a face at some places of an edge, of any length."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP.TopAbs import TopAbs_Orientation
+
+    flat, surface = BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face)
+    sign = -1.0 if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
+    first, last = flat.FirstParameter(), flat.LastParameter()
+    found = []
+    for place in _ALONG:
+        at, along_u, along_v = flat.Value(first + place * (last - first)), gp_Vec(), gp_Vec()
+        surface.D1(at.X(), at.Y(), gp_Pnt(), along_u, along_v)
+        found.append([sign * x for x in _vector(along_u.Crossed(along_v))])
+    return found
 
 
 def _curve(edge: Any) -> dict[str, Any]:

@@ -131,7 +131,8 @@ def test_parts_are_told_apart_by_what_they_are_not_by_their_hash(kernel):
     assert [face.name for face in found] == ["b", "a", "c", "d"]
 
 
-def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel):
+def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel, monkeypatch):
+    monkeypatch.setattr(step_kernel, "_bend", lambda edge, faces: 0.5 + len(faces))
     edges = {name: Shape(name, kind="edge", curve=curve("Line")) for name in "uvwx"}
     again = Shape("v", kind="edge", curve=curve("Line"))
     faces = [
@@ -141,6 +142,7 @@ def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel):
     ]
     found = step_kernel._edges([*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
     assert [edge["faces"] for edge in found] == [[0, 2, 3], [0, 2], [1, 3], [2, 3]]
+    assert {edge["bend"] for edge in found} == {2.5}
     assert step_kernel._edges([plain("f", [edges["u"], edges["u"]])]) == []
 
 

@@ -175,7 +175,7 @@ def robustly(found):
 def test_the_plan_s_json_is_the_plan(planned, several):
     """Every number beside an independent prediction at the plan's poses; rendered and robust settings by key."""
     check, safe = of_three(planned), robustly(planned)
-    told_ = json.loads(json.dumps(plan_json.facts(planned, check, safe, 1.25, [Path("a.png")]), allow_nan=False))
+    told_ = json.loads(json.dumps(plan_json.facts(planned, check, safe, 1.25), allow_nan=False))
     again = planner.predict(planned.scene, planned.sensor, planned.light)
     for row, each, quantity in zip(told_["measurands"], again.measurands, several.measurands, strict=True):
         zone = quantity.tolerance
@@ -241,13 +241,11 @@ def test_the_plan_s_tables_are_its_json(planned):
     check, safe = of_three(planned), robustly(planned)
     made = plan_table.report(planned, check, safe, 1.25)
     text = words(made)
-    headings, rows = titled(made, "Clearly different")
-    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over best"]
-    assert rows[0][:4] == ["best", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required)]
-    assert rows[0][4:] == [planned.limiting, f"{planned.variance:.4g}", "1.000"]
-    first = planned.candidates[0]
-    itself = (first.sensor, first.light) == (planned.sensor, planned.light)
-    for row, c in zip(rows[1:], planned.candidates[itself:], strict=True):
+    headings, rows = titled(made, "The plan, and")
+    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over plan"]
+    assert rows[0] == ["plan", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required),
+                       planned.limiting, f"{planned.prediction.worst_ratio**2:.4g}", "1.000"]  # fmt: skip
+    for row, c in zip(rows[1:], planned.candidates, strict=True):
         over = f"{c.variance / planned.variance:.3f}"
         assert row == ["", pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
     headings, rows = titled(made, "The paper's search")
@@ -283,10 +281,9 @@ def test_the_plan_s_tables_are_its_json(planned):
 def test_the_plan_of_one_measurand_is_told_in_object_and_image(task1):
     found = planner.plan(task1, step_deg=30, refined=False)
     made = plan_table.report(found, None, None, 1.0)
-    headings, rows = titled(made, "Clearly different")
-    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
-    for row, c in zip(rows, found.candidates, strict=True):
-        assert row[0] == ("best" if c is found.candidates[0] else "")
+    headings, rows = titled(made, "The plan, and")
+    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over plan"]
+    for row, c in zip(rows, (found.prediction, *found.candidates), strict=True):
         assert row[4:6] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
     again = planner.predict(task1, found.sensor, found.light)
     text = words(made)

@@ -58,8 +58,8 @@ def test_record_of_a_flange():
 
 
 def test_another_format_is_refused():
-    with pytest.raises(InvalidInput, match="must be a record of format 1, got 2"):
-        step.part({"format": 2})
+    with pytest.raises(InvalidInput, match="must be a record of format 2, got 1"):
+        step.part({"format": 1})
 
 
 @kernel
@@ -166,7 +166,7 @@ def test_the_worker_is_silent(tmp_path):
     command = [sys.executable, "-P", step_kernel.__file__, "24", "2000"]
     done = subprocess.run(command, input=data, capture_output=True, timeout=60, check=True)
     record = json.loads(done.stdout)
-    assert (record["format"], record["unit"], len(record["faces"])) == (1, "mm", 8)
+    assert (record["format"], record["unit"], len(record["faces"])) == (2, "mm", 8)
     assert sum(edge["kind"] == "circle" for edge in record["edges"]) == 4
 
 

@@ -19,6 +19,7 @@ from validation.cli.common import (
     commands,
     parse_pose,
     parse_poses,
+    progress,
     say,
 )
 from validation.cli.outputs import check_directory, check_file
@@ -44,7 +45,9 @@ def budget_command(
     sensor: Pair = None,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
     p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95,
-    render: Annotated[bool, typer.Option("--render", help="Pixel noise and bias from a rendered picture.")] = False,
+    render: Annotated[
+        bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")
+    ] = False,
     monte_carlo: Annotated[
         bool, typer.Option("--monte-carlo", help="Draw all inputs, and compare as JCGM 101 clause 8 asks.")
     ] = False,
@@ -78,7 +81,8 @@ def budget_command(
     picture = _picture(loaded, *poses)
     if stations and not is_plain(loaded):
         raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
-    found = budgets.budget_of(picture, p, rendered=render)
+    with progress("simulating the picture for its bias", "renders"):
+        found = budgets.budget_of(picture, p, rendered=render)
     drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
     shown = budgets.pictured(found, stations, seed) if stations else None
     facts = budgets.facts(found, drawn, shown, reach)

@@ -9,6 +9,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 from imaging.geometry.projection import facing, project
 from imaging.geometry.visibility import visible_spans
@@ -49,6 +50,7 @@ class _View:
     def __init__(self, scene: Scene, sensor: Pose) -> None:
         pictures = Pictures.of(scene, list(sensor))
         self.scene, self.pose, self.position = scene, pictures.sensors, pictures.sensor_at
+        self._spans: dict[str, list[tuple[float, float]]] = {}
 
     def image(self, points: np.ndarray) -> np.ndarray:
         """Places of points (n, 3), px, shape (n, 2)."""
@@ -56,7 +58,9 @@ class _View:
 
     def spans(self, edge: Edge) -> list[tuple[float, float]]:
         """The visible parts of an edge."""
-        return visible_spans(self.scene.bodies, edge, self.position)
+        if edge.name not in self._spans:
+            self._spans[edge.name] = visible_spans(self.scene.bodies, edge, self.position)
+        return self._spans[edge.name]
 
 
 def _faces(axis, view: _View) -> None:
@@ -64,13 +68,13 @@ def _faces(axis, view: _View) -> None:
     solid = view.scene.solid
     shown, middles = facing(solid, view.position), solid.triangles.mean(1)
     corners = view.image(solid.triangles.reshape(-1, 3)).reshape(-1, 3, 2)
-    away = np.linalg.norm(middles - view.position, axis=1)
-    for k in np.argsort(-away):
-        normal = solid.normals[solid.triangle_faces[k]]
-        if shown[solid.triangle_faces[k]]:
-            cosine = abs(normal @ (view.position - middles[k])) / away[k]
-            grey = str(0.55 + 0.37 * cosine)
-            axis.fill(*corners[k].T, color=grey, lw=0.5, ec=grey)
+    away = view.position - middles
+    far = np.linalg.norm(away, axis=1)
+    cosines = np.abs(np.einsum("ti,ti->t", solid.normals[solid.triangle_faces], away)) / far
+    order = np.argsort(-far, kind="stable")
+    order = order[shown[solid.triangle_faces[order]]]
+    greys = [str(grey) for grey in 0.55 + 0.37 * cosines[order]]
+    axis.add_collection(PolyCollection(corners[order], facecolors=greys, edgecolors=greys, linewidths=0.5))
 
 
 def _edge(axis, view: _View, edge: Edge) -> None:

@@ -15,8 +15,9 @@ from validation.report.requirements import Grade, Requirement
 
 COLUMNS = ("", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "result", "limited by")
 NOTE = (
-    "sigma: standard deviation of one picture's value, by noise. bias: mean error. U: expanded uncertainty, 95 %. "
-    "tolerance: how far the value may lie from the nominal one; U is compared with half of the whole zone."
+    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± what its correction "
+    "is not sure of. U: expanded uncertainty, 95 %. tolerance: how far the value may lie from the nominal one; U is "
+    "compared with half of the whole zone."
 )
 
 

@@ -1,0 +1,90 @@
+"""Straight edges in one piece: what follows in a line between the same surfaces is one edge, whatever divides them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from scenes.parts.facets import Chain
+
+_IN_LINE = 1e-7  # of 1 - cos: pieces turn by less, or by what single precision makes of it
+_SINGLE = 3e-7  # of the largest coordinate
+_FLAT = 1e-4  # rad, between the normals of one plane
+
+
+def joined(
+    vertices: np.ndarray, chains: list[Chain], normals: np.ndarray, region: np.ndarray, sharp: np.ndarray
+) -> list[Chain]:
+    """The straight edges, each whole.
+
+    Parameters
+    ----------
+    vertices : ndarray, shape (V, 3)
+    chains : list
+        Straight pieces: (ends, faces, convex).
+    normals : ndarray, shape (F, 3)
+        Of the faces.
+    region : ndarray of int, shape (F,)
+        Number of the curved surface that each face is a facet of, -1 for plane faces.
+    sharp : ndarray of bool, shape (C,)
+        Which pieces are those of sharp edges.
+
+    Returns
+    -------
+    list
+        As the chains; faces are those of the longest piece.
+    """
+    rows = np.flatnonzero(sharp)
+    meeting: dict[int, list[int]] = defaultdict(list)
+    for row in rows.tolist():
+        for end in chains[row][0]:
+            meeting[end].append(row)
+    pairs = [
+        pair
+        for vertex, found in meeting.items()
+        for pair in combinations(found, 2)
+        if _in_line(vertices, vertex, *(chains[k] for k in pair)) and _alike(normals, region, *(chains[k] for k in pair))
+    ]
+    graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(chains),) * 2)
+    group = connected_components(graph, directed=False)[1]
+    parts: dict[int, list[Chain]] = defaultdict(list)
+    for row in rows.tolist():
+        parts[int(group[row])].append(chains[row])
+    return [_one(vertices, each) for each in parts.values()]
+
+
+def _in_line(vertices: np.ndarray, vertex: int, one: Chain, other: Chain) -> bool:
+    """Whether two pieces continue each other in a vertex."""
+    away = [vertices[next(end for end in chain[0] if end != vertex)] - vertices[vertex] for chain in (one, other)]
+    long, short = sorted(away, key=np.linalg.norm, reverse=True)
+    size = np.linalg.norm(long)
+    off = np.linalg.norm(np.cross(short, long)) / size
+    near = max(np.sqrt(2 * _IN_LINE) * np.linalg.norm(short), 2 * _SINGLE * np.abs(vertices[vertex]).max())
+    return bool(short @ long < 0 and off <= near)
+
+
+def _alike(normals: np.ndarray, region: np.ndarray, one: Chain, other: Chain) -> bool:
+    """Whether two pieces lie between the same two surfaces."""
+
+    def same(f: int, g: int) -> bool:
+        if region[f] >= 0 or region[g] >= 0:
+            return bool(region[f] == region[g])
+        return bool(np.linalg.norm(normals[f] - normals[g]) <= _FLAT)
+
+    (a, b), (c, d) = one[1], other[1]
+    return one[2] == other[2] and ((same(a, c) and same(b, d)) or (same(a, d) and same(b, c)))
+
+
+def _one(vertices: np.ndarray, parts: list[Chain]) -> Chain:
+    """Pieces of a line as one, with the faces of the longest."""
+    if len(parts) == 1:
+        return parts[0]
+    ends = np.array([part[0] for part in parts])
+    length = np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1)
+    once, many = np.unique(ends, return_counts=True)
+    first, last = once[many == 1].tolist()
+    return (first, last), *parts[int(length.argmax())][1:]

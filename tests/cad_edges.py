@@ -1,0 +1,171 @@
+"""Which straight and circular sharp edges a STEP file has, asked of OpenCASCADE alone: an oracle of recognised ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+TANGENT = math.radians(1.0)  # faces that meet at less join smoothly
+SAME = 1e-3  # mm
+_PLACES = (0.02, 0.25, 0.5, 0.75, 0.98)  # along an edge, where its faces' normals are asked
+
+
+@dataclass(frozen=True)
+class Sharp:
+    """What can be offered of a part, in mm.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (n, 2, 3)
+        Ends of straight edges, those that continue each other joined.
+    circles : ndarray, shape (m, 4)
+        Centres and radii of whole circles.
+    smooth : ndarray, shape (k, 2, 3)
+        Ends of straight edges in which faces join smoothly.
+    bends : tuple of float
+        Of all edges: the largest angle between the faces, rad.
+    """
+
+    lines: np.ndarray
+    circles: np.ndarray
+    smooth: np.ndarray
+    bends: tuple[float, ...]
+
+
+@dataclass(eq=False)
+class _Edge:
+    kind: str
+    curve: Any
+    faces: list[Any] = field(default_factory=list)
+
+
+def sharp_edges(path: Path) -> Sharp:
+    """Of all solids of a file."""
+    from OCP.STEPControl import STEPControl_Reader
+
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    lines, smooth, arcs, bends = [], [], [], []
+    for edge in _edges(reader.OneShape()):
+        normals = [_normals(edge.curve[0], face) for face in edge.faces]
+        angle = np.arctan2(np.linalg.norm(np.cross(*normals), axis=1), (normals[0] * normals[1]).sum(1))
+        bends.append(float(angle.max()))
+        is_sharp = float(np.median(angle)) >= TANGENT
+        ends = _points(edge.curve[1], (0.0, 1.0))
+        if edge.kind == "line":
+            (lines if is_sharp else smooth).append((ends, normals[0][[0, -1]], normals[1][[0, -1]]))
+        elif edge.kind == "circle" and is_sharp:
+            circle = edge.curve[1].Circle()
+            turn = edge.curve[1].LastParameter() - edge.curve[1].FirstParameter()
+            place, way = circle.Location(), circle.Axis().Direction()
+            around = np.array([place.X(), place.Y(), place.Z(), circle.Radius()])
+            arcs.append((around, np.array([way.X(), way.Y(), way.Z()]), turn))
+    bare = [ends for ends, *_ in smooth]
+    return Sharp(_joined(lines), _whole(arcs), np.array(bare).reshape(-1, 2, 3), tuple(bends))
+
+
+def _edges(shape: Any) -> list[_Edge]:
+    """Edges of solids in which two different faces meet."""
+    from OCP import TopAbs, TopExp, TopoDS
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+    def parts(whole: Any, kind: str, cast: str) -> list[Any]:
+        explorer = TopExp.TopExp_Explorer(whole, getattr(TopAbs.TopAbs_ShapeEnum, f"TopAbs_{kind}"))
+        found = []
+        while explorer.More():
+            found.append(getattr(TopoDS.TopoDS, cast)(explorer.Current()))
+            explorer.Next()
+        return found
+
+    known: dict[int, list[tuple[Any, _Edge]]] = {}
+    for solid in parts(shape, "SOLID", "Solid"):
+        for face in parts(solid, "FACE", "Face"):
+            for edge in parts(face, "EDGE", "Edge"):
+                here = known.setdefault(hash(edge), [])
+                made = next((each for other, each in here if edge.IsSame(other)), None)
+                if made is None:
+                    curve = BRepAdaptor_Curve(edge)
+                    made = _Edge(str(curve.GetType()).rsplit("_", 1)[-1].lower(), (edge, curve))
+                    here.append((edge, made))
+                if not any(face.IsSame(other) for other in made.faces):
+                    made.faces.append(face)
+    return [edge for here in known.values() for _, edge in here if len(edge.faces) == 2]
+
+
+def _points(curve: Any, places: tuple[float, ...]) -> np.ndarray:
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    found = [curve.Value(first + place * (last - first)) for place in places]
+    return np.array([[point.X(), point.Y(), point.Z()] for point in found])
+
+
+def _normals(edge: Any, face: Any) -> np.ndarray:
+    """Outward unit normals of a face along an edge, at `_PLACES`, shape (n, 3)."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP.TopAbs import TopAbs_Orientation
+
+    flat, surface = BRepAdaptor_Curve2d(edge, face), BRepAdaptor_Surface(face)
+    turned = -1.0 if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
+    first, last = flat.FirstParameter(), flat.LastParameter()
+    found = []
+    for place in _PLACES:
+        at, one, two = flat.Value(first + place * (last - first)), gp_Vec(), gp_Vec()
+        surface.D1(at.X(), at.Y(), gp_Pnt(), one, two)
+        normal = one.Crossed(two)
+        found.append([turned * x for x in (normal.X(), normal.Y(), normal.Z())])
+    normals = np.array(found)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+
+
+def _joined(lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Ends of straight edges; pieces that follow each other in a line between faces of the same normals are one."""
+    left = [(ends, tuple(pair)) for ends, *pair in lines]
+    again = True
+    while again:
+        again = False
+        for i, j in ((i, j) for i in range(len(left)) for j in range(i)):
+            whole = _continued(left[i], left[j])
+            if whole is not None:
+                left = [each for k, each in enumerate(left) if k not in (i, j)] + [whole]
+                again = True
+                break
+    return np.array([ends for ends, _ in left]).reshape(-1, 2, 3)
+
+
+def _continued(one: tuple, other: tuple) -> tuple | None:
+    """Two straight edges as one, None where they are not."""
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        if np.abs(one[0][i] - other[0][j]).max() > SAME / 10:
+            continue
+        ways = [e[0][1 - k] - e[0][k] for e, k in ((one, i), (other, j))]
+        if ways[0] @ ways[1] > -(1 - 1e-9) * np.linalg.norm(ways[0]) * np.linalg.norm(ways[1]):
+            continue
+        for order in ((0, 1), (1, 0)):
+            if all(np.abs(one[1][k][i] - other[1][order[k]][j]).max() < 1e-4 for k in (0, 1)):
+                sides = tuple(np.stack([one[1][k][1 - i], other[1][order[k]][1 - j]]) for k in (0, 1))
+                return np.stack([one[0][1 - i], other[0][1 - j]]), sides
+    return None
+
+
+def _whole(arcs: list[tuple[np.ndarray, np.ndarray, float]]) -> np.ndarray:
+    """Circles of which the arcs go once around."""
+    found: list[tuple[np.ndarray, np.ndarray, float]] = []
+    for around, axis, turn in arcs:
+        same = next(
+            (
+                k
+                for k, (other, way, _) in enumerate(found)
+                if np.abs(other - around).max() < SAME / 10 and abs(way @ axis) > 1 - 1e-9
+            ),
+            None,
+        )
+        if same is None:
+            found.append((around, axis, turn))
+        else:
+            found[same] = (*found[same][:2], found[same][2] + turn)
+    return np.array([around for around, _, turn in found if turn > 2 * math.pi - 1e-6]).reshape(-1, 4)
