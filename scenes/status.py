@@ -1,4 +1,4 @@
-"""What a prediction or a measurement says of itself: the list of statuses, what each means, and which may be relied on.
+"""What a prediction or a measurement says of itself: the statuses, what each means, what to do, which may be relied on.
 
 Only those in `MEASURED` come with a value, and only what `is_trusted` may be decided upon, signed, or counted as shown.
 """
@@ -37,6 +37,20 @@ MEANINGS = {
     CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
     OK: "value and sigma can be relied on",
+}
+REMEDIES = {
+    NOT_VISIBLE: "turn the sensor until the camera sees all of it, or choose another feature",
+    SHORT: "come nearer or turn the sensor, so that its image becomes longer",
+    SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
+    LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
+    ILL_CONDITIONED: "turn the sensor, or choose edges that meet at a larger angle",
+    AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
+    COMPRESSED: "save pictures without compression (PNG, TIFF)",
+    CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
+    MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
+    CLUTTER: "move lamp or sensor (`ice plan`), or measure by `arrangement`, which knows what lies around an edge",
+    TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
+    OK: "",
 }
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
@@ -118,12 +132,12 @@ def doubt(status: str) -> str:
 
 
 def legend(statuses: Iterable[str]) -> list[str]:
-    """What each status that is not trusted means, one line each.
+    """What each status that is not trusted means, and what to do about it, one line each.
 
-    >>> legend(["ok", "short"])
-    ['short: too little of an edge is left in the image.']
+    >>> legend(["ok", "compressed"])[0][-51:]
+    'small; save pictures without compression (PNG, TIFF).'
     """
-    return [f"{name}: {MEANINGS[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
+    return [f"{name}: {MEANINGS[name]}; {REMEDIES[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
 
 
 def counted(statuses: Iterable[str]) -> str:

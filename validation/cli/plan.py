@@ -77,9 +77,12 @@ Check = Annotated[
 ]
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Render nothing.")]
 Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Write the maps.")]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")]
 Write = Annotated[
     bool, typer.Option("--write", help="Put the poses into the scene's file, first of its settings; comments stay.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Write plan.html (one page that shows the best setting) and all pictures."),
 ]
 ViewCount = Annotated[
     int | None, typer.Option("--views", metavar="N", help="Plan 1 to N pictures that together measure best.")
@@ -165,7 +168,7 @@ def plan_command(
     scatter = _check_varied(found) if found.varied and count else None
     if target:
         _write(target, found, checked)
-    _show(found, checked, safe, seconds, _pictures(found, map_file, out), target, as_json, scatter)
+    _show(found, checked, safe, seconds, _pictures(found, checked, map_file, out), target, as_json, scatter)
     _say_unchecked(loaded, bool(count or no_check or as_json))
     if scatter and not scatter.agrees:
         raise typer.Exit(1)
@@ -296,12 +299,23 @@ def _tolerances(texts: list[str], scene: scenes.Scene) -> planner.Tolerances | N
     return tolerances
 
 
-def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> list[Path]:
+def _pictures(found: planner.Plan, checked: PlanCheck | None, map_file: Path | None, out: Path | None) -> list[Path]:
     if map_file is None and out is None:
         return []
     from validation.report import plan_figures  # matplotlib takes half a second to load
 
-    return plan_figures.draw(found, out, map_file) if out else [plan_figures.map_picture(found, map_file)]
+    if out is None:
+        return [plan_figures.map_picture(found, map_file)]
+    return [*plan_figures.draw(found, out, map_file), _page(found, checked, out)]
+
+
+def _page(found: planner.Plan, checked: PlanCheck | None, out: Path) -> Path:
+    """The setting that is proposed as one page, as its models predict it."""
+    from validation.report import page, station
+
+    scene, best = found.scene, checked.proposed if checked and checked.proposed else found
+    made = station.of_picture(scenes.Picture.of(scene, best.sensor, best.light))
+    return page.write_station(made, scene.title or scene.name, out / "plan.html")
 
 
 def _show(
