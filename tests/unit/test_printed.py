@@ -130,7 +130,7 @@ def test_measured_values_and_their_decisions_are_printed(value, decision):
     found = SimpleNamespace(
         quantities=(quantity, other), sigma=np.array([0.0024, 0.5]),
         covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
-        u=np.array([0.004, 0.5]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
+        u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
         value=np.array([value, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
     )  # fmt: skip
