@@ -128,7 +128,7 @@ def _joined(lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarra
     again = True
     while again:
         again = False
-        for i, j in ((i, j) for i in range(len(left)) for j in range(i)):
+        for i, j in [(k, m) for k in range(len(left)) for m in range(k)]:
             whole = _continued(left[i], left[j])
             if whole is not None:
                 left = [each for k, each in enumerate(left) if k not in (i, j)] + [whole]

@@ -73,9 +73,7 @@ def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     some = (one != two) | (two != three)  # the others do not reach the plane of position and edge
     some = some.any(tuple(range(some.ndim - 1))) & towards[solid.triangle_faces]
     chosen = corners[some]
-    a, b = (
-        _coordinates(points[chosen], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start))
-    )
+    a, b = (_coordinates(points[chosen], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start)))
     return _merge(*_crossings(a, b, sides[..., chosen]))
 
 

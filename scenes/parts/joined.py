@@ -47,7 +47,8 @@ def joined(
         pair
         for vertex, found in meeting.items()
         for pair in combinations(found, 2)
-        if _in_line(vertices, vertex, *(chains[k] for k in pair)) and _alike(normals, region, *(chains[k] for k in pair))
+        if _in_line(vertices, vertex, *(chains[k] for k in pair))
+        and _alike(normals, region, *(chains[k] for k in pair))
     ]
     graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(chains),) * 2)
     group = connected_components(graph, directed=False)[1]

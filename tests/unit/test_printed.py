@@ -121,26 +121,34 @@ def test_records_of_a_prediction_are_standard_deviations(several):
     [(10.08, "pass"), (10.085, "undecided"), (10.106, "fail"), (9.975, "undecided"), (9.99, "pass"), (9.959, "fail")],
 )
 def test_measured_values_and_their_decisions_are_printed(value, decision):
-    """+0.09 -0.02 about 10 with sigma 0.004: what is well within the one limit is beyond the other."""
+    """+0.09 -0.02 about 10 with u 0.004, of sigma 0.0024 and u(bias) 0.0032: it is u that decides.
+
+    What is well within the one limit is beyond the other.
+    """
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.02))
     other = SimpleNamespace(name="lean", kind="angle", tolerance=None)
     found = SimpleNamespace(
-        quantities=(quantity, other), sigma=np.array([0.004, 0.5]), covariance=np.array([[1.6e-5, 2e-4], [2e-4, 0.25]]),
+        quantities=(quantity, other), sigma=np.array([0.0024, 0.5]),
+        covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
+        u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
         value=np.array([value, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
     )  # fmt: skip
     one, two = measurands.facts(found)
     assert one == {
-        "name": "slot", "kind": "width", "unit": "mm", "value": value, "sigma": 0.004, "value_image": 812.0,
+        "name": "slot", "kind": "width", "unit": "mm", "value": value, "sigma": 0.0024, "value_image": 812.0,
+        "bias": 0.011, "u_bias": 0.0032, "u": 0.004,
         "sigma_image": pytest.approx(0.3), "nominal": 10.0, "tolerance": {"plus": 0.09, "minus": 0.02},
         "decision": decision, "status": "ok",
     }  # fmt: skip
     assert (two["value"], two["sigma"], two["sigma_image"], two["nominal"]) == (29.5, 0.5, pytest.approx(0.4), 30.0)
     assert measurands.covariance(found) == found.covariance.tolist()
     headings, rows = cells(measurands.table([one, two]))
-    assert headings == ["name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status"]
-    assert rows[0] == ["slot", "width", f"{value:.4f}", "+- 0.0040", "mm", "10", "+0.09 -0.02", decision, "ok"]
-    assert rows[1] == ["lean", "angle", "29.50", "+- 0.50", "degrees", "30", "-", "-", "ok"]
+    assert headings == ["name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision",
+                        "status"]  # fmt: skip
+    assert rows[0] == ["slot", "width", f"{value:.4f}", "+- 0.0040", "mm", "0.011", "0.0032", "10", "+0.09 -0.02",
+                       decision, "ok"]  # fmt: skip
+    assert rows[1] == ["lean", "angle", "29.50", "+- 0.50", "degrees", "-", "-", "30", "-", "-", "ok"]
 
 
 # --- plan
@@ -241,11 +249,13 @@ def test_the_plan_s_tables_are_its_json(planned):
     check, safe = of_three(planned), robustly(planned)
     made = plan_table.report(planned, check, safe, 1.25)
     text = words(made)
-    headings, rows = titled(made, "The plan, and")
-    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over plan"]
-    assert rows[0] == ["plan", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required),
-                       planned.limiting, f"{planned.prediction.worst_ratio**2:.4g}", "1.000"]  # fmt: skip
-    for row, c in zip(rows[1:], planned.candidates, strict=True):
+    headings, rows = titled(made, "Clearly different")
+    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over best"]
+    assert rows[0][:4] == ["best", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required)]
+    assert rows[0][4:] == [planned.limiting, f"{planned.variance:.4g}", "1.000"]
+    first = planned.candidates[0]
+    itself = [pose(first.sensor), pose(first.light)] == [pose(planned.sensor), pose(planned.light)]
+    for row, c in zip(rows[1:], planned.candidates[itself:], strict=True):
         over = f"{c.variance / planned.variance:.3f}"
         assert row == ["", pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
     headings, rows = titled(made, "The paper's alternating search")
@@ -281,9 +291,10 @@ def test_the_plan_s_tables_are_its_json(planned):
 def test_the_plan_of_one_measurand_is_told_in_object_and_image(task1):
     found = planner.plan(task1, step_deg=30, refined=False)
     made = plan_table.report(found, None, None, 1.0)
-    headings, rows = titled(made, "The plan, and")
-    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over plan"]
-    for row, c in zip(rows, (found.prediction, *found.candidates), strict=True):
+    headings, rows = titled(made, "Clearly different")
+    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
+    for row, c in zip(rows, found.candidates, strict=True):
+        assert row[0] == ("best" if c is found.candidates[0] else "")
         assert row[4:6] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
     again = planner.predict(task1, found.sensor, found.light)
     text = words(made)

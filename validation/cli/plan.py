@@ -77,11 +77,12 @@ Check = Annotated[
 ]
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Render nothing.")]
 Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Write the maps.")]
-Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Write plan.html (a page of the best setting) and all pictures.")
-]
 Write = Annotated[
     bool, typer.Option("--write", help="Put the poses into the scene's file, first of its settings; comments stay.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Write plan.html (one page that shows the best setting) and all pictures."),
 ]
 ViewCount = Annotated[
     int | None, typer.Option("--views", metavar="N", help="Plan 1 to N pictures that together measure best.")

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from planner.search.candidates import Candidate
 from planner.search.setting_up import how_far
 from render import Tolerance
 from scenes import Scene
@@ -112,6 +113,10 @@ def _searched(found: planner.Plan, seconds: float) -> str:
     return "\n".join(lines)
 
 
+def _how_far(scene: Scene) -> str:
+    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
+
+
 def _part(found: planner.Plan) -> str:
     return f"{100 * found.set_aside[0].variance / found.variance:.0f} %"
 
@@ -124,10 +129,6 @@ def _ruled_out(found: planner.Plan) -> str:
 def _state(status: str) -> str:
     """A status with what it means, and what to do."""
     return f"ok, {MEANINGS[status]}" if is_trusted(status) else legend([status])[0].removesuffix(".")
-
-
-def _how_far(scene: Scene) -> str:
-    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
 
 
 def _alone(found: planner.Plan) -> str:
@@ -170,22 +171,37 @@ def _minimised(found: planner.Plan, units: tuple[str, str]) -> str:
 
 def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     names = (f"object, 1e-6 {units[0]}^2", f"image, 1e-6 {units[1]}^2")
-    several = len(found.prediction.measurands) > 1
+    best, several = _as_candidate(found), len(found.prediction.measurands) > 1
     if several:
         names = ("limited by", _minimised(found, units))
-    title = "\nThe plan, and clearly different settings of the grid, the best first"
-    table = _table(title, "", "sensor", "light", "edges", *names, "over plan", words=("",))
-    for row in (found, *found.candidates):
-        first = "plan" if row is found else ""
-        shown = first, _pose(row.sensor), _pose(row.light), " ".join(row.scene.required if row is found else row.edges)
-        ratio = f"{row.variance / found.variance:.3f}"
+    table = _table("\nClearly different settings, the best first", "", "sensor", "light", "edges", *names, "over best")
+    first = found.candidates[0]
+    itself = [*map(_pose, (first.sensor, first.light))] == [*map(_pose, (best.sensor, best.light))]
+    for c in (best, *found.candidates[itself:]):
+        mark, ratio = "best" if c is best else "", c.variance / best.variance
         if several:
-            table.add_row(*shown, row.limiting, f"{row.variance:.4g}", ratio)
+            table.add_row(
+                mark,
+                _pose(c.sensor),
+                _pose(c.light),
+                " ".join(c.edges),
+                c.limiting,
+                f"{c.variance:.4g}",
+                f"{ratio:.3f}",
+            )
             continue
-        variances = found.prediction if row is found else row
-        values = (f"{1e6 * each:.4g}" for each in (variances.variance_object, variances.variance_image))
-        table.add_row(*shown, *values, ratio)
+        values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
+        table.add_row(mark, _pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
     return table
+
+
+def _as_candidate(found: planner.Plan) -> Candidate:
+    """The plan itself as a row of its table."""
+    p = found.prediction
+    return Candidate(
+        sensor=found.sensor, light=found.light, edges=tuple(found.scene.required), variance=found.variance,
+        variance_object=p.variance_object, variance_image=p.variance_image, limiting=found.limiting,
+    )  # fmt: skip
 
 
 def _reading(found: planner.Plan) -> str:
@@ -195,7 +211,8 @@ def _reading(found: planner.Plan) -> str:
     if several:
         what = "the square of the largest sigma / tolerance" if found.over == "minimax" else "what is minimised"
     return (
-        f"  plan: the place above; the others are places of the grid. Beside them {what}; over plan: over the plan's.\n"
+        f"  best: the place above, found between the grid's; the others are places of the grid. Beside them {what};\n"
+        "  over best: over that of the first row.\n"
         "  Where the best place is taken, another row will do; `--sensor P,A` or `--light P,A` holds one fixed, "
         "`--out DIR` draws all of it, as one page plan.html, too."
     )
