@@ -66,6 +66,7 @@ def _nominal(each: Requirement) -> str:
 def _bias(each: Requirement, places: int) -> str:
     if each.bias is None:
         return "not known"
-    beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}"
+    known = each.u_bias is not None and math.isfinite(each.u_bias)
+    beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}" if known else " ± not known"
     told = f"{each.bias:+.{places}f}"
     return ("0" if float(told) == 0 else told) + beside
