@@ -8,16 +8,17 @@ from rich.console import Group
 from rich.text import Text
 
 from validation.report import cells, station_table
-from validation.report.requirements import Requirement, next_step, sentence
+from validation.report.requirements import Grade, Requirement, next_step, sentence
 
 _WORDS = ("requirement", "result", "limited by")
+_SHORT = ((str(Grade.WELL), "well within"), (str(Grade.WITHIN), "within"), (str(Grade.OPEN), "no tolerance"))
 
 
 def report(found: Sequence[Requirement], title: str) -> Group:
     """The same as the first screen of a page, without its pictures."""
     columns = ("no.", *station_table.COLUMNS[1:])
-    rows = ((str(line.number), *map(_plain, line.cells)) for line in station_table.lines(found))
-    table = cells.table(title, *columns, rows=rows, words=_WORDS)
+    rows = ((str(line.number), line.cells[0], *map(_plain, line.cells[1:])) for line in station_table.lines(found))
+    table = cells.table(title, *columns, rows=rows, words=_WORDS, wrap=True)
     lines = [Text(f" {_plain(station_table.NOTE)}"), Text(f"\n{sentence(found)}", style="bold")]
     if step := next_step(found):
         lines.append(Text(f"What to do next. {step}"))
@@ -25,5 +26,7 @@ def report(found: Sequence[Requirement], title: str) -> Group:
 
 
 def _plain(cell: str) -> str:
-    """Letters that every terminal has."""
-    return cell.replace("±", "+-").replace("°", " degrees")
+    """In few letters, and in those that every terminal has."""
+    for long, short in (("±", "+-"), ("°", " degrees"), *_SHORT):
+        cell = cell.replace(long, short)
+    return cell
