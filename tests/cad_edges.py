@@ -57,7 +57,7 @@ def sharp_edges(path: Path) -> Sharp:
         bends.append(float(angle.max()))
         is_sharp = float(np.median(angle)) >= TANGENT
         ends = _points(edge.curve[1], (0.0, 1.0))
-        if edge.kind == "line":
+        if edge.kind == "line" or _is_straight(edge.curve[1]):
             (lines if is_sharp else smooth).append((ends, normals[0][[0, -1]], normals[1][[0, -1]]))
         elif edge.kind == "circle" and is_sharp:
             circle = edge.curve[1].Circle()
@@ -95,6 +95,14 @@ def _edges(shape: Any) -> list[_Edge]:
                 if not any(face.IsSame(other) for other in made.faces):
                     made.faces.append(face)
     return [edge for here in known.values() for _, edge in here if len(edge.faces) == 2]
+
+
+def _is_straight(curve: Any) -> bool:
+    """Whether a curve of another kind is straight, as boundaries of splines may be."""
+    points = _points(curve, tuple(np.linspace(0, 1, 12)))
+    away = points - points[0]
+    size = np.linalg.norm(away[-1])
+    return size > 0 and np.linalg.norm(np.cross(away, away[-1]), axis=1).max() <= 1e-6 * size**2
 
 
 def _points(curve: Any, places: tuple[float, ...]) -> np.ndarray:

@@ -25,12 +25,13 @@ _TANGENT = 1.25  # of the largest bend between facets: what continues a curve sm
 _TANGENT_BEND = np.radians(1.0)  # faces that bend by less are joined smoothly, whatever they stand for
 _SLIGHT = np.radians(12.0)
 _TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be unequal
+_FINE = np.radians(3.0)  # a plane as narrow as a facet of a surface that bends by so little is not likely
 _FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
 _LAST = 1.5  # widths of the facet before
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
 _LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
-_SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a place
+SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a place
 _MANY = 64  # bends of one face; a plane with more is no facet
 
 
@@ -73,7 +74,7 @@ def facets(
     shape = _Shape.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
     linked, crossed = _linked(shape, ~around & ~edging)
-    slight = shape.slight(vertices) & ~edging
+    slight = shape.slight() & ~edging
     linked |= slight
     inner = linked.copy()
     facet = np.zeros(len(normals), bool)
@@ -86,7 +87,7 @@ def facets(
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, _components(len(normals), joins), -1)
     open_ = ~smooth & ~edging
-    return Facets(region, smooth, edging | _curved(shape, region, open_) | _passing(shape, region, open_))
+    return Facets(region, smooth, edging | _curved(shape, region, open_))
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,7 @@ class _Shape:
     length: np.ndarray
     bend: np.ndarray
     areas: np.ndarray
+    unsure: float  # how far two places may be off each other in single precision
 
     @classmethod
     def of(cls, vertices, chains, normals, areas) -> _Shape:
@@ -109,19 +111,21 @@ class _Shape:
         length = np.linalg.norm(along, axis=1)
         one, two = normals[faces[:, 0]], normals[faces[:, 1]]
         bend = np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
-        return cls(ends, faces, np.array([chain[2] for chain in chains], bool), along, length, bend, areas)
+        convex = np.array([chain[2] for chain in chains], bool)
+        unsure = 2 * SINGLE * float(np.abs(vertices).max())
+        return cls(ends, faces, convex, along, length, bend, areas, unsure)
 
     @property
     def height(self) -> np.ndarray:
         """Of a curve over its chords (sagitta), were each chain a bend of one, shape (C,)."""
         return self.bend * self.areas[self.faces].min(1) / self.length / 8
 
-    def slight(self, vertices: np.ndarray) -> np.ndarray:
+    def slight(self) -> np.ndarray:
         """Chains at which faces bend by nothing that counts, but for what single precision makes of slivers; (C,)."""
         longest = np.zeros(len(self.areas))
         for side in (0, 1):
             np.maximum.at(longest, self.faces[:, side], self.length)
-        unsure = _SINGLE * np.abs(vertices).max() * longest / self.areas
+        unsure = self.unsure / 2 * longest / self.areas
         return self.bend - unsure[self.faces].sum(1) <= _TANGENT_BEND
 
 
@@ -254,65 +258,62 @@ def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
 
 
 def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """Faces at the end of a curved surface that are its last facets, as wide as the one before; bool, shape (F,)."""
+    """Which faces at the end of a curved surface are its last facets; those that are facets among them; bool, (F,).
+
+    They are about as wide as the one before, and the surface bends towards them as before: towards a plane half as much.
+    """
     width = shape.areas[shape.faces] / shape.length[:, None]
-    found = facet.copy()
-    bent = smooth & (shape.bend > _TANGENT_BEND) & (shape.bend <= _SLIGHT)
+    curvature = shape.bend / width.sum(1)
+    found, bent = facet.copy(), smooth & (shape.bend <= _SLIGHT)
     largest = np.zeros(len(shape.areas))
     inner = bent & facet[shape.faces].all(1)
     once = np.bincount(shape.faces[bent].ravel(), minlength=len(facet)) == 1
     for side in (0, 1):
-        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+        np.maximum.at(largest, shape.faces[inner, side], curvature[inner])
     for side in (0, 1):
         here, before = shape.faces[:, side], shape.faces[:, 1 - side]
-        full = shape.bend >= _FULL * largest[before]
-        rows = bent & facet[before] & ~facet[here] & once[here] & full & (width[:, side] <= _LAST * width[:, 1 - side])
-        found[here[rows]] = True
+        full = (curvature >= _FULL * largest[before]) | (shape.bend <= _FINE)
+        rows = bent & facet[before] & ~facet[here] & once[here] & full
+        found[here[rows & (width[:, side] <= _LAST * width[:, 1 - side])]] = True
     return found
 
 
 def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
-    """Which chains are pieces of a curved edge, between a curved surface and the same other one; bool, (C,)."""
-    sides = np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces)
-    candidates = np.flatnonzero(open_ & (region[shape.faces] >= 0).any(1))
-    meeting: dict[tuple, list[int]] = {}
-    for i in candidates:
-        for end in shape.ends[i]:
-            meeting.setdefault((int(end), *sorted(sides[i].tolist())), []).append(int(i))
-    found = np.zeros(len(shape.bend), bool)
-    for (end, *_), chains in meeting.items():
-        for i, j in combinations(chains, 2):
-            one, two = (shape.along[k] * (1 if shape.ends[k][0] == end else -1) for k in (i, j))
-            if -(one @ two) >= _CURVE * shape.length[i] * shape.length[j]:
-                found[i] |= shape.length[i] <= _LONGER * shape.length[j]
-                found[j] |= shape.length[j] <= _LONGER * shape.length[i]
-    return found
+    """Which chains are pieces of a curved edge; bool, shape (C,).
 
-
-def _passing(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
-    """Which chains are pieces of a curved edge that passes through a vertex in which no other edge ends; bool, (C,).
-
-    The surfaces on both sides are then smooth there. A straight edge that continues a curve is much longer than pieces.
+    They go on, turning a little, between the same surfaces, or through a vertex in which no other edge ends, for the
+    surfaces on both sides are smooth there. A straight edge that continues a curve is much longer than its pieces; a
+    last piece without a facet beside it turns as much as those before.
     """
-    ends = shape.ends[open_].ravel()
-    two = np.bincount(ends, minlength=shape.ends.max(initial=0) + 1) == 2
-    order = np.argsort(ends, kind="stable")
-    order = order[two[ends[order]]].reshape(-1, 2)
-    chain, first = np.flatnonzero(open_)[order // 2], order % 2 == 0
-    away = shape.along[chain] * np.where(first, 1.0, -1.0)[..., None]
-    length = shape.length[chain]
-    turns = -(away[:, 0] * away[:, 1]).sum(1) >= _CURVE * length.prod(1)
-    curved = (region[shape.faces[chain]] >= 0).any(2)
-    turn = np.arccos(np.clip(-(away[:, 0] * away[:, 1]).sum(1) / length.prod(1), -1, 1))
-    before = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece
-    before[chain, np.where(first, 0, 1)] = turn[:, None]
+    pairs, ends, alone = _meetings(shape, open_)
+    away = shape.along[pairs] * np.where(ends == 0, 1.0, -1.0)[..., None]
+    cosine = -(away[:, 0] * away[:, 1]).sum(1) / shape.length[pairs].prod(1)
+    sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
+    alike = (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
+    turn = np.arccos(np.clip(cosine, -1, 1))
+    straight = turn * shape.length[pairs].min(1) <= shape.unsure
+    run = _components(len(shape.bend), pairs[alike & straight])
+    length = np.bincount(run, shape.length)[run][pairs]
+    turns = (cosine >= _CURVE) & ~straight
+    curved = (region[shape.faces[pairs]] >= 0).any(2)
+    others = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece, where no other edge ends
+    others[pairs[alone], ends[alone]] = turn[alone, None]
     found = np.zeros(len(shape.bend), bool)
     for k in (0, 1):
-        beyond = before[chain[:, 1 - k], np.where(first[:, 1 - k], 1, 0)]
-        full = curved[:, 1 - k] & (turn >= _FULL * beyond)
+        full = curved[:, 1 - k] & (turn >= _FULL * others[pairs[:, 1 - k], 1 - ends[:, 1 - k]])
         most = np.where(curved[:, k], _LONGER, _LAST * full)
-        found[chain[turns & (length[:, k] <= most * length[:, 1 - k]), k]] = True
-    return found
+        rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
+        found[pairs[rows, k]] = True
+    return np.isin(run, run[found]) & open_
+
+
+def _meetings(shape: _Shape, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs (n, 2) of chains that meet in a vertex, which of their ends meet there, and whether no other one does."""
+    rows = np.flatnonzero(open_)
+    vertex = shape.ends[rows].ravel()
+    at = _pairs_of(vertex)
+    alone = np.bincount(vertex, minlength=1)[vertex[at[:, 0]]] == 2
+    return rows[at // 2], at % 2, alone
 
 
 def _components(count: int, pairs: np.ndarray) -> np.ndarray:

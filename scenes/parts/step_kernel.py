@@ -19,6 +19,7 @@ from typing import Any
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
+_FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
 
 
@@ -149,15 +150,37 @@ def _edges(faces: list[Any]) -> list[dict[str, Any]]:
             else:
                 known.append((edge, {number}))
     found = [(edge, sorted(on)) for known in owners.values() for edge, on in known if len(on) > 1]
-    return [_curve(edge) | {"faces": on, "bend": _bend(edge, [faces[i] for i in on[:2]])} for edge, on in found]
+    return [
+        _curve(edge) | {"faces": on, "bend": _bend(edge, [faces[i] for i in on[:2]]), "straight": _straight(edge)}
+        for edge, on in found
+    ]
+
+
+def _straight(edge: Any) -> bool:
+    """Whether it is a line, or a curve of another kind that is none the less straight."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+    adaptor = BRepAdaptor_Curve(edge)
+    first, last = adaptor.FirstParameter(), adaptor.LastParameter()
+    points = [_vector(adaptor.Value(first + place * (last - first))) for place in (0.0, *_ALONG, 1.0)]
+    way = [b - a for a, b in zip(points[0], points[-1], strict=True)]
+    size = math.hypot(*way)
+    return size > 0 and all(
+        math.hypot(*_across([b - a for a, b in zip(points[0], point, strict=True)], way)) <= _FLAT * size * size
+        for point in points
+    )
+
+
+def _across(one: list[float], other: list[float]) -> list[float]:
+    """Their cross product."""
+    return [one[i - 2] * other[i - 1] - one[i - 1] * other[i - 2] for i in range(3)]
 
 
 def _bend(edge: Any, faces: list[Any]) -> float:
     """Angle between the normals of two faces along their edge, rad: the middle one of several."""
     angles = []
     for one, other in zip(*(_normals(edge, face) for face in faces), strict=True):
-        across = [one[i - 2] * other[i - 1] - one[i - 1] * other[i - 2] for i in range(3)]
-        angles.append(math.atan2(math.hypot(*across), sum(a * b for a, b in zip(one, other, strict=True))))
+        angles.append(math.atan2(math.hypot(*_across(one, other)), sum(a * b for a, b in zip(one, other, strict=True))))
     return sorted(angles)[len(angles) // 2]
 
 

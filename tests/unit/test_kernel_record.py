@@ -142,7 +142,7 @@ def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel, monkeypatch):
     ]
     found = step_kernel._edges([*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
     assert [edge["faces"] for edge in found] == [[0, 2, 3], [0, 2], [1, 3], [2, 3]]
-    assert {edge["bend"] for edge in found} == {2.5}
+    assert {(edge["bend"], edge["straight"]) for edge in found} == {(2.5, True)}
     assert step_kernel._edges([plain("f", [edges["u"], edges["u"]])]) == []
 
 
