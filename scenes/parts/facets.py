@@ -1,38 +1,34 @@
 """Which faces of a mesh stand for a curved surface: rims of circles, and chains of narrow faces that bend alike.
 
-A face is a facet if two bends of the surface, both outwards or both inwards and at most 31 degrees (a prism of 12 sides
-is a cylinder), follow each other across it and it is not much wider than what lies beyond them: the plane between two
-rounded edges is no facet. A chain of at least four bends is a curved surface; three are a polygon's.
+A face is a facet if two bends of the surface follow each other across it and it is not much wider than what lies beyond
+them: the plane between two rounded edges is no facet. They bend the same way, by at most 31 degrees (a prism of 12
+sides is a cylinder), or by at most 12 any way: so files divide surfaces that bend both ways. A chain of at least four
+bends is a curved surface; three are a polygon's, and so are those whose height over the chords is many times that of
+the file's other curves. Bends of less than a degree are none, and an edge that ends within a surface is none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from scenes.parts.chains import Chain, Chains, components, pairs_of
+from scenes.parts.curves import curved
 from scenes.parts.rims import Rim
 
-Chain = tuple[tuple[int, int], tuple[int, int], bool]  # ends, faces, convex
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
 _LEAST_BENDS = 4
 _WIDER = 5.0  # than its neighbours: the steps of a curve may be unequal
 _TANGENT = 1.25  # of the largest bend between facets: what continues a curve smoothly
 _TANGENT_BEND = np.radians(1.0)  # faces that bend by less are joined smoothly, whatever they stand for
-_SLIGHT = np.radians(12.0)
+_SLIGHT = np.radians(12.0)  # bends of less are those of curves as files divide them, whichever way they go
 _TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be unequal
 _FINE = np.radians(3.0)  # a plane as narrow as a facet of a surface that bends by so little is not likely
 _FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
 _LAST = 1.5  # widths of the facet before
-_CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
-_LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
-SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a place
-_MANY = 64  # bends of one face; a plane with more is no facet
 
 
 @dataclass(frozen=True)
@@ -71,10 +67,10 @@ def facets(
     rims : iterable of Rim
         The circles.
     """
-    shape = _Shape.of(vertices, chains, normals, areas)
+    shape = Chains.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
     linked, crossed = _linked(shape, ~around & ~edging)
-    slight = shape.slight() & ~edging
+    slight = (shape.certain <= _TANGENT_BEND) & ~edging
     linked |= slight
     inner = linked.copy()
     facet = np.zeros(len(normals), bool)
@@ -85,48 +81,9 @@ def facets(
     smooth |= _dangling(shape, ~smooth)
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
-    region = np.where(facet, _components(len(normals), joins), -1)
+    region = np.where(facet, components(len(normals), joins), -1)
     open_ = ~smooth & ~edging
-    return Facets(region, smooth, edging | _curved(shape, region, open_))
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """The chains as arrays."""
-
-    ends: np.ndarray
-    faces: np.ndarray
-    convex: np.ndarray
-    along: np.ndarray
-    length: np.ndarray
-    bend: np.ndarray
-    areas: np.ndarray
-    unsure: float  # how far two places may be off each other in single precision
-
-    @classmethod
-    def of(cls, vertices, chains, normals, areas) -> _Shape:
-        ends = np.array([chain[0] for chain in chains]).reshape(-1, 2)
-        faces = np.array([chain[1] for chain in chains]).reshape(-1, 2)
-        along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
-        length = np.linalg.norm(along, axis=1)
-        one, two = normals[faces[:, 0]], normals[faces[:, 1]]
-        bend = np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
-        convex = np.array([chain[2] for chain in chains], bool)
-        unsure = 2 * SINGLE * float(np.abs(vertices).max())
-        return cls(ends, faces, convex, along, length, bend, areas, unsure)
-
-    @property
-    def height(self) -> np.ndarray:
-        """Of a curve over its chords (sagitta), were each chain a bend of one, shape (C,)."""
-        return self.bend * self.areas[self.faces].min(1) / self.length / 8
-
-    def slight(self) -> np.ndarray:
-        """Chains at which faces bend by nothing that counts, but for what single precision makes of slivers; (C,)."""
-        longest = np.zeros(len(self.areas))
-        for side in (0, 1):
-            np.maximum.at(longest, self.faces[:, side], self.length)
-        unsure = self.unsure / 2 * longest / self.areas
-        return self.bend - unsure[self.faces].sum(1) <= _TANGENT_BEND
+    return Facets(region, smooth, edging | curved(shape, region, open_))
 
 
 def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
@@ -145,11 +102,11 @@ def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.n
     return around, edging & ~around
 
 
-def _linked(shape: _Shape, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _linked(shape: Chains, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Chains of which at least four follow each other across narrow faces, bending alike (bool, (C,)); these faces."""
     for _ in range(2):  # what polygons there are is told from the curves found first
         links = _links(shape, free)
-        group = _components(len(shape.bend), links[:, :2])
+        group = components(len(shape.bend), links[:, :2])
         linked = (np.bincount(group) >= _LEAST_BENDS)[group] & free
         polygonal = linked & (_polygonal(shape, group, linked) | _standing_out(shape, links[:, :2]))
         if not polygonal.any():
@@ -159,7 +116,7 @@ def _linked(shape: _Shape, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return linked, links[linked[links[:, :2]].all(1), 2]
 
 
-def _polygonal(shape: _Shape, group: np.ndarray, linked: np.ndarray) -> np.ndarray:
+def _polygonal(shape: Chains, group: np.ndarray, linked: np.ndarray) -> np.ndarray:
     """Which chains are those of polygons, among curves that are divided much more finely; bool, shape (C,).
 
     By the height of a curve over its chords (sagitta), by which files are divided: of a chain against the others of its
@@ -184,7 +141,7 @@ def _polygonal(shape: _Shape, group: np.ndarray, linked: np.ndarray) -> np.ndarr
     return found
 
 
-def _standing_out(shape: _Shape, links: np.ndarray) -> np.ndarray:
+def _standing_out(shape: Chains, links: np.ndarray) -> np.ndarray:
     """Chains of which the height is larger by far than those of all that follow, and of the next; bool, shape (C,)."""
     height = shape.height
     here, there = np.concatenate([links, links[:, ::-1]]).T
@@ -200,11 +157,11 @@ def _standing_out(shape: _Shape, links: np.ndarray) -> np.ndarray:
     return height > 2 * _COARSER * beyond
 
 
-def _links(shape: _Shape, free: np.ndarray) -> np.ndarray:
+def _links(shape: Chains, free: np.ndarray) -> np.ndarray:
     """Pairs of chains that follow each other across a facet, and that face, (n, 3)."""
     rows = np.flatnonzero(free & (shape.bend <= _BEND))
     chain, face, other = np.tile(rows, 2), shape.faces[rows].T.ravel(), shape.faces[rows][:, ::-1].T.ravel()
-    pairs = _pairs_of(face)
+    pairs = pairs_of(face)
     one, two = chain[pairs].T
     here = face[pairs[:, 0]]
     width = shape.areas[here] / np.maximum(shape.length[one], shape.length[two])
@@ -213,21 +170,7 @@ def _links(shape: _Shape, free: np.ndarray) -> np.ndarray:
     return np.column_stack([one, two, here])[alike & (width <= _WIDER * beyond)]
 
 
-def _pairs_of(face: np.ndarray) -> np.ndarray:
-    """Pairs (n, 2) of places at which the same face stands; none of one that stands at more than `_MANY`."""
-    order = np.argsort(face, kind="stable")
-    count = np.bincount(face)
-    first = np.cumsum(count) - count
-    found = [np.zeros((0, 2), int)]
-    for size in range(2, _MANY + 1):
-        starts = first[count == size]
-        if starts.size:
-            one, two = np.triu_indices(size, 1)
-            found.append(np.stack([order[starts[:, None] + one].ravel(), order[starts[:, None] + two].ravel()], 1))
-    return np.concatenate(found)
-
-
-def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
+def _continued(shape: Chains, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,).
 
     Beside the largest bend of a facet and the next: between triangles of a curve every second one is nearly flat.
@@ -242,7 +185,7 @@ def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray
     return ends & (shape.bend <= most * next_[shape.faces].max(1))
 
 
-def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
+def _dangling(shape: Chains, edges: np.ndarray) -> np.ndarray:
     """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
 
     Only those that bend no more than the facets of a curve do: an edge ends where others do.
@@ -257,10 +200,10 @@ def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
         left &= ~loose
 
 
-def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """Which faces at the end of a curved surface are its last facets; those that are facets among them; bool, (F,).
+def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Facets, and those faces at the end of a curved surface that are its last ones; bool, shape (F,).
 
-    They are about as wide as the one before, and the surface bends towards them as before: towards a plane half as much.
+    They are about as wide as the one before, and the surface bends as before: towards a plane it does half as much.
     """
     width = shape.areas[shape.faces] / shape.length[:, None]
     curvature = shape.bend / width.sum(1)
@@ -276,47 +219,3 @@ def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
         rows = bent & facet[before] & ~facet[here] & once[here] & full
         found[here[rows & (width[:, side] <= _LAST * width[:, 1 - side])]] = True
     return found
-
-
-def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
-    """Which chains are pieces of a curved edge; bool, shape (C,).
-
-    They go on, turning a little, between the same surfaces, or through a vertex in which no other edge ends, for the
-    surfaces on both sides are smooth there. A straight edge that continues a curve is much longer than its pieces; a
-    last piece without a facet beside it turns as much as those before.
-    """
-    pairs, ends, alone = _meetings(shape, open_)
-    away = shape.along[pairs] * np.where(ends == 0, 1.0, -1.0)[..., None]
-    cosine = -(away[:, 0] * away[:, 1]).sum(1) / shape.length[pairs].prod(1)
-    sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
-    alike = (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
-    turn = np.arccos(np.clip(cosine, -1, 1))
-    straight = turn * shape.length[pairs].min(1) <= shape.unsure
-    run = _components(len(shape.bend), pairs[alike & straight])
-    length = np.bincount(run, shape.length)[run][pairs]
-    turns = (cosine >= _CURVE) & ~straight
-    curved = (region[shape.faces[pairs]] >= 0).any(2)
-    others = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece, where no other edge ends
-    others[pairs[alone], ends[alone]] = turn[alone, None]
-    found = np.zeros(len(shape.bend), bool)
-    for k in (0, 1):
-        full = curved[:, 1 - k] & (turn >= _FULL * others[pairs[:, 1 - k], 1 - ends[:, 1 - k]])
-        most = np.where(curved[:, k], _LONGER, _LAST * full)
-        rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
-        found[pairs[rows, k]] = True
-    return np.isin(run, run[found]) & open_
-
-
-def _meetings(shape: _Shape, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs (n, 2) of chains that meet in a vertex, which of their ends meet there, and whether no other one does."""
-    rows = np.flatnonzero(open_)
-    vertex = shape.ends[rows].ravel()
-    at = _pairs_of(vertex)
-    alone = np.bincount(vertex, minlength=1)[vertex[at[:, 0]]] == 2
-    return rows[at // 2], at % 2, alone
-
-
-def _components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Number of the connected component of each of ``count`` things."""
-    graph = coo_array((np.ones(len(pairs)), np.asarray(pairs).reshape(-1, 2).T), shape=(count, count))
-    return connected_components(graph, directed=False)[1]

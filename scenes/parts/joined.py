@@ -6,10 +6,8 @@ from collections import defaultdict
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from scenes.parts.facets import SINGLE, Chain
+from scenes.parts.chains import SINGLE, Chain, components
 
 _FLAT = 1e-4  # rad, between the normals of one plane
 
@@ -45,10 +43,10 @@ def joined(
         pair
         for vertex, found in meeting.items()
         for pair in combinations(found, 2)
-        if _in_line(vertices, vertex, *(chains[k] for k in pair)) and _alike(normals, region, *(chains[k] for k in pair))
+        if _in_line(vertices, vertex, *(chains[k] for k in pair))
+        and _alike(normals, region, *(chains[k] for k in pair))
     ]
-    graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(chains),) * 2)
-    group = connected_components(graph, directed=False)[1]
+    group = components(len(chains), np.array(pairs, int))
     parts: dict[int, list[Chain]] = defaultdict(list)
     for row in rows.tolist():
         parts[int(group[row])].append(chains[row])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from scenes.parts.rims import circle_through
 from scenes.parts.solid import Solid
 from scenes.parts.surfaces import Cylinder, axes_beside

@@ -1,5 +1,7 @@
 """Which edges of a mesh are the part's: on parts whose edges are known from how they were made."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import trimesh
@@ -67,7 +69,7 @@ def half_of_a_cone(rows=(0.0, 4.0, 7.0, 10.0), counts=(20, 23, 19, 26)):
         angle, radius = np.linspace(0, np.pi, count + 1), 5 - 0.2 * z
         rings.append(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count + 1, z)]))
     triangles = []
-    for low, high in zip(rings, rings[1:], strict=False):
+    for low, high in pairwise(rings):
         i = j = 0
         while i < len(low) - 1 or j < len(high) - 1:
             if j == len(high) - 1 or (i < len(low) - 1 and (i + 1) / len(low) <= (j + 1) / len(high)):
