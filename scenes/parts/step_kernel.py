@@ -21,7 +21,7 @@ FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
 _WAYS = (False, 1, False), (True, 1, False), (False, 2, False), (True, 2, False), (False, 1, True)
-"""Whether the shape is healed, what the pieces of a turn are divided by, whether the triangles are taken as they are."""
+"""Whether the shape is healed, what the pieces of a turn are divided by, whether what comes is taken as it is."""
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
