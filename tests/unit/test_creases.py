@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
+import scenes
+from imaging.blurred import boundaries
+from imaging.pictures import Pictures
 from scenes.parts import mesh, rims
 from scenes.parts.joined import joined
 from scenes.parts.recognised import cylinders
@@ -176,3 +179,22 @@ def test_regions_of_several_solids_stay_apart():
     both = assembled(rod, rod, block((1, 1, 1)))
     assert both.plane.tolist() == [*rod.plane, *rod.plane, *[True] * 6]
     assert len(set(both.regions[~both.plane])) == 2
+
+
+def test_bends_of_a_round_wall_are_boundaries_where_one_side_is_hidden():
+    """Of the bracket's bore, 96 pieces, those are left at which it turns away from the sensor; coarse ones are all."""
+    scene = scenes.load("bracket_mm")
+    solid = scene.solid
+    smooth = np.array([edge.kind == "smooth" for edge in solid.edges])
+    assert boundaries.slight(solid).tolist() == smooth.tolist()
+    assert not boundaries.slight(mesh.solid(trimesh.creation.cylinder(3, 10, sections=48))).any()  # 7.5 degrees
+    pictures = Pictures.of(scene, np.array([[40.0, 30.0]]), np.array([[30.0, 100.0]]))
+    names = (solid.sharp[0].name,)
+    places = boundaries.Places(names, np.array([[[0.1, 0.9]]]), np.zeros((1, 1, 2, 2, 2)), np.zeros((1, 1, 2, 2, 2)))
+    _, _, other = boundaries._pairs(pictures, places, 1e5)
+    away = pictures.sensor_at[0] - solid.vertices[[edge.ends[0] for edge in solid.edges]]
+    faces = np.array([edge.faces for edge in solid.edges])
+    seen = np.einsum("efi,ei->ef", solid.normals[faces], away) > 0
+    wanted = np.flatnonzero(np.where(smooth, seen.sum(1) == 1, seen.any(1)))
+    assert sorted(other.tolist()) == wanted.tolist()
+    assert 0 < sum(smooth[wanted]) < 10  # two bores turn away twice each
