@@ -48,7 +48,7 @@ REMEDIES = {
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
-    CLUTTER: "move lamp or sensor (`ice plan`), or measure by `arrangement`, which knows what lies around an edge",
+    CLUTTER: "move lamp or sensor (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
     OK: "",
 }

@@ -258,7 +258,7 @@ def test_the_plan_s_tables_are_its_json(planned):
     for row, c in zip(rows[1:], planned.candidates[itself:], strict=True):
         over = f"{c.variance / planned.variance:.3f}"
         assert row == ["", pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
-    headings, rows = titled(made, "The paper's search")
+    headings, rows = titled(made, "The paper's alternating search")
     assert headings == ["held fixed", "", "found", "", "largest ratio^2"]
     for row, s in zip(rows, planned.trace, strict=True):
         assert row == [s.fixed, pose(s.fixed_pose), s.found, pose(s.found_pose), f"{s.variance:.4g}"]
