@@ -41,7 +41,7 @@ MEANINGS = {
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
 MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
-OF_SIGMA, OF_TOLERANCE = 1.0, 0.1  # what u(bias) may be of noise, and of the tolerance to one side
+OF_SIGMA, OF_TOLERANCE = 1.0, 0.2  # what u(bias) may be of noise, and of half the tolerance zone
 
 
 def worst(*statuses: str) -> str:
@@ -85,7 +85,7 @@ def corrected(
     u_bias, sigma : float
         Standard uncertainties (not variances) of the correction and by noise, of one unit; infinite: not known.
     tolerance : float
-        To one side, of the same unit; 0 where there is none.
+        Half of its zone, of the same unit; 0 where there is none.
     modelled : bool
         Whether ``misfit`` of the picture may be what the simulated one has, too.
 

@@ -100,13 +100,17 @@ def of_render(
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
 
 
-@lru_cache(maxsize=64)
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
     Renders of other rays are added until their noise is below a tenth of sigma or a hundredth of the tolerance, six at
     most.
     """
+    return _simulated(picture, method, how)
+
+
+@lru_cache(maxsize=64)
+def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
     renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
     images = _completed(alike, renders, (), how)
