@@ -104,17 +104,23 @@ def corrected(
     return OK if small else CLUTTER
 
 
-def doubt(status: str) -> str:
+def doubt(status: str, bias: str = "") -> str:
     """Why a value is not relied on, in a few words: what is wrong, and what is not known of it; empty where it is.
+
+    ``bias`` is how large it may be, with its unit, where that is known.
 
     >>> doubt("clutter"), doubt("short")
     ('clutter, bias unknown', 'short, no value')
+    >>> doubt("clutter", "0.03 mm")
+    'clutter, bias up to 0.03 mm'
     """
     if is_trusted(status):
         return ""
     if status in (CORRELATED, COMPRESSED):
         return f"{status}, uncertainty unknown"
-    return f"{status}, {'bias unknown' if status in MEASURED else 'no value'}"
+    if status not in MEASURED:
+        return f"{status}, no value"
+    return f"{status}, bias up to {bias}" if bias and status == CLUTTER else f"{status}, bias unknown"
 
 
 def legend(statuses: Iterable[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""A newcomer's plate: 50 x 30 x 8 mm with a step 2 mm wide and deep, at whose foot light from the riser moves an edge."""
+"""A newcomer's plate, 50 x 30 x 8 mm, its step 2 mm wide and deep: at its foot light from the riser moves an edge."""
 
 import numpy as np
 import pytest
