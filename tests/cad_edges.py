@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 TANGENT = math.radians(1.0)  # faces that meet at less join smoothly
 SAME = 1e-3  # mm
@@ -57,7 +60,7 @@ def sharp_edges(path: Path) -> Sharp:
         bends.append(float(angle.max()))
         is_sharp = float(np.median(angle)) >= TANGENT
         ends = _points(edge.curve[1], (0.0, 1.0))
-        if edge.kind == "line":
+        if edge.kind == "line" or _is_straight(edge.curve[1]):
             (lines if is_sharp else smooth).append((ends, normals[0][[0, -1]], normals[1][[0, -1]]))
         elif edge.kind == "circle" and is_sharp:
             circle = edge.curve[1].Circle()
@@ -97,6 +100,14 @@ def _edges(shape: Any) -> list[_Edge]:
     return [edge for here in known.values() for _, edge in here if len(edge.faces) == 2]
 
 
+def _is_straight(curve: Any) -> bool:
+    """Whether a curve of another kind is straight, as boundaries of splines may be."""
+    points = _points(curve, tuple(np.linspace(0, 1, 12)))
+    away = points - points[0]
+    size = np.linalg.norm(away[-1])
+    return size > 0 and np.linalg.norm(np.cross(away, away[-1]), axis=1).max() <= 1e-6 * size**2
+
+
 def _points(curve: Any, places: tuple[float, ...]) -> np.ndarray:
     first, last = curve.FirstParameter(), curve.LastParameter()
     found = [curve.Value(first + place * (last - first)) for place in places]
@@ -124,32 +135,30 @@ def _normals(edge: Any, face: Any) -> np.ndarray:
 
 def _joined(lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> np.ndarray:
     """Ends of straight edges; pieces that follow each other in a line between faces of the same normals are one."""
-    left = [(ends, tuple(pair)) for ends, *pair in lines]
-    again = True
-    while again:
-        again = False
-        for i, j in [(k, m) for k in range(len(left)) for m in range(k)]:
-            whole = _continued(left[i], left[j])
-            if whole is not None:
-                left = [each for k, each in enumerate(left) if k not in (i, j)] + [whole]
-                again = True
-                break
-    return np.array([ends for ends, _ in left]).reshape(-1, 2, 3)
+    ends = np.array([line[0] for line in lines]).reshape(-1, 3)
+    if not len(ends):
+        return ends.reshape(-1, 2, 3)
+    meeting = KDTree(ends).query_pairs(SAME / 10)
+    pairs = [(i // 2, j // 2) for i, j in meeting if i // 2 != j // 2 and _continued(lines, i, j)]
+    graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(lines),) * 2)
+    group = connected_components(graph, directed=False)[1]
+    return np.array([_farthest(ends[np.repeat(group, 2) == g]) for g in range(group.max() + 1)])
 
 
-def _continued(one: tuple, other: tuple) -> tuple | None:
-    """Two straight edges as one, None where they are not."""
-    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        if np.abs(one[0][i] - other[0][j]).max() > SAME / 10:
-            continue
-        ways = [e[0][1 - k] - e[0][k] for e, k in ((one, i), (other, j))]
-        if ways[0] @ ways[1] > -(1 - 1e-9) * np.linalg.norm(ways[0]) * np.linalg.norm(ways[1]):
-            continue
-        for order in ((0, 1), (1, 0)):
-            if all(np.abs(one[1][k][i] - other[1][order[k]][j]).max() < 1e-4 for k in (0, 1)):
-                sides = tuple(np.stack([one[1][k][1 - i], other[1][order[k]][1 - j]]) for k in (0, 1))
-                return np.stack([one[0][1 - i], other[0][1 - j]]), sides
-    return None
+def _continued(lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]], i: int, j: int) -> bool:
+    """Whether two edges continue each other where their ends of these numbers meet."""
+    (one, k), (other, m) = ((lines[n // 2], n % 2) for n in (i, j))
+    ways = one[0][1 - k] - one[0][k], other[0][1 - m] - other[0][m]
+    if ways[0] @ ways[1] > -(1 - 1e-9) * np.linalg.norm(ways[0]) * np.linalg.norm(ways[1]):
+        return False
+    off = [[np.abs(one[a][k] - other[b][m]).max() for b in (1, 2)] for a in (1, 2)]
+    return min(max(off[0][0], off[1][1]), max(off[0][1], off[1][0])) < 1e-4
+
+
+def _farthest(points: np.ndarray) -> np.ndarray:
+    """The two of points (n, 3) of a line that are farthest apart."""
+    first = points[np.linalg.norm(points - points[0], axis=1).argmax()]
+    return np.stack([first, points[np.linalg.norm(points - first, axis=1).argmax()]])
 
 
 def _whole(arcs: list[tuple[np.ndarray, np.ndarray, float]]) -> np.ndarray:

@@ -1,37 +1,34 @@
 """Which faces of a mesh stand for a curved surface: rims of circles, and chains of narrow faces that bend alike.
 
-A face is a facet if two bends of the surface, both outwards or both inwards and at most 31 degrees (a prism of 12 sides
-is a cylinder), follow each other across it and it is not much wider than what lies beyond them: the plane between two
-rounded edges is no facet. A chain of at least four bends is a curved surface; three are a polygon's.
+A face is a facet if two bends of the surface follow each other across it and it is not much wider than what lies beyond
+them: the plane between two rounded edges is no facet. They bend the same way, by at most 31 degrees (a prism of 12
+sides is a cylinder), or by at most 12 any way: so files divide surfaces that bend both ways. A chain of at least four
+bends is a curved surface; three are a polygon's, and so are those whose height over the chords is many times that of
+the file's other curves. Bends of less than a degree are none, and an edge that ends within a surface is none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from scenes.parts.chains import Chain, Chains, components, pairs_of
+from scenes.parts.curves import curved
 from scenes.parts.rims import Rim
 
-Chain = tuple[tuple[int, int], tuple[int, int], bool]  # ends, faces, convex
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
 _LEAST_BENDS = 4
 _WIDER = 5.0  # than its neighbours: the steps of a curve may be unequal
 _TANGENT = 1.25  # of the largest bend between facets: what continues a curve smoothly
 _TANGENT_BEND = np.radians(1.0)  # faces that bend by less are joined smoothly, whatever they stand for
-_SLIGHT = np.radians(12.0)
+_SLIGHT = np.radians(12.0)  # bends of less are those of curves as files divide them, whichever way they go
 _TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be unequal
+_FINE = np.radians(3.0)  # a plane as narrow as a facet of a surface that bends by so little is not likely
 _FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
 _LAST = 1.5  # widths of the facet before
-_CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
-_LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
-_SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a place
-_MANY = 64  # bends of one face; a plane with more is no facet
 
 
 @dataclass(frozen=True)
@@ -70,10 +67,10 @@ def facets(
     rims : iterable of Rim
         The circles.
     """
-    shape = _Shape.of(vertices, chains, normals, areas)
+    shape = Chains.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
     linked, crossed = _linked(shape, ~around & ~edging)
-    slight = shape.slight(vertices) & ~edging
+    slight = (shape.certain <= _TANGENT_BEND) & ~edging
     linked |= slight
     inner = linked.copy()
     facet = np.zeros(len(normals), bool)
@@ -84,45 +81,9 @@ def facets(
     smooth |= _dangling(shape, ~smooth)
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
-    region = np.where(facet, _components(len(normals), joins), -1)
+    region = np.where(facet, components(len(normals), joins), -1)
     open_ = ~smooth & ~edging
-    return Facets(region, smooth, edging | _curved(shape, region, open_) | _passing(shape, region, open_))
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """The chains as arrays."""
-
-    ends: np.ndarray
-    faces: np.ndarray
-    convex: np.ndarray
-    along: np.ndarray
-    length: np.ndarray
-    bend: np.ndarray
-    areas: np.ndarray
-
-    @classmethod
-    def of(cls, vertices, chains, normals, areas) -> _Shape:
-        ends = np.array([chain[0] for chain in chains]).reshape(-1, 2)
-        faces = np.array([chain[1] for chain in chains]).reshape(-1, 2)
-        along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
-        length = np.linalg.norm(along, axis=1)
-        one, two = normals[faces[:, 0]], normals[faces[:, 1]]
-        bend = np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
-        return cls(ends, faces, np.array([chain[2] for chain in chains], bool), along, length, bend, areas)
-
-    @property
-    def height(self) -> np.ndarray:
-        """Of a curve over its chords (sagitta), were each chain a bend of one, shape (C,)."""
-        return self.bend * self.areas[self.faces].min(1) / self.length / 8
-
-    def slight(self, vertices: np.ndarray) -> np.ndarray:
-        """Chains at which faces bend by nothing that counts, but for what single precision makes of slivers; (C,)."""
-        longest = np.zeros(len(self.areas))
-        for side in (0, 1):
-            np.maximum.at(longest, self.faces[:, side], self.length)
-        unsure = _SINGLE * np.abs(vertices).max() * longest / self.areas
-        return self.bend - unsure[self.faces].sum(1) <= _TANGENT_BEND
+    return Facets(region, smooth, edging | curved(shape, region, open_))
 
 
 def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
@@ -141,11 +102,11 @@ def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.n
     return around, edging & ~around
 
 
-def _linked(shape: _Shape, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _linked(shape: Chains, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Chains of which at least four follow each other across narrow faces, bending alike (bool, (C,)); these faces."""
     for _ in range(2):  # what polygons there are is told from the curves found first
         links = _links(shape, free)
-        group = _components(len(shape.bend), links[:, :2])
+        group = components(len(shape.bend), links[:, :2])
         linked = (np.bincount(group) >= _LEAST_BENDS)[group] & free
         polygonal = linked & (_polygonal(shape, group, linked) | _standing_out(shape, links[:, :2]))
         if not polygonal.any():
@@ -155,7 +116,7 @@ def _linked(shape: _Shape, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return linked, links[linked[links[:, :2]].all(1), 2]
 
 
-def _polygonal(shape: _Shape, group: np.ndarray, linked: np.ndarray) -> np.ndarray:
+def _polygonal(shape: Chains, group: np.ndarray, linked: np.ndarray) -> np.ndarray:
     """Which chains are those of polygons, among curves that are divided much more finely; bool, shape (C,).
 
     By the height of a curve over its chords (sagitta), by which files are divided: of a chain against the others of its
@@ -180,7 +141,7 @@ def _polygonal(shape: _Shape, group: np.ndarray, linked: np.ndarray) -> np.ndarr
     return found
 
 
-def _standing_out(shape: _Shape, links: np.ndarray) -> np.ndarray:
+def _standing_out(shape: Chains, links: np.ndarray) -> np.ndarray:
     """Chains of which the height is larger by far than those of all that follow, and of the next; bool, shape (C,)."""
     height = shape.height
     here, there = np.concatenate([links, links[:, ::-1]]).T
@@ -196,11 +157,11 @@ def _standing_out(shape: _Shape, links: np.ndarray) -> np.ndarray:
     return height > 2 * _COARSER * beyond
 
 
-def _links(shape: _Shape, free: np.ndarray) -> np.ndarray:
+def _links(shape: Chains, free: np.ndarray) -> np.ndarray:
     """Pairs of chains that follow each other across a facet, and that face, (n, 3)."""
     rows = np.flatnonzero(free & (shape.bend <= _BEND))
     chain, face, other = np.tile(rows, 2), shape.faces[rows].T.ravel(), shape.faces[rows][:, ::-1].T.ravel()
-    pairs = _pairs_of(face)
+    pairs = pairs_of(face)
     one, two = chain[pairs].T
     here = face[pairs[:, 0]]
     width = shape.areas[here] / np.maximum(shape.length[one], shape.length[two])
@@ -209,21 +170,7 @@ def _links(shape: _Shape, free: np.ndarray) -> np.ndarray:
     return np.column_stack([one, two, here])[alike & (width <= _WIDER * beyond)]
 
 
-def _pairs_of(face: np.ndarray) -> np.ndarray:
-    """Pairs (n, 2) of places at which the same face stands; none of one that stands at more than `_MANY`."""
-    order = np.argsort(face, kind="stable")
-    count = np.bincount(face)
-    first = np.cumsum(count) - count
-    found = [np.zeros((0, 2), int)]
-    for size in range(2, _MANY + 1):
-        starts = first[count == size]
-        if starts.size:
-            one, two = np.triu_indices(size, 1)
-            found.append(np.stack([order[starts[:, None] + one].ravel(), order[starts[:, None] + two].ravel()], 1))
-    return np.concatenate(found)
-
-
-def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
+def _continued(shape: Chains, ends: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Which chains at the end of a curved surface continue it smoothly; bool, shape (C,).
 
     Beside the largest bend of a facet and the next: between triangles of a curve every second one is nearly flat.
@@ -238,7 +185,7 @@ def _continued(shape: _Shape, ends: np.ndarray, inner: np.ndarray) -> np.ndarray
     return ends & (shape.bend <= most * next_[shape.faces].max(1))
 
 
-def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
+def _dangling(shape: Chains, edges: np.ndarray) -> np.ndarray:
     """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
 
     Only those that bend no more than the facets of a curve do: an edge ends where others do.
@@ -253,69 +200,22 @@ def _dangling(shape: _Shape, edges: np.ndarray) -> np.ndarray:
         left &= ~loose
 
 
-def _last(shape: _Shape, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """Faces at the end of a curved surface that are its last facets, as wide as the one before; bool, shape (F,)."""
+def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Facets, and those faces at the end of a curved surface that are its last ones; bool, shape (F,).
+
+    They are about as wide as the one before, and the surface bends as before: towards a plane it does half as much.
+    """
     width = shape.areas[shape.faces] / shape.length[:, None]
-    found = facet.copy()
-    bent = smooth & (shape.bend > _TANGENT_BEND) & (shape.bend <= _SLIGHT)
+    curvature = shape.bend / width.sum(1)
+    found, bent = facet.copy(), smooth & (shape.bend <= _SLIGHT)
     largest = np.zeros(len(shape.areas))
     inner = bent & facet[shape.faces].all(1)
     once = np.bincount(shape.faces[bent].ravel(), minlength=len(facet)) == 1
     for side in (0, 1):
-        np.maximum.at(largest, shape.faces[inner, side], shape.bend[inner])
+        np.maximum.at(largest, shape.faces[inner, side], curvature[inner])
     for side in (0, 1):
         here, before = shape.faces[:, side], shape.faces[:, 1 - side]
-        full = shape.bend >= _FULL * largest[before]
-        rows = bent & facet[before] & ~facet[here] & once[here] & full & (width[:, side] <= _LAST * width[:, 1 - side])
-        found[here[rows]] = True
+        full = (curvature >= _FULL * largest[before]) | (shape.bend <= _FINE)
+        rows = bent & facet[before] & ~facet[here] & once[here] & full
+        found[here[rows & (width[:, side] <= _LAST * width[:, 1 - side])]] = True
     return found
-
-
-def _curved(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
-    """Which chains are pieces of a curved edge, between a curved surface and the same other one; bool, (C,)."""
-    sides = np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces)
-    candidates = np.flatnonzero(open_ & (region[shape.faces] >= 0).any(1))
-    meeting: dict[tuple, list[int]] = {}
-    for i in candidates:
-        for end in shape.ends[i]:
-            meeting.setdefault((int(end), *sorted(sides[i].tolist())), []).append(int(i))
-    found = np.zeros(len(shape.bend), bool)
-    for (end, *_), chains in meeting.items():
-        for i, j in combinations(chains, 2):
-            one, two = (shape.along[k] * (1 if shape.ends[k][0] == end else -1) for k in (i, j))
-            if -(one @ two) >= _CURVE * shape.length[i] * shape.length[j]:
-                found[i] |= shape.length[i] <= _LONGER * shape.length[j]
-                found[j] |= shape.length[j] <= _LONGER * shape.length[i]
-    return found
-
-
-def _passing(shape: _Shape, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
-    """Which chains are pieces of a curved edge that passes through a vertex in which no other edge ends; bool, (C,).
-
-    The surfaces on both sides are then smooth there. A straight edge that continues a curve is much longer than pieces.
-    """
-    ends = shape.ends[open_].ravel()
-    two = np.bincount(ends, minlength=shape.ends.max(initial=0) + 1) == 2
-    order = np.argsort(ends, kind="stable")
-    order = order[two[ends[order]]].reshape(-1, 2)
-    chain, first = np.flatnonzero(open_)[order // 2], order % 2 == 0
-    away = shape.along[chain] * np.where(first, 1.0, -1.0)[..., None]
-    length = shape.length[chain]
-    turns = -(away[:, 0] * away[:, 1]).sum(1) >= _CURVE * length.prod(1)
-    curved = (region[shape.faces[chain]] >= 0).any(2)
-    turn = np.arccos(np.clip(-(away[:, 0] * away[:, 1]).sum(1) / length.prod(1), -1, 1))
-    before = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece
-    before[chain, np.where(first, 0, 1)] = turn[:, None]
-    found = np.zeros(len(shape.bend), bool)
-    for k in (0, 1):
-        beyond = before[chain[:, 1 - k], np.where(first[:, 1 - k], 1, 0)]
-        full = curved[:, 1 - k] & (turn >= _FULL * beyond)
-        most = np.where(curved[:, k], _LONGER, _LAST * full)
-        found[chain[turns & (length[:, k] <= most * length[:, 1 - k]), k]] = True
-    return found
-
-
-def _components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Number of the connected component of each of ``count`` things."""
-    graph = coo_array((np.ones(len(pairs)), np.asarray(pairs).reshape(-1, 2).T), shape=(count, count))
-    return connected_components(graph, directed=False)[1]

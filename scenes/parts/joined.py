@@ -6,13 +6,9 @@ from collections import defaultdict
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from scenes.parts.facets import Chain
+from scenes.parts.chains import SINGLE, Chain, components
 
-_IN_LINE = 1e-7  # of 1 - cos: pieces turn by less, or by what single precision makes of it
-_SINGLE = 3e-7  # of the largest coordinate
 _FLAT = 1e-4  # rad, between the normals of one plane
 
 
@@ -50,8 +46,7 @@ def joined(
         if _in_line(vertices, vertex, *(chains[k] for k in pair))
         and _alike(normals, region, *(chains[k] for k in pair))
     ]
-    graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(chains),) * 2)
-    group = connected_components(graph, directed=False)[1]
+    group = components(len(chains), np.array(pairs, int))
     parts: dict[int, list[Chain]] = defaultdict(list)
     for row in rows.tolist():
         parts[int(group[row])].append(chains[row])
@@ -64,8 +59,7 @@ def _in_line(vertices: np.ndarray, vertex: int, one: Chain, other: Chain) -> boo
     long, short = sorted(away, key=np.linalg.norm, reverse=True)
     size = np.linalg.norm(long)
     off = np.linalg.norm(np.cross(short, long)) / size
-    near = max(np.sqrt(2 * _IN_LINE) * np.linalg.norm(short), 2 * _SINGLE * np.abs(vertices[vertex]).max())
-    return bool(short @ long < 0 and off <= near)
+    return bool(short @ long < 0 and off <= 2 * SINGLE * np.abs(vertices).max())
 
 
 def _alike(normals: np.ndarray, region: np.ndarray, one: Chain, other: Chain) -> bool:

@@ -18,7 +18,8 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
-from scenes.parts.facets import Chain, Facets, facets
+from scenes.parts.chains import Chain
+from scenes.parts.facets import Facets, facets
 from scenes.parts.joined import joined
 from scenes.parts.mend import mended
 from scenes.parts.rims import Rim, boundaries, rims

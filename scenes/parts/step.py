@@ -56,6 +56,8 @@ class StepEdge:
         One of a circle, both half axes of an ellipse, none otherwise.
     bend : float
         Angle between the normals of its faces in the middle of it, rad.
+    straight : bool
+        Whether it is a line, whatever its kind.
     """
 
     kind: str
@@ -65,11 +67,12 @@ class StepEdge:
     axis: np.ndarray | None
     radii: tuple[float, ...]
     bend: float = math.pi / 2
+    straight: bool = False
 
     def holds(self, points: np.ndarray, near: float) -> bool:
         """Whether it is straight and points (n, 3) lie on its line."""
         start, way = self.ends[0], self.ends[1] - self.ends[0]
-        if self.kind != "line" or not way.any():
+        if not self.straight or not way.any():
             return False
         return bool(np.linalg.norm(np.cross(points - start, way / np.linalg.norm(way)), axis=1).max() <= near)
 
@@ -272,4 +275,5 @@ def _edge(edge: dict[str, Any], scale: float) -> StepEdge:
         axis=np.array(edge["axis"]) if round_ else None,
         radii=tuple(scale * r for r in radii),
         bend=edge["bend"],
+        straight=edge["straight"],
     )

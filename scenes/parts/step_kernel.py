@@ -14,11 +14,16 @@ import json
 import math
 import os
 import sys
+from collections import Counter
 from typing import Any
 
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
+_WAYS = (False, 1, False), (True, 1, False), (False, 2, False), (True, 2, False), (False, 1, True)
+"""Whether the shape is healed, what the pieces of a turn are divided by, whether what comes is taken as it is."""
+_DIGITS = 9  # of coordinates that are those of one node
+_FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
 
 
@@ -27,23 +32,69 @@ class Unusable(Exception):
 
 
 def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
-    """Faces on their surfaces, edges on their curves, and triangles of ``segments`` pieces a turn."""
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    """Faces on their surfaces, edges on their curves, and triangles of ``segments`` pieces a turn.
 
+    Where these leave the surface open, of a healed shape, or of fewer pieces.
+    """
     reader, shape = _read(data)
-    solids = _parts([shape], "TopAbs_SOLID", "Solid")
-    faces = _parts(solids, "TopAbs_FACE", "Face")
+    faces = _faces(shape)
     if len(faces) > most_faces:
         raise Unusable(f"of at most {most_faces} faces, got {len(faces)}")
     if not faces:
         raise Unusable("of a solid body, got none")
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
+    for heals, divisor, last in _WAYS:
+        body, wanted = _healed(shape) if heals else shape, max(_FEWEST, pieces // divisor)
+        try:
+            found = _divided(reader, body, wanted)
+        except Unusable:
+            if last:
+                raise
+            continue
+        if last or _is_closed(found):
+            break
+    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(body))}
+
+
+def _faces(shape: Any) -> list[Any]:
+    """Those of the solids."""
+    return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
+
+
+def _divided(reader: Any, shape: Any, pieces: int) -> list[dict[str, Any]]:
+    """The faces, in triangles of so many pieces a turn."""
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
+
+    BRepTools.Clean_s(shape)
     BRepMesh_IncrementalMesh(shape, _LINEAR, True, 4 * math.pi / pieces, False)
+    faces = _faces(shape)
     found = [{"name": _name(reader, face), **_surface(face), **_triangles(face)} for face in faces]
-    for face in _parts([*solids, shape], "TopAbs_FACE", "Face")[len(faces) :]:
+    for face in _parts([*_parts([shape], "TopAbs_SOLID", "Solid"), shape], "TopAbs_FACE", "Face")[len(faces) :]:
         _triangles(face)  # or the file is broken, and this one may be missing in a solid
-    return {"format": FORMAT, "unit": "mm", "segments": pieces, "faces": found, "edges": _edges(faces)}
+    return found
+
+
+def _healed(shape: Any) -> Any:
+    """The shape with its faces' boundaries repaired by the kernel."""
+    from OCP.ShapeFix import ShapeFix_Shape
+
+    fix = ShapeFix_Shape(shape)
+    fix.Perform()
+    return fix.Shape()
+
+
+def _is_closed(faces: list[dict[str, Any]]) -> bool:
+    """Whether triangles pass each edge as often one way as the other."""
+    passed: Counter[tuple[Any, Any]] = Counter()
+    for face in faces:
+        nodes = [tuple(round(x, _DIGITS) for x in node) for node in face["nodes"]]
+        for triangle in face["triangles"]:
+            a, b, c = (nodes[k] for k in triangle)
+            for one, other in ((a, b), (b, c), (c, a)):
+                passed[min(one, other), max(one, other)] += (one < other) - (other < one)
+    return not any(passed.values())
 
 
 def _read(data: bytes) -> tuple[Any, Any]:
@@ -149,15 +200,37 @@ def _edges(faces: list[Any]) -> list[dict[str, Any]]:
             else:
                 known.append((edge, {number}))
     found = [(edge, sorted(on)) for known in owners.values() for edge, on in known if len(on) > 1]
-    return [_curve(edge) | {"faces": on, "bend": _bend(edge, [faces[i] for i in on[:2]])} for edge, on in found]
+    return [
+        _curve(edge) | {"faces": on, "bend": _bend(edge, [faces[i] for i in on[:2]]), "straight": _straight(edge)}
+        for edge, on in found
+    ]
+
+
+def _straight(edge: Any) -> bool:
+    """Whether it is a line, or a curve of another kind that is none the less straight."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+
+    adaptor = BRepAdaptor_Curve(edge)
+    first, last = adaptor.FirstParameter(), adaptor.LastParameter()
+    points = [_vector(adaptor.Value(first + place * (last - first))) for place in (0.0, *_ALONG, 1.0)]
+    way = [b - a for a, b in zip(points[0], points[-1], strict=True)]
+    size = math.hypot(*way)
+    return size > 0 and all(
+        math.hypot(*_across([b - a for a, b in zip(points[0], point, strict=True)], way)) <= _FLAT * size * size
+        for point in points
+    )
+
+
+def _across(one: list[float], other: list[float]) -> list[float]:
+    """Their cross product."""
+    return [one[i - 2] * other[i - 1] - one[i - 1] * other[i - 2] for i in range(3)]
 
 
 def _bend(edge: Any, faces: list[Any]) -> float:
     """Angle between the normals of two faces along their edge, rad: the middle one of several."""
     angles = []
     for one, other in zip(*(_normals(edge, face) for face in faces), strict=True):
-        across = [one[i - 2] * other[i - 1] - one[i - 1] * other[i - 2] for i in range(3)]
-        angles.append(math.atan2(math.hypot(*across), sum(a * b for a, b in zip(one, other, strict=True))))
+        angles.append(math.atan2(math.hypot(*_across(one, other)), sum(a * b for a, b in zip(one, other, strict=True))))
     return sorted(angles)[len(angles) // 2]
 
 

@@ -66,7 +66,9 @@ def curve(kind, **numbers):
 @pytest.fixture
 def kernel(monkeypatch):
     """OpenCASCADE's names as far as they are used; ``said`` is what the test lets it read."""
-    said = SimpleNamespace(status=1, roots=1, shapes=1, whole=None, names={}, mesh=None, moved=(0, 0, 0), cut=None)
+    said = SimpleNamespace(
+        status=1, roots=1, shapes=1, whole=None, names={}, mesh=None, moved=(0, 0, 0), cut=None, healed=lambda: None
+    )
     entity = lambda face, _: said.names.get(face.name)  # noqa: E731
 
     class Reader:
@@ -84,6 +86,8 @@ def kernel(monkeypatch):
     names = {
         "OCP": {},
         "OCP.BRepMesh": {"BRepMesh_IncrementalMesh": cut},
+        "OCP.BRepTools": {"BRepTools": SimpleNamespace(Clean_s=lambda shape: None)},
+        "OCP.ShapeFix": {"ShapeFix_Shape": lambda shape: SimpleNamespace(Perform=said.healed, Shape=lambda: shape)},
         "OCP.STEPControl": {"STEPControl_Reader": Reader},
         "OCP.TopAbs": {
             "TopAbs_ShapeEnum": kinds, "TopAbs_Orientation": SimpleNamespace(TopAbs_REVERSED="reversed"),
@@ -142,7 +146,7 @@ def test_an_edge_knows_all_of_its_faces_and_a_seam_is_none(kernel, monkeypatch):
     ]
     found = step_kernel._edges([*faces, plain("i", [edges["x"], edges["w"], edges["u"]])])
     assert [edge["faces"] for edge in found] == [[0, 2, 3], [0, 2], [1, 3], [2, 3]]
-    assert {edge["bend"] for edge in found} == {2.5}
+    assert {(edge["bend"], edge["straight"]) for edge in found} == {(2.5, True)}
     assert step_kernel._edges([plain("f", [edges["u"], edges["u"]])]) == []
 
 
@@ -166,6 +170,34 @@ def test_triangles_are_counter_clockwise_from_outside(kernel):
     kernel.mesh = None
     with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
         step_kernel._triangles(plain("f"))
+
+
+def test_ways_to_a_closed_surface(kernel):
+    """Triangles of a tetrahedron are taken at once; of an open one the shape is healed, then divided more coarsely."""
+    tried = []
+    tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    nodes = [vector(0, 0, 0), vector(1, 0, 0), vector(0, 1, 0), vector(0, 0, 1)]
+
+    def of(triangles):
+        corner = lambda i: SimpleNamespace(Value=lambda k: triangles[i - 1][k - 1] + 1)  # noqa: E731
+        return SimpleNamespace(
+            NbNodes=lambda: 4, Node=lambda i: nodes[i - 1], NbTriangles=lambda: len(triangles), Triangle=corner
+        )
+
+    sys.modules["OCP.BRepMesh"].BRepMesh_IncrementalMesh = lambda *given: tried.append(round(4 * math.pi / given[3]))
+    kernel.healed = lambda: tried.append("healed")
+    kernel.whole, kernel.mesh = body(plain("f")), of(tetrahedron)
+    assert len(step_kernel.record(b"data", 96, 2000)["faces"][0]["triangles"]) == 4
+    assert tried == [96]
+    tried.clear()
+    kernel.mesh = of(tetrahedron[:3])
+    assert step_kernel.record(b"data", 96, 2000)["segments"] == 96
+    assert tried == [96, "healed", 96, 48, "healed", 48, 96]
+    tried.clear()
+    kernel.mesh = None
+    with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
+        step_kernel.record(b"data", 20, 2000)
+    assert tried == [20, "healed", 20, 12, "healed", 12, 20]
 
 
 @pytest.mark.parametrize(

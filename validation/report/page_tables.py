@@ -52,8 +52,8 @@ def ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found, rows)
     columns = [
-        *key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px: predicted",
-        "measured", "rmse, px", "status",
+        *key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px: taken off",
+        "left", "rmse, px", "status",
     ]  # fmt: skip
     lines = [[*cells[row.index], ratio(row.main), str(row.main.n), failed(row), *of_errors(row)] for row in rows]
     terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
@@ -79,7 +79,7 @@ def units(found: Validation) -> Table:
     key, cells = _key(found, rows)
     columns = [
         *key, "measurand", "value", "unit", "sigma: calibrated", "propagated", "measured", "ratio of variances [95 %]",
-        "bias", "status",
+        "bias left", "u(bias)", "status",
     ]  # fmt: skip
     lines = [[*cells[row.index], *of_measurand(each)] for row in rows for each in row.measurands]
     statuses = (each.status for row in rows for each in row.measurands)

@@ -242,13 +242,17 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
         "light",
         f"calibrated, {unit}",
         "propagated",
+        "with u(bias)",
         "ratio",
         "status",
         "not in formulas",
     )
     table = _table(f"\nThe best settings rendered, and measured by {ESTIMATOR}", *columns)
     for row in checked.settings:
-        values = (f"{1e6 * value:.4g}" if math.isfinite(value) else "-" for value in (row.calibrated, row.propagated))
+        values = (
+            f"{1e6 * value:.4g}" if math.isfinite(value) else "-"
+            for value in (row.calibrated, row.propagated, row.minimised)
+        )
         now = "-" if row.rank_after is None else str(row.rank_after)
         ratio = "-" if row.ratio is None else f"{row.ratio:.3f}"
         names = ", ".join(row.without_formula)
@@ -274,7 +278,7 @@ def _gain(best: CheckedSetting, plan: CheckedSetting) -> str:
     """What the proposal gains over the plan, in words."""
     if plan.rank_after is None:
         return f"the plan's picture cannot be measured ({plan.status})"
-    change = best.propagated / plan.propagated - 1
+    change = best.minimised / plan.minimised - 1
     if plan.status != best.status:
         return f"{100 * change:+.1f} % variance, but the plan's picture is {plan.status}"
     small = f", less than effects that are left out may matter ({100 * Tolerance().variance:g} %)"

@@ -1,0 +1,50 @@
+"""Curved edges of a mesh: straight pieces that turn a little from one to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes.parts.chains import Chains, components, pairs_of
+
+_CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
+_LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
+_FULL = 0.7  # of the turn before: where a straight edge begins it is half of it, at a last piece all
+_LAST = 1.5  # lengths of the piece before: a last piece
+
+
+def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
+    """Which chains are pieces of a curved edge; bool, shape (C,).
+
+    They go on, turning a little, between the same surfaces, or through a vertex in which no other edge ends, for the
+    surfaces on both sides are smooth there. A straight edge that continues a curve is much longer than its pieces; a
+    last piece without a facet beside it turns as much as those before.
+    """
+    pairs, ends, alone = _meetings(shape, open_)
+    away = shape.along[pairs] * np.where(ends == 0, 1.0, -1.0)[..., None]
+    cosine = -(away[:, 0] * away[:, 1]).sum(1) / shape.length[pairs].prod(1)
+    sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
+    alike = (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
+    turn = np.arccos(np.clip(cosine, -1, 1))
+    straight = turn * shape.length[pairs].min(1) <= shape.unsure
+    run = components(len(shape.bend), pairs[alike & straight])
+    length = np.bincount(run, shape.length)[run][pairs]
+    turns = (cosine >= _CURVE) & ~straight
+    curved = (region[shape.faces[pairs]] >= 0).any(2)
+    others = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece, where no other edge ends
+    others[pairs[alone], ends[alone]] = turn[alone, None]
+    found = np.zeros(len(shape.bend), bool)
+    for k in (0, 1):
+        full = curved[:, 1 - k] & (turn >= _FULL * others[pairs[:, 1 - k], 1 - ends[:, 1 - k]])
+        most = np.where(curved[:, k], _LONGER, _LAST * full)
+        rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
+        found[pairs[rows, k]] = True
+    return np.isin(run, run[found]) & open_
+
+
+def _meetings(shape: Chains, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs (n, 2) of chains that meet in a vertex, which of their ends meet there, and whether no other one does."""
+    rows = np.flatnonzero(open_)
+    vertex = shape.ends[rows].ravel()
+    at = pairs_of(vertex)
+    alone = np.bincount(vertex, minlength=1)[vertex[at[:, 0]]] == 2
+    return rows[at // 2], at % 2, alone
