@@ -7,6 +7,7 @@ ice_vision.check(__file__, "scenes", "imaging")
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
 from measure.bounds import bound, image_bound
+from measure.correction import Correction, Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.estimators.registry import best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
@@ -16,7 +17,7 @@ from measure.find.ellipse import find_ellipse
 from measure.find.search import find
 from measure.fitting.fit import fit
 from measure.fitting.result import Fit
-from measure.measurands import Measurements, measure, measure_by
+from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
@@ -31,11 +32,13 @@ __all__ = [
     "Board",
     "CameraCalibration",
     "Candidate",
+    "Correction",
     "EdgeResponse",
     "Ellipse",
     "EstimatorKind",
     "Fit",
     "Found",
+    "Images",
     "Lens",
     "MeasuredValue",
     "Measurement",
@@ -49,6 +52,8 @@ __all__ = [
     "bound",
     "calibrate_camera",
     "chessboard",
+    "corrected",
+    "correction",
     "distance",
     "distances",
     "find",

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from measure.correction import Correction
 from measure.estimators.registry import best_estimator
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import Found, find
-from scenes import Picture, Quantity, Scene, status
+from scenes import InvalidInput, Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
 
@@ -42,6 +43,10 @@ class Measurements(Shown):
         The first quantity as `measure.distance` gives it, with its edges, if it is a distance.
     picture : Picture
         What the images are taken to show: scene, sensor, and the lights where they are known.
+    bias, u_bias : ndarray, shape (M,)
+        What a `Correction` has taken off the values, and its standard uncertainty (not variance), `units`; 0 and NaN
+        where none was made. Where one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in
+        the simulated picture, for the estimator's own are those of a lone edge.
     """
 
     quantities: tuple[Quantity, ...]
@@ -55,6 +60,8 @@ class Measurements(Shown):
     p_value: np.ndarray
     first: Measurement | None
     picture: Picture
+    bias: np.ndarray
+    u_bias: np.ndarray
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,10 +72,15 @@ class Measurements(Shown):
         """Standard deviation of `value`, shape (..., M)."""
         return np.sqrt(np.einsum("...mm->...m", self.covariance))
 
+    @property
+    def u(self) -> np.ndarray:
+        """Combined standard uncertainty, of noise and of the bias' correction, shape (..., M); NaN without one."""
+        return np.hypot(self.sigma, self.u_bias)
+
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record an image and measurand: scene and poses, value, one sigma, status; None where there is none."""
+        """One record an image and measurand: scene and poses, value, one sigma, u, status; None: there is none."""
         where, count = self.picture.row, len(self.quantities)
-        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.status))
+        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.u, self.status))
         return [
             where
             | {
@@ -78,10 +90,12 @@ class Measurements(Shown):
                 "unit": self.units[m],
                 "value": finite(values[m]),
                 "sigma": finite(sigmas[m]),
+                "u_bias": finite(self.u_bias[m]),
+                "u": finite(combined[m]),
                 "nominal": float(self.nominal[m]),
                 "status": str(states[m]),
             }
-            for i, (values, sigmas, states) in enumerate(zip(*columns, strict=True))
+            for i, (values, sigmas, combined, states) in enumerate(zip(*columns, strict=True))
             for m, quantity in enumerate(self.quantities)
         ]
 
@@ -106,6 +120,8 @@ def measure(
     light: Any = None,
     estimator: str | None = None,
     threshold: float | None = None,
+    *,
+    correction: Correction | None = None,
 ) -> Measurements:
     """Measure all measurands of a scene, jointly.
 
@@ -117,6 +133,8 @@ def measure(
         Of the straight edges, as for `measure.distance`; `measure.best_estimator` when not given. Circles are found
         from edge points (zero crossing of the Gaussian second derivative) around their rims, in the plane that the pose
         tells, so that centre and diameter are the circle's own and not those of its image, an ellipse.
+    correction : Correction, optional
+        Biases to be subtracted (`measure.correction`), found for this picture; estimator and threshold are then its.
 
     Examples
     --------
@@ -127,8 +145,57 @@ def measure(
     (('distance',), ('cm',), ['low_contrast'])
     """
     picture = Picture.of(scene, sensor, light)
+    if correction is not None:
+        _check_same(correction, picture, estimator, threshold)
+        (found,) = measure_by(image, picture, ((correction.estimator, correction.threshold),))
+        return corrected(found, correction)
     (found,) = measure_by(image, picture, ((estimator or best_estimator(picture.scene), threshold),))
     return found
+
+
+def _check_same(correction: Correction, picture: Picture, estimator: str | None, threshold: float | None) -> None:
+    if correction.quantities != picture.scene.quantities:
+        raise InvalidInput("correction must be of the same measurands, got one of others")
+    for name, given, its in (
+        ("estimator", estimator, correction.estimator),
+        ("threshold", threshold, correction.threshold),
+    ):
+        if given is not None and given != its:
+            raise InvalidInput(f"{name} must be that of the correction, {its}, got {given}")
+
+
+def corrected(found: Measurements, correction: Correction) -> Measurements:
+    """With the biases of a picture taken off, and the statuses that this leaves."""
+    shape = found.status.shape
+    rows = [correction.status_of(row) for row in found.status.reshape(-1, shape[-1])]
+    off, off_image = (np.nan_to_num(each) for each in (correction.bias, correction.bias_image))
+    doubtful = np.isin(found.status, (status.CLUTTER, status.MISFIT))
+    return replace(
+        found,
+        value=found.value - off,
+        value_image=found.value_image - off_image,
+        covariance=_scaled(found.covariance, correction.covariance, doubtful),
+        covariance_image=_scaled(found.covariance_image, correction.covariance_image, doubtful),
+        status=np.array(rows).reshape(shape),
+        first=found.first and _first_corrected(found.first, off_image[0], np.array(rows)[:, 0].reshape(shape[:-1])),
+        bias=off,
+        u_bias=correction.u_bias,
+    )
+
+
+def _first_corrected(first: Measurement, bias: float, states: np.ndarray) -> Measurement:
+    measured = np.isfinite(first.value_px)
+    return replace(
+        first, value_px=first.value_px - bias, bias_px=np.where(measured, bias, 0.0), status=states
+    )  # fmt: skip
+
+
+def _scaled(covariance: np.ndarray, propagated: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Covariances (..., M, M) with the marked variances replaced by propagated ones, correlations as they are."""
+    own, told = np.einsum("...mm->...m", covariance), np.diag(propagated)
+    usable = which & np.isfinite(own) & (own > 0) & np.isfinite(told)
+    factor = np.sqrt(np.divide(told, own, out=np.ones(own.shape), where=usable))
+    return covariance * factor[..., :, None] * factor[..., None, :]
 
 
 def measure_by(
@@ -162,6 +229,8 @@ def _gathered(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurem
         p_value=found.shape.p_value.reshape(lead),
         first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
         picture=picture,
+        bias=np.zeros(count),
+        u_bias=np.full(count, np.nan),
     )
 
 

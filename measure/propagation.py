@@ -12,7 +12,6 @@ from imaging.models.texture import TextureErrors, texture_errors
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
-from measure.estimators.kinds import ESTIMATORS
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response
@@ -70,9 +69,8 @@ class Propagated:
     response : ndarray, shape (height, width)
         Derivative of its value by each pixel, px per grey level.
     status : str
-        As `measure.distance` says; ``clutter`` too where a classic locator's noise-free value is off by more than 0.3
-        standard deviations for a reason that no formula knows (interreflection); what statistical textures do to this
-        part is known.
+        As `measure.distance` says; ``clutter`` too where the noise-free value is off by more than 0.3 standard
+        deviations, by whatever estimator and for whatever reason; what statistical textures do to this part is known.
     measurands : PropagatedValues
         All of them, in the scene's unit, jointly.
     """
@@ -125,7 +123,7 @@ def propagate(
     errors = (noise * rows) @ rows.T
     image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
     textures = texture_errors(Pictures.of(picture)) if picture.lights else None
-    values = _values(found, image, plane, state, ESTIMATORS[estimator].bias_predicted and not photographed, textures)
+    values = _values(found, image, plane, state, not photographed, textures)
     return _of_first(found, rows, errors, values, clean.shape)
 
 

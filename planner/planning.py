@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -27,6 +28,7 @@ from planner.search.objective import (
     SearchProblem,
     check_choice,
 )
+from planner.search.setting_up import SettingUp, printed
 from planner.search.varying import Variation
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
@@ -34,11 +36,8 @@ from scenes.results import Shown, finite, poses
 Search = Literal["exhaustive", "alternating"]
 Edges = Literal["given", "best"]
 Shares = Literal["best", "given"]
+_CLOSELY = 3  # settings beside an optimum that are looked at closely
 COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
-
-
-def _rounded(pose: Pose) -> str:
-    return f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})"
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +50,10 @@ class Plan(Shown):
         The scene, its task with the required edges that the plan uses: ready to predict, render and measure.
     sensor : Pose
     light : Pose or tuple of Pose
-        Of the light that is free, or of all that are. Continuous if refined, else on the grid.
+        Of the light that is free, or of all that are. To a tenth of a degree if refined, else on the grid or as held.
+    steady : bool
+        Whether all can be measured where sensor and light are 0.2 degrees off, too (or twice the uncertainty of their
+        poses), with a variance not more than four times as large; True of a plan that is not refined: nobody asks.
     shares : tuple of float
         Of each light of several, of the sum of their intensities; the scene's intensities are made of them.
     alone : float or None
@@ -90,6 +92,7 @@ class Plan(Shown):
     scene: Scene
     sensor: Pose
     light: Pose | tuple[Pose, ...]
+    steady: bool
     shares: tuple[float, ...]
     alone: float | None
     objective: str
@@ -127,8 +130,8 @@ class Plan(Shown):
         ]
 
     def _line(self) -> str:
-        lights = " ".join(map(_rounded, several(self.light)))
-        return f"{self.scene.name}: sensor {_rounded(self.sensor)}, light {lights}; {self.prediction.told}"
+        lights = " ".join(map(printed, several(self.light)))
+        return f"{self.scene.name}: sensor {printed(self.sensor)}, light {lights}; {self.prediction.told}"
 
 
 def plan(
@@ -177,7 +180,7 @@ def plan(
     shares : {"best", "given"}
         Of two lights: search their shares of the sum of their intensities, or keep them; of more they stay.
     refined : bool
-        Whether to descend below the grid step.
+        Whether to descend below the grid step, to a setting that can be set up.
     vary : tuple of {"analyser", "polarisation", "band"}
         What else is to be found beside the poses (`Plan.varied`): the angle of the analyser, that of the light's
         polarisation, each or no such polariser; one of the scene's ``lamps`` and ``filters``.
@@ -236,11 +239,17 @@ def _finished(best: Searched, searches: list[Searched], refined: bool) -> Plan:
         proven = best.found is not None and has_bound(best.problem.scene, best.problem.model)
         taken = _refined(best, taken, () if set_aside or proven else choice[1:3])
     problem, taken, alone = _or_one_light(best, taken, refined)
+    steady = True
+    if refined and not all(best.grid.held):
+        single = alone == taken.value
+        taken, steady = _set_up(SettingUp(problem, best.grid.held), taken, choice)
+        alone = taken.value if single else alone
     scene, prediction = problem.scene, taken.prediction
     return Plan(
         scene=scene,
         sensor=Pose(*map(float, taken.sensor)),
         light=as_poses(taken.light),
+        steady=steady,
         shares=shares_of(scene) if len(scene.lights) > 1 else (),
         alone=alone,
         objective=problem.objective.unit,
@@ -285,6 +294,19 @@ def _refined(best: Searched, begin: RayTraced, others: tuple[Candidate, ...]) ->
     end = refine(best.problem, (end.sensor, end.lights), step, sizes=(0.1,), known=end.value)
     found = RayTraced.of(best.problem, end.sensor, end.lights)
     return begin if found.untrusted > begin.untrusted else found
+
+
+def _set_up(setting_up: SettingUp, taken: RayTraced, others: tuple[Candidate, ...]) -> tuple[RayTraced, bool]:
+    """The setting nearby that can be set up, else one of others; and whether there is any."""
+    problem = setting_up.problem
+    starts = [(taken.sensor, taken.light)]
+    starts += [(np.array(list(c.sensor)), as_array(c.light)) for c in others if c.edges == problem.scene.required]
+    for start in starts:
+        for pair in islice(setting_up.offers(*start), _CLOSELY):
+            found = RayTraced.of(problem, *pair)
+            if found.untrusted <= taken.untrusted:
+                return found, True
+    return taken, False
 
 
 def _or_one_light(best: Searched, taken: RayTraced, refined: bool) -> tuple[SearchProblem, RayTraced, float | None]:

@@ -11,7 +11,7 @@ import numpy as np
 from scenes.errors import InvalidInput
 from scenes.lights import Luminaire
 from scenes.pose import Pose, several
-from scenes.results import poses
+from scenes.results import html_of, poses
 from scenes.scene import Scene
 
 
@@ -81,6 +81,9 @@ class Picture:
         """
         free = tuple(self.lights[i] for i in self.scene.free) if self.lights else ((None, None),) * len(self.scene.free)
         return {"scene": self.scene.name, **poses(self.sensor, free)}
+
+    def _repr_html_(self) -> str:
+        return html_of(self, f"{self.scene.title or self.scene.name}, sensor {self.sensor}", [self.row])
 
     def unlit(self) -> Picture:
         """The same picture, its lights not known."""

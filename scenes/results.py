@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas
 
 _MOST = 50  # rows that a notebook shows
+DRAW: list[Callable[[Any], str]] = []  # what draws results, HTML: `import validation` adds it
 
 
 class Shown(ABC):
@@ -33,10 +34,7 @@ class Shown(ABC):
         return f"{type(self).__name__}({self._line()})"
 
     def _repr_html_(self) -> str:
-        rows = self.as_rows()
-        shown = _table(rows[:_MOST])
-        more = f"<p>and {len(rows) - _MOST} rows more</p>" if len(rows) > _MOST else ""
-        return f"<p>{html.escape(repr(self))}</p>{shown}{more}"
+        return html_of(self, repr(self), self.as_rows())
 
     def to_frame(self) -> pandas.DataFrame:
         """The rows as a data frame of pandas, which is an optional extra (``frames``).
@@ -52,6 +50,13 @@ class Shown(ABC):
             raise InvalidInput('pandas must be installed for to_frame ("ice-vision[frames]"), got none') from None
         found = pandas.DataFrame(self.as_rows())
         return found.astype(dict.fromkeys(found.columns[found.isna().all()], float))
+
+
+def html_of(found: Any, line: str, rows: list[dict[str, Any]]) -> str:
+    """What a notebook shows of a result: a line, its picture where `import validation` can draw it, and its rows."""
+    more = f"<p>and {len(rows) - _MOST} rows more</p>" if len(rows) > _MOST else ""
+    picture = "".join(draw(found) for draw in DRAW)
+    return f"<p>{html.escape(line)}</p>{picture}{_table(rows[:_MOST])}{more}"
 
 
 def poses(sensor: Any, light: Any) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from scenes.materials.kinds import MATERIALS, AnyMaterial
 from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.measurands.features import Centre, Corner, Side, Wall, check_feature
+from scenes.measurands.features import Centre, Corner, Side, Wall, check_feature, place_of
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
 from scenes.model import FileName, Model, Title, rebuild
@@ -38,6 +38,7 @@ from scenes.parts.step_file import Step
 from scenes.parts.turned import Turned
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
+from scenes.results import html_of
 from scenes.surroundings import Floor, Jitter, Obstacle
 from scenes.uncertain import UncertainNumber, check_uncertain, taken_out
 from scenes.uncertainty import Uncertainty
@@ -156,6 +157,15 @@ class Scene(Model):
     """Numbers with an uncertainty; also written in their places, as `{ value = 25, sd = 0.05 }`."""
     uncertainty: Uncertainty = Uncertainty()
     """The same of what is no number of a scene."""
+
+    def _repr_html_(self) -> str:
+        rows = [
+            {"measurand": each.name, "kind": each.kind, "of": " to ".join(map(place_of, each.features)),
+             "unit": self.unit_of(each), "plus": each.tolerance and each.tolerance.plus,
+             "minus": each.tolerance and each.tolerance.minus}
+            for each in quantities_of(self.task, self.measurands)
+        ]  # fmt: skip
+        return html_of(self, self.title or self.name, rows)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -1,10 +1,11 @@
-"""What a prediction or a measurement says of itself: the list of statuses, what each means, and which may be relied on.
+"""What a prediction or a measurement says of itself: the statuses, what each means, what to do, which may be relied on.
 
 Only those in `MEASURED` come with a value, and only what `is_trusted` may be decided upon, signed, or counted as shown.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from typing import Any
@@ -37,9 +38,24 @@ MEANINGS = {
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
     OK: "value and sigma can be relied on",
 }
+REMEDIES = {
+    NOT_VISIBLE: "turn the sensor until the camera sees all of it, or choose another feature",
+    SHORT: "come nearer or turn the sensor, so that its image becomes longer",
+    SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
+    LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
+    ILL_CONDITIONED: "turn the sensor, or choose edges that meet at a larger angle",
+    AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
+    COMPRESSED: "save pictures without compression (PNG, TIFF)",
+    CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
+    MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
+    CLUTTER: "move lamp or sensor (`ice plan`), or measure by `arrangement`, which knows what lies around an edge",
+    TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
+    OK: "",
+}
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
 MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+OF_SIGMA, OF_TOLERANCE = 1.0, 0.1  # what u(bias) may be of noise, and of the tolerance to one side
 
 
 def worst(*statuses: str) -> str:
@@ -68,6 +84,40 @@ def is_trusted(status: Any) -> Any:
     return status == OK
 
 
+def corrected(
+    found: str, simulated: str, u_bias: float, sigma: float, tolerance: float = 0.0, *, modelled: bool = True
+) -> str:
+    """Status of a value whose bias a simulation told and that was taken off; the one rule for all that do.
+
+    What lies around an edge biases a simulated picture as it does the real one, so ``clutter`` is what the correction
+    leaves: ``ok`` where its standard uncertainty is small beside the noise or the tolerance, ``clutter`` where not.
+
+    Parameters
+    ----------
+    found, simulated : str
+        Of the value as measured, and in the simulated noise-free picture.
+    u_bias, sigma : float
+        Standard uncertainties (not variances) of the correction and by noise, of one unit; infinite: not known.
+    tolerance : float
+        To one side, of the same unit; 0 where there is none.
+    modelled : bool
+        Whether ``misfit`` of the picture may be what the simulated one has, too.
+
+    Examples
+    --------
+    >>> corrected("clutter", "clutter", 0.5, 1.0), corrected("clutter", "clutter", 2.0, 1.0)
+    ('ok', 'clutter')
+    >>> corrected("ok", "short", 0.5, 1.0), corrected("misfit", "ok", 0.0, 1.0), corrected("misfit", "misfit", 0.0, 1.0)
+    ('short', 'misfit', 'ok')
+    """
+    if simulated not in MEASURED or found not in (OK, CLUTTER, MISFIT):
+        return worst(found, simulated) if simulated not in MEASURED else found
+    if found == MISFIT and not (modelled and simulated == MISFIT):
+        return MISFIT
+    small = math.isfinite(u_bias) and u_bias <= max(OF_SIGMA * sigma, OF_TOLERANCE * tolerance)
+    return OK if small else CLUTTER
+
+
 def doubt(status: str) -> str:
     """Why a value is not relied on, in a few words: what is wrong, and what is not known of it; empty where it is.
 
@@ -82,12 +132,12 @@ def doubt(status: str) -> str:
 
 
 def legend(statuses: Iterable[str]) -> list[str]:
-    """What each status that is not trusted means, one line each.
+    """What each status that is not trusted means, and what to do about it, one line each.
 
-    >>> legend(["ok", "short"])
-    ['short: too little of an edge is left in the image.']
+    >>> legend(["ok", "compressed"])[0][-51:]
+    'small; save pictures without compression (PNG, TIFF).'
     """
-    return [f"{name}: {MEANINGS[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
+    return [f"{name}: {MEANINGS[name]}; {REMEDIES[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
 
 
 def counted(statuses: Iterable[str]) -> str:

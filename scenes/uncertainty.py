@@ -73,6 +73,12 @@ class Uncertainty(Model):
         None
     )
     """Of a camera calibration: a file's name, relative to the scene's file, or names and matrix."""
+    reflectance: Deviation = Uncertain(half_width=0.1)
+    """Of what each surface reflects, as a part of it: what light between faces, and so the correction of biases, is not
+    sure of; known to within 10 % where not given [ratio]."""
+    light_place: Deviation = Uncertain(half_width=0.01)
+    """Of each light's place as a part of its distance, in all directions independently: what the correction of biases
+    is not sure of; known to within 1 % where not given [ratio]."""
     influences: tuple[AnyInfluence, ...] = ()
     """Influence quantities of kinds that a module of your own adds (`ice --plugin MODULE`)."""
 

@@ -1,4 +1,5 @@
 import os
+import tempfile
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy is loaded: each of the tests' processes has one core
@@ -8,6 +9,8 @@ import pytest
 
 import scenes
 
+_CACHE = tempfile.TemporaryDirectory(prefix="ice-vision-")
+os.environ["XDG_CACHE_HOME"] = _CACHE.name  # nothing that a user has kept is read, or written
 collect_ignore = ["outside"]  # imported, its modules add kinds for all tests of a process
 
 _LONG = [

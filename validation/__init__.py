@@ -9,6 +9,8 @@ ice_vision.check(__file__, "scenes", "imaging", "planner", "render", "measure")
 from importlib import import_module
 from typing import Any
 
+from scenes.results import DRAW
+
 _HOMES = {
     "Campaign": "batch.campaign", "Grid": "batch.campaign", "run": "batch.job", "Judged": "batch.rows",
     "Row": "batch.rows", "Validation": "batch.result", "Stopped": "batch.stopped", "Verdict": "statistics",
@@ -16,6 +18,13 @@ _HOMES = {
 }  # fmt: skip
 
 __all__ = list(_HOMES)
+
+
+def _drawn(found: Any) -> str:
+    return import_module("validation.report.notebook").drawn(found)
+
+
+DRAW.append(_drawn)  # results show their pictures in notebooks, drawn when one asks for them
 
 
 def __getattr__(name: str) -> Any:

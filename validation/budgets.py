@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from imaging.light.appearance import is_plain
 from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.capability import gauge, tur
@@ -24,7 +25,11 @@ _LEAST_GAIN = 0.01  # part of U below which an improvement is not worth its line
 
 
 def budget_of(picture: Picture, p: float = 0.95, *, rendered: bool = False) -> SceneBudget:
-    """The budget of a picture, its noise predicted, or propagated through a rendered picture.
+    """The budget of a picture, its noise and bias predicted, or where that does not do, simulated.
+
+    Formulas do for one convex body before darkness, without textures, whose predicted statuses are trusted. Elsewhere,
+    or where it is asked for, the bias is found in renders and counts as taken off: what that is not sure of are sources
+    of their own.
 
     Raises
     ------
@@ -32,16 +37,18 @@ def budget_of(picture: Picture, p: float = 0.95, *, rendered: bool = False) -> S
         If a measurand cannot be measured there.
     """
     if not rendered:
-        return budget(picture, p=p)
+        found = budget(picture, p=p)
+        if all(map(is_trusted, found.statuses)) and is_plain(picture.scene) and not picture.scene.textures:
+            return found
     import measure
-    import render
+    from validation import kept
+    from validation.remeasured import Method
 
-    clean = render.image(picture.scene, picture.sensor, picture.lights)
-    found = measure.propagate(clean, picture, estimator=measure.best_estimator(picture.scene)).measurands
-    for quantity, value, state in zip(picture.scene.quantities, found.value, found.status, strict=True):
+    off = kept.correction(picture, Method(measure.best_estimator(picture.scene)))
+    for quantity, value, state in zip(picture.scene.quantities, off.bias, off.simulated, strict=True):
         if not np.isfinite(value):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state} in the rendered picture")
-    return budget(picture, variances=np.diag(found.covariance), biases=found.bias, statuses=tuple(found.status), p=p)
+    return budget(picture, variances=np.diag(off.covariance), doubts=off.sources, statuses=off.status, p=p)
 
 
 def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 5.0) -> list[dict[str, Any]]:
@@ -141,7 +148,7 @@ def _measurand(found: SceneBudget, m: int, reach: float | None, seed: int) -> di
 
     return {
         "name": each.name, "kind": kind, "unit": each.unit, "value": each.value, "u": each.u, "U": each.U, "k": each.k,
-        "status": status, "signed": is_trusted(status),
+        "u_bias": found.u_bias[m], "status": status, "signed": is_trusted(status),
         "dof": each.dof if np.isfinite(each.dof) else None, "repeatability": each.repeatability,
         "accuracy": each.accuracy, "contributions": each.as_rows(), "capability": capability(found, m, seed),
         "improve": [asdict(one) for one in improvements(each)[:_SHOWN]],

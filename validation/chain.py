@@ -19,7 +19,7 @@ from measure import best_estimator
 from measure.believed import believed
 from planner.budgeting.budgets import SceneBudget
 from planner.budgeting.station import Station
-from planner.budgeting.terms import EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE
 from planner.uncertainty.groups import draw
 from validation.stations import exposed
 
@@ -117,7 +117,9 @@ class Chain:
         """What drawn terms add to the m-th value, (n,); without those that a picture has in itself."""
         total, by_name = np.zeros(1), {term.name: term for term in self.budget.terms[m]}
         for name, term in by_name.items():
-            if name not in (TEMPERATURE, EXPANSION) and not (pictured and name in _IN_A_PICTURE):
+            if name not in (TEMPERATURE, EXPANSION) and not (
+                pictured and (name in _IN_A_PICTURE or name.startswith(BIAS))
+            ):
                 total = total + term.sensitivity * (drawn[name] - term.value)
         if EXPANSION in by_name:
             nominal = by_name[TEMPERATURE].value * by_name[EXPANSION].value

@@ -10,7 +10,7 @@ import scenes
 from measure.fitting.result import Fit
 from scenes import InvalidInput, Lens
 from scenes.files.door import read_toml
-from scenes.files.written import toml
+from scenes.files.written import edited
 from scenes.numbers import number_at
 from scenes.scene import Scene
 from scenes.uncertain import taken_out
@@ -21,7 +21,7 @@ _SAID_ELSE = ("black_level", "working_distance_mm", "focal_length_mm")  # other 
 
 
 def write(found: Fit, source: str, path: Path) -> Scene:
-    """Write the fitted scene of a bundled scene or file, and load it; comments of the source are not kept.
+    """Write the fitted scene of a bundled scene or file, and load it; what stays keeps its comments.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def write(found: Fit, source: str, path: Path) -> Scene:
     _moved(document, origin.parent, path.parent)
     head = f"# {origin.name} as photographs show it: camera, noise and settings were fitted (status {found.status}).\n"
     try:
-        path.write_text(head + toml({"name": path.stem, **{k: v for k, v in document.items() if k != "name"}}), "utf-8")
+        path.write_text(head + edited(origin.read_text("utf-8"), document | {"name": path.stem}), "utf-8")
     except OSError as error:
         raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None
     return scenes.load(path)

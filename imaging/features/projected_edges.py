@@ -16,7 +16,7 @@ from imaging.geometry.lens import image_centre, recorded
 from imaging.geometry.projection import depth, facing, from_axis
 from imaging.geometry.visibility import longest_span, turned
 from imaging.pictures import Pictures
-from scenes import Centre, Corner, Edge, Scene, Wall
+from scenes import Centre, Corner, Edge, Scene, Solid, Wall
 from scenes.measurands.features import place_of
 
 
@@ -99,14 +99,14 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
     seen = facing(solid, positions)
     edges = [solid.edge(name) for name in names]
     needed, clear, lead = (
-        _near(solid.edges, edges),
+        _near(solid, edges),
         reach(scene.locator.scale_px, scene.camera.blur_px),
         sensors.shape[:-1],
     )
     corners = dict(
         zip(needed, np.moveaxis(from_axis(solid.vertices[needed], sensors, scene.camera), -2, 0), strict=True)
     )
-    trims = [np.stack([_trim(solid.edges, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
+    trims = [np.stack([_trim(solid, e, end, corners, seen, clear) for end in (0, 1)], -1) for e in edges]
     ends = _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], lead, (2, 2))
     trims = _stack(trims, lead, (2,))
     shown = image_fractions(
@@ -174,20 +174,19 @@ def _stack(arrays: list, lead: tuple[int, ...], tail: tuple[int, ...]) -> np.nda
     return np.stack(arrays, len(lead)) if arrays else np.empty((*lead, 0, *tail))
 
 
-def _near(edges: tuple[Edge, ...], wanted: list[Edge]) -> np.ndarray:
+def _near(solid: Solid, wanted: list[Edge]) -> np.ndarray:
     """The vertices of the wanted edges and of those that share a vertex with them."""
     ends = {end for edge in wanted for end in edge.ends}
-    near = (edge.ends for edge in edges if not ends.isdisjoint(edge.ends)) if ends else ()
-    return np.array(sorted({end for pair in near for end in pair}), int)
+    return np.array(sorted({other for end in ends for edge in solid.meeting[end] for other in edge.ends}), int)
 
 
-def _trim(edges: tuple[Edge, ...], edge: Edge, end: int, corners: dict, seen: np.ndarray, clear: float):
+def _trim(solid: Solid, edge: Edge, end: int, corners: dict, seen: np.ndarray, clear: float):
     """Length to leave out at one end of an edge, shape (...)."""
     here, far = edge.ends[end], edge.ends[1 - end]
     along = corners[far] - corners[here]
     trim = np.full(along.shape[:-1], clear)
-    for other in edges:
-        if other is edge or here not in other.ends:
+    for other in solid.meeting[here]:
+        if other is edge:
             continue
         aside = corners[other.ends[1 - other.ends.index(here)]] - corners[here]
         cosine = np.einsum("...i,...i->...", along, aside)

@@ -86,7 +86,7 @@ def by_embree(
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
     lengths = np.linalg.norm(vectors, axis=1)
     at, rays = _entries(plates, origins, vectors, lengths)
-    passed, last = np.isin(plates.faces, own), np.full(len(origins), -1)
+    last = np.full(len(origins), -1)
     step = np.full(len(origins), _PAST * plates.radius)
     for _ in range(_MOST_PASSED):
         if not rays.size:
@@ -100,12 +100,12 @@ def by_embree(
         last[rays] = which
         at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
         outside, place = plates.met(which, origins[rays], vectors[rays])
-        outside &= ~passed[which]
+        outside &= ~np.isin(plates.faces[which], own)
         if plates.margin:
             near = ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
             some = rays[near]
             most = np.maximum(at[some], np.where(outside, place, 0.0)[near]) + _BENT * plates.radius / lengths[some]
-            which[near], place[near] = plates.met_beside(which[near], origins[some], vectors[some], most, passed)
+            which[near], place[near] = plates.met_beside(which[near], origins[some], vectors[some], most, own)
             outside[near] = np.isfinite(place[near])
         face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
         rays = rays[~outside]
@@ -287,11 +287,11 @@ class Plates:
             return (fall < 0) & (over > 0) & (place > _STEP), place
 
     def met_beside(
-        self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray, most: np.ndarray, passed: np.ndarray
+        self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray, most: np.ndarray, own: tuple[int, ...]
     ) -> tuple[np.ndarray, np.ndarray]:
         """What rays (n, 3) meet first, in double precision, of triangles (n,) and those that share a corner with them.
 
-        The triangle, (n,), and t, (n,): at most ``most``, infinite where nothing is; ``passed``, (T,), are not met.
+        The triangle, (n,), and t, (n,): at most ``most``, infinite where nothing is; faces ``own`` are not met.
         """
         triangle, place = which.copy(), np.full(len(which), np.inf)
         starts, corners = self._at_corners, self._corner_numbers[which].ravel()
@@ -302,7 +302,7 @@ class Plates:
         hit, t = self.met(other, origins[ray], vectors[ray])
         with np.errstate(invalid="ignore"):
             within = self._shares(other, origins[ray] + t[:, None] * vectors[ray]) * self._heights[:, other]
-            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray]) & ~passed[other]
+            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray]) & ~np.isin(self.faces[other], own)
         ray, other, t = ray[hit], other[hit], t[hit]
         order = np.lexsort((other, t, ray))[::-1]  # the first of each ray is written last
         triangle[ray[order]], place[ray[order]] = other[order], t[order]

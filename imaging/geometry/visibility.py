@@ -62,24 +62,25 @@ def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     """
     towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
     towards[list(edge.faces)] = False
-    triangles = solid.triangles[towards[solid.triangle_faces]]
     start, stop = (solid.vertices[end] - positions for end in edge.ends)
     normal = np.cross(start, stop)
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
-    sides = _coordinates(triangles, positions, normal)
-    some = (sides.max(-1) >= 0) & (sides.min(-1) < 0)  # the others do not reach the plane of position and edge
-    some = some.any(tuple(range(some.ndim - 1)))
-    a, b = (
-        _coordinates(triangles[some], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start))
-    )
-    return _merge(*_crossings(a, b, sides[..., some, :]))
+    points, corners = solid.triangle_corners
+    sides = _coordinates(points, positions, normal)
+    over = sides >= 0
+    one, two, three = (over[..., each] for each in corners.T)
+    some = (one != two) | (two != three)  # the others do not reach the plane of position and edge
+    some = some.any(tuple(range(some.ndim - 1))) & towards[solid.triangle_faces]
+    chosen = corners[some]
+    a, b = (_coordinates(points[chosen], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start)))
+    return _merge(*_crossings(a, b, sides[..., chosen]))
 
 
-def _coordinates(triangles: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Coordinates of the triangles' corners along an axis (..., 3) from the positions, shape (..., T, 3)."""
-    along = axis @ triangles.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
-    return along.reshape(*along.shape[:-1], len(triangles), 3)
+def _coordinates(points: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Coordinates of points (..., 3) along axes (n, 3), or one, from the positions, shape (n, ...)."""
+    along = axis @ points.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
+    return along.reshape(*along.shape[:-1], *points.shape[:-1])
 
 
 def _united(spans: np.ndarray) -> np.ndarray:

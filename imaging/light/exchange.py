@@ -255,7 +255,7 @@ def _areas(triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=2048)
 def _sheet(exchange: Exchange, face: int) -> Sheet:
     """The rectangle along a face's longest edge; nodes that are not on the face see what the nearest place of it does.
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,7 +15,7 @@ from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.budgeting.terms import EXPANSION, TEMPERATURE, Term, as_input, terms
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, TEMPERATURE, Term, as_input, terms
 from planner.prediction import Prediction, predict
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
@@ -82,6 +83,15 @@ class SceneBudget(Shown):
         """
         return as_ufloats(_with_own_terms(each, rows) for each, rows in zip(self, self.terms, strict=True))
 
+    @property
+    def u_bias(self) -> tuple[float, ...]:
+        """Standard uncertainty of each value by its bias: what a correction is not sure of, or the model error."""
+        told = (
+            [row.contribution for row in each.contributions if row.source == MODEL or row.source.startswith(BIAS)]
+            for each in self.measurands
+        )
+        return tuple(math.hypot(*some) for some in told)
+
     @cached_property
     def features(self) -> Features:
         """The lines and circles of the picture, to be found in those of other stations."""
@@ -102,6 +112,7 @@ def budget(
     biases: np.ndarray | None = None,
     statuses: tuple[str, ...] | None = None,
     biased: bool | None = None,
+    doubts: Mapping[str, np.ndarray] | None = None,
     p: float = 0.95,
 ) -> SceneBudget:
     """The uncertainty of every measurand in one picture: pixel noise and all that the scene says is not exact.
@@ -121,6 +132,9 @@ def budget(
     biased : bool, optional
         Whether straight edges are found by the classic locators, whose bias the planner predicts; by default where
         `measure.best_estimator` is one of them.
+    doubts : dict of str to ndarray, shape (M,), optional
+        Where the values' biases are found by simulation and taken off (`measure.correction`): standard uncertainties of
+        that by source, the scene's unit or degrees. They stand in place of the model error.
     p : float
         Coverage probability of the expanded uncertainties.
 
@@ -142,6 +156,9 @@ def budget(
     variances, biases = (_checked(*told, picture) for told in (("variances", variances), ("biases", biases)))
     if variances is not None and variances.min() < 0:
         raise InvalidInput(f"variances must be at least 0, got {variances.min():g}")
+    for name, some in (doubts or {}).items():
+        if np.shape(some) != (len(picture.scene.quantities),) or not (np.asarray(some) >= 0).all():
+            raise InvalidInput(f"doubts[{name!r}] must be one at least 0 for each measurand, got {some}")
     prediction = predict(picture)
     for each in prediction.measurands:
         if not np.isfinite(each.variance_object):
@@ -152,7 +169,7 @@ def budget(
     slopes = sensitivities(features, given, biased=biased)
     told = prediction if biased else predict(picture, model="bound")  # by the estimator that is meant
     noise = np.array([each.variance_object for each in told.measurands]) if variances is None else variances
-    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased)
+    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased, doubts=doubts)
     inputs, budgets = shared_inputs(picture.scene, given), []
     for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
         by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from planner.uncertainty.inputs import Input, Kind
 from scenes import Centre, Noise, Scene, Uncertain
 
 NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error", "rounding"
+BIAS = "bias by "  # and what its correction is not sure of
 TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
@@ -64,6 +66,7 @@ def terms(
     biases: np.ndarray | None = None,
     *,
     biased: bool,
+    doubts: Mapping[str, np.ndarray] | None = None,
 ) -> list[list[Term]]:
     """Of each of M quantities.
 
@@ -77,6 +80,8 @@ def terms(
         Of the values, where a noise-free picture tells them.
     biased : bool
         Whether straight edges have the classic locators' bias.
+    doubts : dict of str to ndarray, shape (M,), optional
+        Where biases have been taken off: standard uncertainties of that by source, in place of all bias.
     """
     scene, known = pictures.scene, measurands(pictures)
     pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
@@ -84,12 +89,24 @@ def terms(
     for m, each in enumerate(forecasts):
         noise = float(np.sqrt(variances[m]))
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
-        limit = _model_error(known, m, each, noise, biased) if biases is None else abs(float(biases[m]))
-        rows.append(Term(MODEL, 0.0, Uncertain(half_width=limit), each.unit, 1.0))
+        rows += _of_bias(known, m, each, noise, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
         if pattern[m] > 0:
             rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
         found.append(rows + _stated(scene, each))
     return found
+
+
+def _of_bias(
+    known: Measurands, m: int, each: Forecast, sigma: float, biases: np.ndarray | None, biased: bool
+) -> list[Term]:
+    limit = _model_error(known, m, each, sigma, biased) if biases is None else abs(float(biases[m]))
+    return [Term(MODEL, 0.0, Uncertain(half_width=limit), each.unit, 1.0)]
+
+
+def _of_doubts(doubts: Mapping[str, np.ndarray], m: int, unit: str) -> list[Term]:
+    """What is not known at all is no number: the value's status says so."""
+    known = {name: float(u[m]) for name, u in doubts.items() if np.isfinite(u[m])}
+    return [Term(BIAS + name, 0.0, Uncertain(sd=u), unit, 1.0) for name, u in known.items() if u > 0]
 
 
 def _model_error(known: Measurands, m: int, each: Forecast, sigma: float, biased: bool) -> float:

@@ -22,6 +22,7 @@ from planner.search.grid import APART, Feasible, Grid, as_array, as_poses, disti
 from planner.search.lights import Mixture, best_lights
 from planner.search.local import Partial, alternating
 from planner.search.objective import Report, SearchProblem, minimised
+from planner.search.setting_up import DIGITS, rounded
 from scenes import Picture, Pose
 from scenes.status import is_trusted
 
@@ -125,11 +126,14 @@ def candidates(searches: Sequence[Searched], count: int = 10) -> tuple[Candidate
     """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges."""
     rows = sorted((row for each in searches for row in each.rows(count)), key=lambda row: row[0])
     chosen = distinct(rows, _differ, 2 * count)
-    made = [_candidate(searched.problem, sensor, light) for _, searched, sensor, light in chosen]
+    made = [_candidate(searched, sensor, light) for _, searched, sensor, light in chosen]
     return tuple(sorted(made, key=lambda c: c.variance)[:count])
 
 
-def _candidate(problem: SearchProblem, sensor: np.ndarray, light: np.ndarray) -> Candidate:
+def _candidate(searched: Searched, sensor: np.ndarray, light: np.ndarray) -> Candidate:
+    """At the digits of poses that are printed, but for what is held."""
+    problem, held = searched.problem, searched.grid.held
+    sensor, light = (pose if kept else rounded(pose) for pose, kept in zip((sensor, light), held, strict=True))
     poses = Pose(*map(float, sensor)), as_poses(light)
     found = variance_model(problem.model)(Pictures.of(Picture.of(problem.scene, *poses)))
     worst = int(np.argmax(found.variances_object * problem.objective.shares))
@@ -205,7 +209,7 @@ def trusted(
         if candidate.edges != problem.scene.required:
             continue
         poses = np.array(list(candidate.sensor)), as_array(candidate.light)
-        if not all(np.allclose(pose, own) for pose, own in zip(poses, best[:2], strict=True)):
+        if not all(np.allclose(pose, own, atol=10.0**-DIGITS) for pose, own in zip(poses, best[:2], strict=True)):
             other = RayTraced.of(problem, *poses)
             if other.untrusted < least.untrusted:
                 least, set_aside = other, tuple(passed)

@@ -114,8 +114,9 @@ def descend(
     trusted : callable, optional
         Whether a setting counts; asked only where it would be the best so far, for it takes long.
     fast : bool
-        Whether to end after 100 evaluations of each simplex or at 0.01 units, instead of 250 (400 of more than four
-        unknowns) and 0.001.
+        Whether to end after 100 evaluations of each simplex, instead of 250 (400 of more than four unknowns). It ends
+        where the simplex is 0.01 units large and its values are the same to 1e-4: poses are rounded to tenths of a
+        degree in the end.
 
     Raises
     ------
@@ -139,8 +140,8 @@ def descend(
             least = found
         return min(found, _MOST)
 
-    stop = {"xatol": 0.01, "fatol": 1e-5, "maxfev": 100} if fast else {"xatol": 1e-3, "fatol": 1e-7}
-    x, lowest = _nelder_mead(cost, begin, sizes, {"maxfev": 250 if start.count <= 4 else 400} | stop)
+    most = 100 if fast else 250 if start.count <= 4 else 400
+    x, lowest = _nelder_mead(cost, begin, sizes, {"maxfev": most, "xatol": 0.01, "fatol": 1e-4})
     return Refined(*start.at(x), float(lowest * unit))
 
 

@@ -1,75 +1,71 @@
-"""A document of tables, lists, numbers and text as TOML: what `tomllib` reads, it writes."""
+"""A TOML document's text with other content: comments and order stay where nothing else is said."""
 
 from __future__ import annotations
 
-import json
-import math
-import re
+from collections.abc import MutableMapping
 from typing import Any
 
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
+import tomlkit
 
 
-def toml(document: dict[str, Any]) -> str:
-    """The text of a document.
+def edited(text: str, document: dict[str, Any]) -> str:
+    """The text of a document, made from that of another.
 
     Parameters
     ----------
+    text : str
+        TOML; empty to begin anew.
     document : dict
-        Of str, bool, int, float, lists and dicts; what is None is left out.
+        What it is to say, of str, bool, int, float, lists and dicts; what is None is left out.
+
+    Raises
+    ------
+    TypeError
+        If something else is in it.
 
     Examples
     --------
-    >>> print(toml({"units": "mm", "camera": {"width": 8, "aim": [0.0, 1.5]}, "settings": [{"sensor": [30, 90]}]}))
-    units = "mm"
-    <BLANKLINE>
+    >>> print(edited("units = 'mm' # of all\\n[camera]\\nwidth = 8\\n", {"units": "mm", "camera": {"width": 9}}))
+    units = 'mm' # of all
     [camera]
-    width = 8
-    aim = [0.0, 1.5]
-    <BLANKLINE>
-    [[settings]]
-    sensor = [30, 90]
+    width = 9
     <BLANKLINE>
     """
-    told = {key: value for key, value in document.items() if value is not None}
-    plain = "\n".join(_row(key, value) for key, value in told.items() if not _is_table(value))
-    parts = [plain] if plain else []
+    whole = tomlkit.parse(text)
+    _say(whole, document)
+    return tomlkit.dumps(whole)
+
+
+def _say(table: MutableMapping[str, Any], wanted: dict[str, Any]) -> None:
+    """Make a table say what is wanted, changing no more than that takes."""
+    told = {key: _told(value) for key, value in wanted.items() if value is not None}
+    for key in [key for key in table if key not in told]:
+        del table[key]
     for key, value in told.items():
-        if _is_table(value):
-            head, each = (f"[{_key(key)}]", [value]) if isinstance(value, dict) else (f"[[{_key(key)}]]", value)
-            parts += ["\n".join([head, *(_row(*row) for row in table.items() if row[1] is not None)]) for table in each]
-    return "\n\n".join(parts) + "\n"
+        old = table.get(key)
+        if isinstance(old, MutableMapping) and isinstance(value, dict):
+            _say(old, value)
+        elif isinstance(old, list) and _tables(old) and _tables(value) and len(old) == len(value):
+            for one, other in zip(old, value, strict=True):
+                _say(one, other)
+        elif key not in table or type(_plain(old)) is not type(value) or _plain(old) != value:
+            table[key] = value
 
 
-def _row(key: str, value: Any) -> str:
-    return f"{_key(key)} = {_value(value)}"
-
-
-def _is_table(value: Any) -> bool:
-    many = isinstance(value, list) and bool(value) and all(isinstance(each, dict) for each in value)
-    return isinstance(value, dict) or many
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _text(name)
-
-
-def _text(text: str) -> str:
-    """A basic string; TOML forbids the control character 0x7f, which JSON does not escape."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return _text(value)
+def _told(value: Any) -> Any:
+    """The value without what is None in it."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items() if v is not None) + " }"
+        return {key: _told(each) for key, each in value.items() if each is not None}
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    if isinstance(value, float) and not math.isfinite(value):
-        return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
-    if isinstance(value, int | float):
-        return repr(value)
+        return [_told(each) for each in value]
+    if isinstance(value, str | bool | int | float):
+        return value
     raise TypeError(f"{type(value).__name__} has no place in a TOML document")
+
+
+def _plain(value: Any) -> Any:
+    return value.unwrap() if hasattr(value, "unwrap") else value
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(each, MutableMapping) for each in value)

@@ -82,6 +82,10 @@ class Brdf(Model):
         """The same without a lobe, its Lambertian part as it is."""
         return self
 
+    def dimmed(self, part: float) -> Self | None:
+        """The same reflecting less by a part, 0 to 1, in all directions; None of a kind that does not say how."""
+        return None
+
     def indices(self, curves: Curves = ()) -> tuple[Index, ...]:
         """What the lobe depends on at each wavelength that is seen, of light, filter and sensor of these curves."""
         return (Index(1.0, 0.0),)

@@ -86,6 +86,18 @@ class Material(Brdf):
         """The same with n = 1 and k = 0."""
         return self.tried(refractive_index=1.0, extinction=0.0, index_table=())
 
+    def dimmed(self, part: float) -> Self:
+        """Of both terms: s less by the part, and R_d such that (1 - s) R_d is.
+
+        >>> shiny = Material(specular_fraction=0.4, diffuse_reflectance=0.5)
+        >>> round(shiny.dimmed(0.1).lambertian / shiny.lambertian, 12)
+        0.9
+        """
+        specular = (1 - part) * self.specular_fraction
+        lambertian = (1 - part) * self.lambertian
+        diffuse = lambertian / (1 - specular) if specular < 1 else self.diffuse_reflectance
+        return self.tried(specular_fraction=specular, diffuse_reflectance=diffuse)
+
     def indices(self, curves: Curves = ()) -> tuple[Index, ...]:
         """The spectral sum of eq. 1: C S Q by the trapezium rule at the wavelengths of the table.
 

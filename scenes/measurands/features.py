@@ -127,7 +127,7 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     if len(points) > 2:
         return np.linalg.svd(points - points.mean(0))[2][2]
     ends = [solid.vertex_names.index(f.vertex) for f in quantity.features]
-    faces = [f for f, loop in enumerate(solid.faces) if set(ends) <= set(loop)]
+    faces = sorted(set.intersection(*(solid.faces_at[end] for end in ends)))
     normals = solid.normals[faces]
     alike = len(faces) and (np.abs(normals @ normals[0]) > 1 - 1e-12).all()
     return normals[0] if alike else None

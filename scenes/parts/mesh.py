@@ -257,27 +257,24 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
 
     A sliver in the crease between two faces lies in both their planes; it becomes part of one, the larger.
     """
+    from scipy.cluster.hierarchy import DisjointSet  # slow to load, and rarely needed
+
     normals, areas = _normals(mesh, group)
     middles = np.zeros_like(normals)
     np.add.at(middles, group, mesh.triangles_center * mesh.area_faces[:, None])
     middles /= np.bincount(group, mesh.area_faces)[:, None]
     order = np.argsort(group, kind="stable")
     corners = dict(enumerate(np.split(mesh.triangles[order], np.cumsum(np.bincount(group))[:-1])))
-    owner, kept = np.arange(len(areas)), []
-
-    def whole(number: int) -> int:
-        while owner[number] != number:
-            number = owner[number] = owner[owner[number]]
-        return number
-
+    sets, largest, kept = DisjointSet(range(len(areas))), np.arange(len(areas)), []
     for one, other in pairs[np.argsort(-areas[pairs].max(1), kind="stable")]:
-        large, small = sorted((whole(one), whole(other)), key=lambda number: -areas[number])
+        large, small = sorted((int(largest[sets[each]]) for each in (one, other)), key=lambda number: -areas[number])
         if large == small:
             continue
         away = corners[small] - middles[large]
         near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
         if (np.abs(away @ normals[large]) <= near).all():
-            owner[small] = large
+            sets.merge(large, small)
+            largest[sets[large]] = large
             corners[large] = np.concatenate([corners[large], corners.pop(small)])
             kept.append((one, other))
     return np.array(kept, int).reshape(-1, 2)

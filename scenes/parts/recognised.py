@@ -78,7 +78,7 @@ def _fitted(solid: Solid, faces: np.ndarray) -> tuple | None:
     """Cylinder, faces, residuals and turn; None where they are no cylinder's."""
     normals = solid.normals[faces]
     points = solid.vertices[np.unique(np.concatenate([solid.faces[f] for f in faces]))]
-    axis = np.linalg.svd(normals, full_matrices=True)[2][2]
+    axis = np.linalg.svd(normals, full_matrices=len(normals) < 3)[2][2]
     if np.abs(normals @ axis).max() > 0.1 or len(points) < 6:
         return None
     centre, radius, _ = circle_through(points - (points @ axis)[:, None] * axis, axis)

@@ -127,6 +127,12 @@ class Solid:
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     @cached_property
+    def triangle_corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """The different corners of all triangles, (P, 3), and which of them each triangle has, (T, 3)."""
+        points, number = np.unique(self.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        return points, number.reshape(-1, 3)
+
+    @cached_property
     def offsets(self) -> np.ndarray:
         """Distance of each face's plane from the origin along its normal, shape (F,)."""
         anchors = self.vertices[[face[0] for face in self.faces]]
@@ -197,6 +203,24 @@ class Solid:
             return self.regions < 0
         found = np.ones(len(self.faces), bool)
         found[[face for edge in self.edges if edge.kind == "smooth" for face in edge.faces]] = False
+        return found
+
+    @cached_property
+    def meeting(self) -> dict[int, tuple[Edge, ...]]:
+        """Of each vertex's number all edges that end there, those of curved surfaces too, in their order."""
+        found: dict[int, list[Edge]] = {}
+        for edge in self.edges:
+            for end in edge.ends:
+                found.setdefault(end, []).append(edge)
+        return {end: tuple(edges) for end, edges in found.items()}
+
+    @cached_property
+    def faces_at(self) -> dict[int, set[int]]:
+        """Of each vertex's number the faces whose outline has it."""
+        found: dict[int, set[int]] = {}
+        for face, loop in enumerate(self.faces):
+            for vertex in loop:
+                found.setdefault(vertex, set()).add(face)
         return found
 
     def edges_at(self, vertex: str) -> tuple[Edge, ...]:

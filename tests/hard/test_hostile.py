@@ -208,7 +208,7 @@ def test_a_run_that_measured_nothing_is_reported(tiny, tmp_path):
     assert json.loads(done.stdout)["verdict"].startswith("contradict: none of 1 rows could be measured")
     again = ice("report", tmp_path / "out")
     assert again.returncode == 0, again.stderr
-    assert (tmp_path / "out" / "report.html").read_text().count("<img") >= 4
+    assert (tmp_path / "out" / "report.html").read_text().count('<svg role="img"') >= 4
 
 
 def test_a_sensor_without_noise_has_no_variance_to_judge(tiny, tmp_path):

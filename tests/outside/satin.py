@@ -46,3 +46,6 @@ class Satin(Brdf):
 
     def matt(self) -> "Satin":
         return self.tried(mirrored=0.0)
+
+    def dimmed(self, part: float) -> "Satin":
+        return self.tried(reflectance=(1 - part) * self.reflectance, mirrored=(1 - part) * self.mirrored)

@@ -70,13 +70,12 @@ def test_validate_judges_each(tmp_path):
     found = validation.run(scene, 60, seed=3, out=tmp_path, workers=1)
     document = found.to_json()
     assert document["verdict"].startswith("agree")
-    assert (document["judgement"]["rows"], document["judgement"]["not_proven"]) == (9, {"clutter": 1})
-    assert "9 of 10 rows proven, 1 not: clutter 1" in document["verdict"]
+    assert (document["judgement"]["rows"], document["judgement"]["not_proven"]) == (10, {})
     for setting in document["settings"]:
         assert [each["name"] for each in setting["measurands"]] == NAMES
         for each in setting["measurands"]:
             assert {"kind", "unit", "value", "predicted", "empirical", "n", "failed", "ratio", "ratio_interval", "bias",
-                    "bound", "status"} <= each.keys()  # fmt: skip
+                    "u", "u_bias", "correction", "bound", "status"} <= each.keys()  # fmt: skip
             assert each["ratio"] == pytest.approx(each["empirical"] / each["predicted"])
             assert each["bound"] < each["predicted"]  # margin: a bound is below any variance, by its kind
             assert (each["n"], each["failed"]) == (60, 0)

@@ -8,7 +8,7 @@ from rich.console import Console
 
 import scenes
 import validation
-from scenes.status import MEANINGS
+from scenes.status import MEANINGS, REMEDIES
 from validation.report import guide, table
 
 pytestmark = pytest.mark.render
@@ -40,7 +40,8 @@ def test_only_columns_that_are_there_are_explained(found):
 
 def test_a_status_that_occurs_is_explained(found):
     rows = [replace(found.rows[0], main=replace(found.rows[0].main, status="misfit")), found.rows[1]]
-    assert f"misfit: {MEANINGS['misfit']}." in printed(replace(found, rows=rows))
+    text = " ".join(printed(replace(found, rows=rows)).split())
+    assert f"misfit: {MEANINGS['misfit']}; {REMEDIES['misfit']}." in text
 
 
 def test_results_in_the_scenes_unit(found):
@@ -64,6 +65,6 @@ def test_results_in_the_scenes_unit(found):
 def test_what_to_try_next(found, change, said):
     judged = replace(found, verdict=replace(found.verdict, **change))
     line = guide.next_line(judged, "a b.toml", Path("runs/x"))
-    assert line.startswith("Next: `ice report runs/x` writes runs/x/report.html; ")
+    assert line.startswith("Next: look at runs/x/report.html; ")
     assert said in line
-    assert guide.next_line(judged, None, Path("runs/x")) == "Next: `ice report runs/x` writes runs/x/report.html."
+    assert guide.next_line(judged, None, Path("runs/x")) == "Next: look at runs/x/report.html."

@@ -33,7 +33,7 @@ def test_what_is_set_aside_is_better_and_not_to_be_trusted(wedge, found, capsys)
     from rich.console import Console
 
     Console(width=200).print(report(found, None, None, 1.0))
-    assert "set aside" in capsys.readouterr().out
+    assert "passed over" in capsys.readouterr().out
 
 
 def test_nothing_is_set_aside_for_what_costs_too_much(wedge, found):

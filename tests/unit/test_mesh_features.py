@@ -1,5 +1,6 @@
 """Faces, edges and circles of meshes against the dimensions that the parts were made with."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -135,12 +136,13 @@ def test_a_mesh_of_many_triangles_has_few_faces(tmp_path):
 
 @pytest.mark.parametrize("angle", [30.0, 90.0, 150.0])
 @pytest.mark.parametrize("off", [1e-8, 1e-7])
-def test_a_sliver_in_a_crease_does_not_make_one_face_of_two(angle, off):
-    """As CAD systems leave them where they write single precision: it lies in both planes, and belongs to one."""
+@pytest.mark.parametrize("places", [(2.5,), (1.0, 2.0, 2.5, 4.5)])
+def test_slivers_in_a_crease_do_not_make_one_face_of_two(angle, off, places):
+    """As CAD systems leave them where they write single precision: they lie in both planes, and belong to one."""
     turn = np.radians(angle)
     profile = np.array([[0, 0], [4, 0], [4 + 3 * np.cos(np.pi - turn), 3 * np.sin(turn)], [0, 3 * np.sin(turn)]])
     low, high = (np.column_stack([profile[:, 0], np.full(4, y), profile[:, 1]]) for y in (0.0, 5.0))
-    beside = np.array([[4.0 + off, 2.5, -off]])  # on the crease at x = 4, between the face below and the slanted one
+    beside = np.array([[4.0 + off, y, -off] for y in places])  # on the crease at x = 4, between the face below
     corners = np.concatenate([low, high, beside])
     faces = [
         (0, 1, 2),
@@ -154,10 +156,25 @@ def test_a_sliver_in_a_crease_does_not_make_one_face_of_two(angle, off):
         (3, 7, 0),
         (7, 4, 0),
     ]
-    faces += [(0, 4, 8), (4, 5, 8), (0, 8, 1), (1, 8, 5)]  # the last one is the sliver
+    chain = [1, *range(8, 8 + len(places)), 5]  # and the slanted one
+    faces += [(0, other, one) for one, other in pairwise([*chain, 4])]
+    faces += [(one, other, 5) for one, other in pairwise(chain[:-1])]  # the slivers
     body = trimesh.Trimesh(corners, faces, process=False)
     body.fix_normals()
     solid = mesh.solid(body)
     assert (len(solid.faces), len(solid.sharp)) == (6, 12)
     heights = np.einsum("tki,ti->tk", solid.triangles, solid.normals[solid.triangle_faces])
     assert np.abs(heights - solid.offsets[solid.triangle_faces][:, None]).max() < 5 * off
+
+
+def test_coplanar_pieces_are_one_face_in_whatever_order_they_meet():
+    """Pieces of all sizes, joined by the edges of random trees: each of these joins two sets, and none is lost."""
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        count = 40
+        sizes, at = rng.uniform(0.1, 3, count), rng.uniform(-9, 9, (count, 1, 2))
+        flat = at + sizes[:, None, None] * np.array([[0.0, 0], [1, 0], [0, 1]])
+        corners = np.concatenate([flat, np.ones((count, 3, 1))], -1).reshape(-1, 3)
+        pieces = trimesh.Trimesh(corners, np.arange(3 * count).reshape(-1, 3), process=False)
+        tree = np.array([(k, rng.integers(k)) for k in range(1, count)])
+        assert len(mesh._in_plane(pieces, np.arange(count), rng.permutation(tree))) == count - 1

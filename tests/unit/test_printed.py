@@ -96,7 +96,7 @@ def test_predictions_are_printed_by_their_names(several):
                         "status"]  # fmt: skip
     for row, each in zip(rows, found.measurands, strict=True):
         assert row == [
-            "(35, 320)", "(20, 260)", each.name, f"{each.value_object:.6g}", f"{each.variance_object**0.5:.3g}",
+            "(35.0, 320.0)", "(20.0, 260.0)", each.name, f"{each.value_object:.6g}", f"{each.variance_object**0.5:.3g}",
             f"{each.bias_object:.2g}", each.unit, f"{each.value_image:.6g}", f"{each.variance_image**0.5:.3g}",
             each.status,
         ]  # fmt: skip
@@ -121,26 +121,34 @@ def test_records_of_a_prediction_are_standard_deviations(several):
     [(10.08, "pass"), (10.085, "undecided"), (10.106, "fail"), (9.975, "undecided"), (9.99, "pass"), (9.959, "fail")],
 )
 def test_measured_values_and_their_decisions_are_printed(value, decision):
-    """+0.09 -0.02 about 10 with sigma 0.004: what is well within the one limit is beyond the other."""
+    """+0.09 -0.02 about 10 with u 0.004, of sigma 0.0024 and u(bias) 0.0032: it is u that decides.
+
+    What is well within the one limit is beyond the other.
+    """
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.02))
     other = SimpleNamespace(name="lean", kind="angle", tolerance=None)
     found = SimpleNamespace(
-        quantities=(quantity, other), sigma=np.array([0.004, 0.5]), covariance=np.array([[1.6e-5, 2e-4], [2e-4, 0.25]]),
+        quantities=(quantity, other), sigma=np.array([0.0024, 0.5]),
+        covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
+        u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
         value=np.array([value, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
     )  # fmt: skip
     one, two = measurands.facts(found)
     assert one == {
-        "name": "slot", "kind": "width", "unit": "mm", "value": value, "sigma": 0.004, "value_image": 812.0,
+        "name": "slot", "kind": "width", "unit": "mm", "value": value, "sigma": 0.0024, "value_image": 812.0,
+        "bias": 0.011, "u_bias": 0.0032, "u": 0.004,
         "sigma_image": pytest.approx(0.3), "nominal": 10.0, "tolerance": {"plus": 0.09, "minus": 0.02},
         "decision": decision, "status": "ok",
     }  # fmt: skip
     assert (two["value"], two["sigma"], two["sigma_image"], two["nominal"]) == (29.5, 0.5, pytest.approx(0.4), 30.0)
     assert measurands.covariance(found) == found.covariance.tolist()
     headings, rows = cells(measurands.table([one, two]))
-    assert headings == ["name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status"]
-    assert rows[0] == ["slot", "width", f"{value:.4f}", "+- 0.0040", "mm", "10", "+0.09 -0.02", decision, "ok"]
-    assert rows[1] == ["lean", "angle", "29.50", "+- 0.50", "degrees", "30", "-", "-", "ok"]
+    assert headings == ["name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision",
+                        "status"]  # fmt: skip
+    assert rows[0] == ["slot", "width", f"{value:.4f}", "+- 0.0040", "mm", "0.011", "0.0032", "10", "+0.09 -0.02",
+                       decision, "ok"]  # fmt: skip
+    assert rows[1] == ["lean", "angle", "29.50", "+- 0.50", "degrees", "-", "-", "30", "-", "-", "ok"]
 
 
 # --- plan
@@ -175,7 +183,7 @@ def robustly(found):
 def test_the_plan_s_json_is_the_plan(planned, several):
     """Every number beside an independent prediction at the plan's poses; rendered and robust settings by key."""
     check, safe = of_three(planned), robustly(planned)
-    told_ = json.loads(json.dumps(plan_json.facts(planned, check, safe, 1.25, [Path("a.png")]), allow_nan=False))
+    told_ = json.loads(json.dumps(plan_json.facts(planned, check, safe, 1.25), allow_nan=False))
     again = planner.predict(planned.scene, planned.sensor, planned.light)
     for row, each, quantity in zip(told_["measurands"], again.measurands, several.measurands, strict=True):
         zone = quantity.tolerance
@@ -242,12 +250,16 @@ def test_the_plan_s_tables_are_its_json(planned):
     made = plan_table.report(planned, check, safe, 1.25)
     text = words(made)
     headings, rows = titled(made, "Clearly different")
-    assert headings == ["sensor", "light", "edges", "limited by", "worst ratio^2", "over best"]
-    for row, c in zip(rows, planned.candidates, strict=True):
-        over = f"{c.variance / planned.candidates[0].variance:.3f}"
-        assert row == [pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
-    headings, rows = titled(made, "Alternating")
-    assert headings == ["fixed", "", "found", "", "worst ratio^2"]
+    assert headings == ["", "sensor", "light", "edges", "limited by", "largest ratio^2", "over best"]
+    assert rows[0][:4] == ["best", pose(planned.sensor), pose(planned.light), " ".join(planned.scene.required)]
+    assert rows[0][4:] == [planned.limiting, f"{planned.variance:.4g}", "1.000"]
+    first = planned.candidates[0]
+    itself = [pose(first.sensor), pose(first.light)] == [pose(planned.sensor), pose(planned.light)]
+    for row, c in zip(rows[1:], planned.candidates[itself:], strict=True):
+        over = f"{c.variance / planned.variance:.3f}"
+        assert row == ["", pose(c.sensor), pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", over]
+    headings, rows = titled(made, "The paper's search")
+    assert headings == ["held fixed", "", "found", "", "largest ratio^2"]
     for row, s in zip(rows, planned.trace, strict=True):
         assert row == [s.fixed, pose(s.fixed_pose), s.found, pose(s.found_pose), f"{s.variance:.4g}"]
     headings, rows = titled(made.renderables[-2], "The best settings")
@@ -267,10 +279,11 @@ def test_the_plan_s_tables_are_its_json(planned):
     assert "-33.3 % against the plan" in text
     assert f"sensor {pose(planned.sensor)}, light {pose(planned.light)}" in text
     p = planned.prediction
-    assert f"Limited by {planned.limiting}: sigma is {p.worst_ratio:.3g} of its tolerance" in text
+    assert f"Limited by {planned.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance" in text
     for each in p.measurands:
         assert (
-            f"sigma {each.variance_object**0.5:.3g} {each.unit}, {each.ratio:.3g} of +-{each.tolerance.half:g}" in text
+            f"sigma {each.variance_object**0.5:.3g} {each.unit}, {100 * each.ratio:.3g} % of +-{each.tolerance.half:g}"
+            in text
         )
     assert f"{pose(check.proposed.sensor)}, light {pose(check.proposed.light)}, ok: -4.2 % variance" in text
 
@@ -279,13 +292,14 @@ def test_the_plan_of_one_measurand_is_told_in_object_and_image(task1):
     found = planner.plan(task1, step_deg=30, refined=False)
     made = plan_table.report(found, None, None, 1.0)
     headings, rows = titled(made, "Clearly different")
-    assert headings == ["sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
+    assert headings == ["", "sensor", "light", "edges", "object, 1e-6 cm^2", "image, 1e-6 px^2", "over best"]
     for row, c in zip(rows, found.candidates, strict=True):
-        assert row[3:5] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
+        assert row[0] == ("best" if c is found.candidates[0] else "")
+        assert row[4:6] == [f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"]
     again = planner.predict(task1, found.sensor, found.light)
     text = words(made)
-    assert f"standard deviation {again.variance_object**0.5:.3g} cm of {again.value_object:.4g} cm" in text
-    assert f"{again.variance_image**0.5:.3g} px of {again.value_image:.4g} px in the image" in text
+    assert f"One picture's sigma is {again.variance_object**0.5:.3g} cm of {again.value_object:.4g} cm" in text
+    assert f"in the image {again.variance_image**0.5:.3g} px of {again.value_image:.4g} px" in text
 
 
 # --- several pictures

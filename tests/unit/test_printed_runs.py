@@ -16,7 +16,7 @@ import validation
 from scenes import Pose
 from validation import comparison
 from validation.batch import job, result, work
-from validation.report import diagnostics, export, figures, page_tables, run_cells, table
+from validation.report import export, figures, page_tables, proof_figures, run_cells, table
 from validation.statistics import ALLOWANCE, LEVEL, SHARES
 
 METHODS = ("gradient", "canny@12", "canny@10")
@@ -220,7 +220,7 @@ def interval(each):
 
 def poses(index):
     setting = _scene().settings[index]
-    return [f"({pose.polar_deg:g}, {pose.azimuth_deg:g})" for pose in (setting.sensor, setting.light)]
+    return [f"({pose.polar_deg:.1f}, {pose.azimuth_deg:.1f})" for pose in (setting.sensor, setting.light)]
 
 
 def shifts(main):
@@ -323,41 +323,57 @@ def test_of_many_settings_those_farthest_from_their_prediction_are_shown(run, mo
     assert [row.index for row in run_cells.far(found)[0]] == sorted(range(SETTINGS), key=lambda i: -away[i])[:2]
 
 
-def test_residuals_are_in_their_own_standard_errors(run):
-    """ln of the ratio over sqrt(2 / (n - 1)) of the values that are not lost."""
-    found, told = run
-    wanted = []
-    for here in told:
-        main = methods_of(here)[0]
-        wanted.append(math.log(main["ratio"]) / math.sqrt(2 / (main["n"] - main["failed"] - 1)))
-    assert diagnostics.residuals(found) == pytest.approx(wanted)
+def counted_by_hand(values):
+    """Of standardised values how many lie in each quarter of a sigma, those beyond 5 in the outermost."""
+    counts = [0] * 40
+    for z in values:
+        counts[min(max(math.floor((z + 5) * 4), 0), 39)] += 1
+    return counts
 
 
-def test_standardised_values_are_counted_on_both_sides(run):
-    """Each setting's values less their mean over the predicted sigma: how many lie within one and two."""
+def test_standardised_values_are_counted_requirement_by_requirement(run):
+    """Each setting's values less their mean over the predicted sigma of that requirement, one far off among them."""
     found, told = run
-    store = SimpleNamespace(distances=lambda index, method: told[index].values[method])
-    made = diagnostics.Distances.of(found, store)
-    every = []
-    for here in told:
-        values = here.values["gradient"][np.isfinite(here.values["gradient"])]
-        every.append((values - values.mean()) / here.sigma["gradient"])
-    z = np.concatenate(every)
-    assert made.total == z.size
-    for sigmas in (1.0, 2.0):
-        assert made.inside(sigmas) == pytest.approx((np.abs(z) < sigmas).mean(), abs=0.01)
+    kept = {(i, name): values for i, here in enumerate(told) for name, values in here.values.items()}
+    kept[0, "gradient:0"] = np.append(kept[0, "gradient:0"], told[0].true["gradient:0"] + 1.0)
+    store = SimpleNamespace(distances=lambda index, method: kept[index, method])
+    made = proof_figures.standardised(found, store)
+    assert list(made) == [f"m{k}" for k in range(MEASURANDS)]
+    for k in range(MEASURANDS):
+        every = []
+        for i, here in enumerate(told):
+            values = [v for v in kept[i, f"gradient:{k}"] if math.isfinite(v)]
+            every += [(v - statistics.fmean(values)) / here.sigma[f"gradient:{k}"] for v in values]
+        assert made[f"m{k}"].tolist() == counted_by_hand(every)
+    assert made["m0"][-1] >= 1
 
 
 def test_two_values_are_enough_to_stand_off_their_mean(run):
     """One stands off itself by nothing: it is not counted."""
     found, told = run
     some = {0: 2, 1: 1, 2: 0, 3: 3}
-    kept = {i: np.append(here.values["gradient"][np.isfinite(here.values["gradient"])][: some[i]], np.nan)
+    kept = {i: here.values["gradient:1"][np.isfinite(here.values["gradient:1"])][: some[i]]
             for i, here in enumerate(told)}  # fmt: skip
-    made = diagnostics.Distances.of(found, SimpleNamespace(distances=lambda index, method: kept[index]))
-    assert made.total == 5
-    z = [(kept[i][:-1] - kept[i][:-1].mean()) / told[i].sigma["gradient"] for i in (0, 3)]
-    assert np.repeat(np.arange(1600), made.counts).tolist() == sorted(np.floor((np.concatenate(z) + 8) * 100))
+    made = proof_figures.standardised(found, SimpleNamespace(distances=lambda index, method: kept[index]))
+    assert made["m1"].sum() == 5
+
+
+def test_lines_of_the_forest_are_the_documents_rows(run):
+    """Ratio, interval, bias and its standard error of each requirement and setting, by requirement."""
+    found, told = run
+    lines = proof_figures.lines_of(found, {"m1": 0.25})
+    assert [(line.name, line.setting) for line in lines] == [
+        (f"m{k}", i + 1) for k in range(MEASURANDS) for i in range(SETTINGS)
+    ]
+    for line in lines:
+        wanted = measurands_of(told[line.setting - 1])[line.number - 1]
+        good = wanted["n"] - wanted["failed"]
+        assert [line.low, line.high] == pytest.approx(wanted["ratio_interval"])
+        assert (line.ratio, line.bias) == (pytest.approx(wanted["ratio"]), pytest.approx(wanted["bias"]))
+        assert line.error == pytest.approx(math.sqrt(wanted["empirical"] / good))
+        assert line.half == (0.25 if line.name == "m1" else None)
+        inside = wanted["ratio_interval"][0] <= 1 <= wanted["ratio_interval"][1]
+        assert line.grade == ("open" if wanted["status"] != "ok" else "inside" if inside else "outside")
 
 
 def test_the_figure_shows_variances_and_their_intervals(run, monkeypatch):

@@ -1,6 +1,7 @@
 """What results show of themselves: one line, a table in a notebook, rows, a data frame."""
 
 import math
+import re
 import sys
 
 import numpy as np
@@ -111,3 +112,29 @@ def test_to_frame(results):
         assert isinstance(frame, pandas.DataFrame)
         assert frame.shape == (len(found.as_rows()), len(found.as_rows()[0]))
     assert results["Measurement"].to_frame()["value_px"].dtype == float
+
+
+def test_a_notebook_shows_pictures_once_validation_is_there(results, task1, monkeypatch):
+    """Of scene, picture and each result with a picture, its SVG; without `validation` the rows alone."""
+    import validation
+
+    assert validation._drawn in scenes.results.DRAW
+    picture = scenes.Picture.of(task1, *POSES)
+    pictured = [task1, picture, *(results[kind] for kind in ("Prediction", "Plan", "Measurement", "SceneBudget"))]
+    for found in pictured:
+        shown = found._repr_html_()
+        assert shown.count('<svg role="img"') == 1
+        assert "<table>" in shown
+    assert "The part as the camera sees it. 1 distance: no tolerance given" in picture._repr_html_()
+    assert "<svg" not in results["Budget"]._repr_html_()
+    assert "<svg" not in picture.unlit()._repr_html_()
+    one, two = (re.findall(r'id="(n\d+)-', picture._repr_html_())[0] for _ in range(2))
+    assert one != two
+    monkeypatch.setattr(scenes.results, "DRAW", [])
+    assert all("<svg" not in found._repr_html_() for found in pictured)
+
+
+def test_a_scene_that_asks_for_nothing_is_shown(task1):
+    shown = task1.model_copy(update={"task": None, "title": "<i>x</i>"})._repr_html_()
+    assert "&lt;i&gt;x&lt;/i&gt;" in shown
+    assert "<i>" not in shown

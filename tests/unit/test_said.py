@@ -148,7 +148,8 @@ def test_the_papers_search_is_shown_beside_ours():
     ours = [("task1", (30.0, 90.0), (15.0, 270.0), 0.5, 0.25), ("x", (1, 2), (3, 4), 0, 0.125)]
     rows = zip(*(column.cells for column in table._search(SimpleNamespace(search=ours)).columns), strict=True)
     assert list(rows) == [
-        ("(30, 90)", "(15, 270)", "0.5000", "0.2500", "0.500"), ("(1, 2)", "(3, 4)", "0.0000", "0.1250", "-")
+        ("(30.0, 90.0)", "(15.0, 270.0)", "0.5000", "0.2500", "0.500"),
+        ("(1.0, 2.0)", "(3.0, 4.0)", "0.0000", "0.1250", "-"),
     ]  # fmt: skip
 
 

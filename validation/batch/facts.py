@@ -28,6 +28,15 @@ def _length(value: float) -> float:
 _Length = Annotated[float, AfterValidator(_length)]
 
 
+class _Correction(BaseModel):
+    """A bias that is taken off, and its standard uncertainty, which may be infinite."""
+
+    model_config = _Strict
+
+    bias: _Length
+    u: _Variance
+
+
 class _Photos(BaseModel):
     """Which photographs, and whether the mean error is judged."""
 
@@ -69,6 +78,7 @@ class _PredictedMeasurand(BaseModel):
     bound: _Variance
     predicted_bias: _Length
     texture: _Variance | None = None
+    correction: _Correction | None = None
 
 
 class _Predicted(BaseModel):
@@ -82,6 +92,7 @@ class _Predicted(BaseModel):
     value_px: _Length
     predicted_bias: _Length
     texture: _Variance | None = None
+    corrections: dict[str, _Correction] = {}
     measurands: Annotated[list[_PredictedMeasurand], Field(min_length=1, max_length=1000)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,20 +27,24 @@ class Found:
     failures : dict
         Number of images by status, of those that are not ``ok``.
     clean : str
-        Status of the noise-free image.
+        Status of the noise-free image, once its bias is taken off.
+    correction, u_bias : float
+        Bias that a simulation tells and that is taken off, and its standard uncertainty (not variance); 0 and NaN where
+        there was none.
     """
 
     propagated: float
     distances: np.ndarray
     failures: dict[str, int]
     clean: str
+    correction: float = 0.0
+    u_bias: float = math.nan
 
     def scatter(self, true: float) -> dict[str, float]:
-        """Variance and mean error of what was measured (NaN of too little), number of images, of those that failed."""
+        """Variance and mean error of the corrected values (NaN of too little), number of images, of failed ones."""
         sample = Sample.of(self.distances)
-        return {
-            "empirical": sample.variance, "bias": sample.mean - true, "n": sample.n, "failed": sample.failed,
-        }  # fmt: skip
+        left = sample.mean - self.correction - true
+        return {"empirical": sample.variance, "bias": left, "n": sample.n, "failed": sample.failed}
 
 
 def ratios(empirical: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ import scenes
 from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Scene
-from validation import remeasured
+from validation import remeasured, simulation
 from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign
@@ -176,7 +176,7 @@ def _code() -> str:
     """Digest of the code that makes the numbers."""
     folders = [Path(package.__file__).parent for package in (scenes, imaging, planner, render, measure)]
     files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
-        Path(module.__file__) for module in (work, photographs, remeasured)
+        Path(module.__file__) for module in (work, photographs, remeasured, simulation)
     ]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 

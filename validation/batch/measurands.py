@@ -42,12 +42,19 @@ def texture(variance: float | None) -> dict[str, float]:
     return {} if variance is None or np.isnan(variance) else {"texture": variance}
 
 
-def propagated(method: str, found: PropagatedValues, spread: np.ndarray) -> dict[str, tuple[float, float, str]]:
+def propagated(
+    method: str, found: PropagatedValues, spread: np.ndarray, states: tuple[str, ...]
+) -> dict[str, tuple[float, float, str]]:
     """Variance, value and status of each measurand, with the scatter of the poses added, by `column`."""
     return {
         column(method, k): (float(found.covariance[k, k] + spread[k]), float(found.value[k]), state)
-        for k, state in enumerate(found.status)
+        for k, state in enumerate(states)
     }
+
+
+def correction(bias: float, u: float) -> dict[str, float]:
+    """A bias that is taken off, and its standard uncertainty, as a run file has it; 0 and infinite: not known."""
+    return {"bias": float(np.nan_to_num(bias)), "u": float(u)}
 
 
 @dataclass(frozen=True)
@@ -55,8 +62,9 @@ class JudgedMeasurand:
     """One measurand of one setting, by the verdict's method, in the scene's unit or degrees.
 
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
-    ``ratio`` and its interval, ``bias`` (mean less the object's value), ``predicted_bias`` and ``status`` as of
-    `Judged`. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    ``ratio`` and its interval, ``bias`` (mean of the corrected values less the object's), ``correction``, ``u_bias``,
+    ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a value is told with.
+    ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
     ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
     """
 
@@ -78,6 +86,9 @@ class JudgedMeasurand:
     status: str
     independent: float
     texture: float | None = None
+    correction: float = 0.0
+    u_bias: float | None = None
+    u: float | None = None
 
     @property
     def record(self) -> dict[str, Any]:
@@ -99,10 +110,15 @@ _NUMBERS = (
     "independent",
     "low",
     "high",
+    "correction",
+    "u_bias",
 )
 _RECORD = np.dtype(
     [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
 )
+
+
+_PLAIN = ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction")
 
 
 class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
@@ -130,6 +146,9 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
                 record[name] = about[name]
             record["texture"] = about.get("texture", np.nan)
             record["predicted"], record["independent"] = each.propagated, share
+            record["correction"], record["u_bias"] = each.correction, each.u_bias
+            if not np.isnan(each.u_bias):
+                record["predicted_bias"] = 0.0  # it has been taken off
             for name, number in each.scatter(about["value"]).items():
                 record[name] = number
             record["status"] = STATUSES.index(row_status(each.clean, each.failures, each.distances.size))
@@ -167,13 +186,15 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
 def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:
     name, kind, unit = texts[record["about"]]
     known = {
-        key: None if np.isnan(record[key]) else float(record[key]) for key in ("empirical", "ratio", "bias", "texture")
+        key: None if np.isnan(record[key]) else float(record[key])
+        for key in ("empirical", "ratio", "bias", "texture", "u_bias")
     }
+    known["u"] = None if known["u_bias"] is None else float(np.hypot(np.sqrt(record["predicted"]), known["u_bias"]))
     return JudgedMeasurand(
         name=name, kind=kind, unit=unit, n=int(record["n"]), failed=int(record["failed"]),
         status=STATUSES[record["status"]],
         ratio_interval=None if known["ratio"] is None else (float(record["low"]), float(record["high"])),
-        **{key: float(record[key]) for key in ("value", *FIELDS, "predicted_bias", "predicted", "independent")},
+        **{key: float(record[key]) for key in _PLAIN},
         **known,
     )  # fmt: skip
 

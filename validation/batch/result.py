@@ -80,8 +80,10 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         model = store.predicted(i)
         if model:
             scene = campaign.case(i).scene
-            found = {method.name: _found(i, method.name, store) for method in methods(scene)}
-            each = [_found(i, column(next(iter(found)), k), store) for k in range(len(model["measurands"]))]
+            off = model.get("corrections", {})
+            found = {m.name: _found(i, m.name, store, off.get(m.name)) for m in methods(scene)}
+            main = next(iter(found))
+            each = [_found(i, column(main, k), store, m.get("correction")) for k, m in enumerate(model["measurands"])]
             rows.add(i, scene.name, model, found, each)
         else:
             refused[i] = store.trouble(i) or _WAITING
@@ -107,9 +109,10 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     )
 
 
-def _found(setting: int, method: str, store: RunFile) -> Found:
+def _found(setting: int, method: str, store: RunFile, off: dict[str, float] | None) -> Found:
     propagated, _, status = store.propagated(setting, method)
-    return Found(propagated, store.distances(setting, method), store.failures(setting, method), status)
+    correction = {} if off is None else {"correction": off["bias"], "u_bias": off["u"]}
+    return Found(propagated, store.distances(setting, method), store.failures(setting, method), status, **correction)
 
 
 def _printed(campaign: Campaign) -> bool:

@@ -22,8 +22,10 @@ class Judged:
     """One method in one setting: predicted from its image against measured.
 
     Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
-    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean distance minus the model's, px,
-    ``predicted_bias`` what the classic locators add without noise, and ``rmse`` the root mean square error
+    propagated with its two-sided 95 % chi-square interval, ``bias`` the mean of the corrected distances minus the
+    model's, px, ``correction`` what was taken off each of them, the bias in a render of other rays, ``u_bias`` that
+    one's standard uncertainty (None where nothing was), ``predicted_bias`` the mean error that is expected (0 where it
+    was taken off, else what the classic locators add without noise), and ``rmse`` the root mean square error
     sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
     lost than may be (`row_status`).
     """
@@ -40,6 +42,8 @@ class Judged:
     predicted_bias: float
     rmse: float | None
     status: str
+    correction: float = 0.0
+    u_bias: float | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,7 @@ MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture"
 def _record(methods: int) -> np.dtype:
     judged = [
         ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
+        ("correction", "f8"), ("u_bias", "f8"), ("predicted_bias", "f8"),
         ("failed", "i4"), ("stray", "i4"), ("failures", "i4"), ("clean", "u1"),
     ]  # fmt: skip
     return np.dtype([
@@ -120,6 +125,8 @@ class Rows(Sequence[Row]):
             record[name] = model.get(name, math.nan)
         for place, one in zip(record["judged"], found.values(), strict=False):
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
+            place["correction"], place["u_bias"] = one.correction, one.u_bias
+            place["predicted_bias"] = record["predicted_bias"] if math.isnan(one.u_bias) else 0.0
             for name, number in one.scatter(model["value_px"]).items():
                 place[name] = number
             place["stray"], place["failures"] = sum(one.failures.values()), self._failure(one.failures)
@@ -188,10 +195,9 @@ class Rows(Sequence[Row]):
         def numbers(name: str) -> np.ndarray:
             return self._records["judged"][name][chosen, place]
 
-        found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed")}
+        found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed", "predicted_bias")}
         return {
             **found, "ratio": ratios(found["empirical"], found["propagated"]),
-            "predicted_bias": self._records["predicted_bias"][chosen],
             "status": self._statuses(numbers), "independent": np.ones(chosen.size),
         }  # fmt: skip
 
@@ -214,9 +220,9 @@ class Rows(Sequence[Row]):
         setting, parameters = self._campaign.at(index)
         scene, names = self._kinds[int(record["kind"])]
         numbers = {name: float(record[name]) for name in MODEL} | {"texture": _known(record["texture"])}
-        bias = numbers.pop("predicted_bias")
+        numbers.pop("predicted_bias")
         judged = [
-            _judged(name, place, self._failures[place["failures"]], bias)
+            _judged(name, place, self._failures[place["failures"]])
             for name, place in zip(names, record["judged"], strict=False)
         ]
         return Row(
@@ -226,7 +232,7 @@ class Rows(Sequence[Row]):
         )  # fmt: skip
 
 
-def _judged(method: str, place: np.void, failures: dict[str, int], predicted_bias: float) -> Judged:
+def _judged(method: str, place: np.void, failures: dict[str, int]) -> Judged:
     n, propagated = int(place["n"]), float(place["propagated"])
     empirical, bias = _known(place["empirical"]), _known(place["bias"])
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
@@ -240,9 +246,11 @@ def _judged(method: str, place: np.void, failures: dict[str, int], predicted_bia
         ratio=empirical / propagated if judged else None,
         ratio_interval=(float(place["low"]), float(place["high"])) if judged else None,
         bias=bias,
-        predicted_bias=predicted_bias,
+        predicted_bias=float(place["predicted_bias"]),
         rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
         status=row_status(STATUSES[place["clean"]], failures, n),
+        correction=float(place["correction"]),
+        u_bias=_known(place["u_bias"]),
     )
 
 

@@ -18,10 +18,12 @@ from threadpoolctl import ThreadpoolController
 import measure
 import planner
 import render
+from measure import Correction
 from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
+from validation import simulation
 from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
 from validation.remeasured import Method, Values, batches, remeasured
@@ -227,16 +229,43 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
         clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
     spread = planner.pose_scatter(shaken, np.array([list(picture.sensor)]))
-    propagated = {}
-    for i, method in enumerate(methods(scene)):
-        how_found = {"estimator": method.locator, "threshold": method.threshold, "photographed": photographed}
-        found = measure.propagate(image, picture, **how_found)
-        propagated[method.name] = found.variance_px2 + float(spread.covariance[0, 0, 0]), found.value_px, found.status
+    used = methods(scene)
+    found = [
+        measure.propagate(image, picture, estimator=m.locator, threshold=m.threshold, photographed=photographed)
+        for m in used
+    ]
+    clock.lap("propagate")
+    off: tuple[Correction, ...] = ()
+    if not photographed:
+        way = simulation.How(how.quality, variant, how.effects, how.tolerance)
+        off = simulation.independent(picture, used, image, tuple(each.measurands for each in found), way)
+        _note_corrections(numbers, used, off)
+        clock.lap("correct")
+    return Clean(Packed.of(image), _propagated(used, found, off, spread), numbers, clock.seconds)
+
+
+def _note_corrections(numbers: dict[str, Any], used: tuple[Method, ...], off: tuple[Correction, ...]) -> None:
+    """Beside what is predicted: the biases that are taken off, of the first measurand by method, px, and of all."""
+    numbers["corrections"] = {
+        method.name: measurands.correction(each.bias_image[0], each.u_bias_image[0])
+        for method, each in zip(used, off, strict=True)
+    }
+    for m, told in enumerate(numbers["measurands"]):
+        told["correction"] = measurands.correction(off[0].bias[m], off[0].u_bias[m])
+
+
+def _propagated(
+    used: tuple[Method, ...], found: list[measure.Propagated], off: tuple[Correction, ...], spread: Any
+) -> dict[str, tuple[float, float, str]]:
+    """Variance with the poses' scatter, value and status, as of `Clean`; statuses are what the correction leaves."""
+    told = {}
+    for i, (method, each) in enumerate(zip(used, found, strict=True)):
+        states = off[i].status if off else each.measurands.status
+        told[method.name] = each.variance_px2 + float(spread.covariance[0, 0, 0]), each.value_px, states[0]
         if i == 0:
             in_object = np.diag(spread.covariance_object[0])
-            propagated |= measurands.propagated(method.name, found.measurands, in_object)
-    clock.lap("propagate")
-    return Clean(Packed.of(image), propagated, numbers, clock.seconds)
+            told |= measurands.propagated(method.name, each.measurands, in_object, states)
+    return told
 
 
 def measure_chunk(

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from validation.batch import photographs
     from validation.batch.result import Validation
     from validation.cost.goal import Goal, Reached
+    from validation.report.station import Station
 
 commands = commands()
 _MOST_RENDERS = 10_000_000
@@ -96,7 +97,8 @@ def validate_command(
     With --photos nothing is rendered: repeated photographs are measured instead. Sub-folders of DIR are named as
     sensor_30_90_light_15_270, or DIR holds photos.toml: [[settings]] with sensor, light and files.
 
-    Writes run.sqlite, table.csv, measurands.csv, result.json and pictures to DIR. Exit status 1 if the measurements
+    Writes run.sqlite, report.html (one page that shows all), report.md, table.csv, measurands.csv, result.json and
+    pictures to DIR. Exit status 1 if the measurements
     contradict the predictions.
     """
     started = time.perf_counter()
@@ -123,13 +125,13 @@ def validate_command(
                 found, reached = run_by(options, loaded, renders, shown, photos=taken), None
             else:
                 found, reached = reach(loaded, goal, options, lambda line: print(line, file=sys.stderr), shown)
-        _write(loaded, found, out)
+        station = _write(loaded, found, out)
     reached = reached and replace(reached, seconds=time.perf_counter() - started)
     if as_json:
         _print_json(found, reached, taken)
     else:
         one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
-        _print_tables(found, reached, out, one, explain)
+        _print_tables(found, reached, station, out, one, explain)
     raise typer.Exit(0 if found.verdict.agrees else 1)
 
 
@@ -172,13 +174,16 @@ def _print_json(found: Validation, goal: Reached | None, taken: photographs.Phot
     print()
 
 
-def _print_tables(found: Validation, goal: Reached | None, directory: Path, scene: str | None, explain: bool) -> None:
+def _print_tables(
+    found: Validation, goal: Reached | None, station: Station, directory: Path, scene: str | None, explain: bool
+) -> None:
     """The whole result as tables; ``scene`` as it was named, None of a campaign."""
-    from validation.report import guide
+    from validation.report import guide, station_text
     from validation.report.table import report
 
     shown_on = console()
     shown_on.print(report(found, explain))
+    shown_on.print(station_text.report(station.requirements, guide.station_title(found, station)), highlight=False)
     if goal:
         shown_on.print(goal.text, highlight=False)
     for line in (guide.directory_line(directory), guide.next_line(found, scene, directory)):
@@ -196,9 +201,11 @@ def _goal(accuracy: float | None, budget: str | None, started: float) -> Goal | 
     return Goal(accuracy, None if budget is None else seconds(budget), started)
 
 
-def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> None:
+def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> Station:
+    """All files of a run; the station that they show."""
     from validation.batch.store import RunFile
-    from validation.report import export, figures
+    from validation.report import export, figures, page
+    from validation.report.station import of_run
 
     export.write_csv(found, directory / "table.csv")
     export.write_measurands(found, directory / "measurands.csv")
@@ -206,5 +213,8 @@ def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> Non
     store = RunFile.reopen(directory)
     try:
         figures.draw(loaded, found, store, directory / "figures")
+        station = of_run(loaded, found, store)
+        page.write(loaded, found, store, station, directory)
+        return station
     finally:
         store.close()

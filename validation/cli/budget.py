@@ -19,6 +19,7 @@ from validation.cli.common import (
     commands,
     parse_pose,
     parse_poses,
+    progress,
     say,
 )
 from validation.cli.outputs import check_directory, check_file
@@ -44,7 +45,9 @@ def budget_command(
     sensor: Pair = None,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
     p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95,
-    render: Annotated[bool, typer.Option("--render", help="Pixel noise and bias from a rendered picture.")] = False,
+    render: Annotated[
+        bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")
+    ] = False,
     monte_carlo: Annotated[
         bool, typer.Option("--monte-carlo", help="Draw all inputs, and compare as JCGM 101 clause 8 asks.")
     ] = False,
@@ -56,7 +59,10 @@ def budget_command(
     ] = None,
     csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write budget.json, budget.csv and budget.png.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Write budget.html (one page that shows all), budget.json, budget.csv and budget.png."
+        ),
     ] = None,
     seed: Seed = DEFAULT_SEED,
     as_json: Json = False,
@@ -75,7 +81,8 @@ def budget_command(
     picture = _picture(loaded, *poses)
     if stations and not is_plain(loaded):
         raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
-    found = budgets.budget_of(picture, p, rendered=render)
+    with progress("simulating the picture for its bias", "renders"):
+        found = budgets.budget_of(picture, p, rendered=render)
     drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
     shown = budgets.pictured(found, stations, seed) if stations else None
     facts = budgets.facts(found, drawn, shown, reach)
@@ -88,7 +95,7 @@ def budget_command(
         return
     _show(found, drawn, shown, reach)
     if out:
-        console().print(f"budget.json, budget.csv and budget.png: {out}", highlight=False)
+        console().print(f"budget.html, budget.json, budget.csv and budget.png: {out}", highlight=False)
 
 
 def _check(stations: int, reach: float | None) -> None:
@@ -101,12 +108,14 @@ def _check(stations: int, reach: float | None) -> None:
 
 def _write(found: SceneBudget, facts: dict, out: Path) -> None:
     """All that is known, as files of a directory."""
-    from validation.report import budget_figure
+    from validation.report import budget_figure, page, station
 
+    scene = found.picture.scene
     out.mkdir(parents=True, exist_ok=True)
     (out / "budget.json").write_text(dumps(facts), encoding="utf-8")
     write_csv(found, out / "budget.csv")
-    budget_figure.draw(found.measurands, out / "budget.png")
+    budget_figure.draw(found, out / "budget.png")
+    page.write_station(station.of_budget(found), scene.title or scene.name, out / "budget.html")
 
 
 def _poses(sensor: str | None, light: str | None) -> tuple[Any, Any]:
@@ -134,7 +143,7 @@ def write_csv(found: SceneBudget, path: Path) -> None:
 
 def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: float | None) -> None:
     from validation import budgets
-    from validation.report import budget_table
+    from validation.report import budget_table, station, station_text
 
     terminal = console()
     for each, quantity, status in zip(found, found.picture.scene.quantities, found.statuses, strict=True):
@@ -148,6 +157,7 @@ def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
     if shown:
         for line in budgets.said_of_pictures(shown):
             terminal.print(line, highlight=False)
+    terminal.print(station_text.report(station.of_budget(found).requirements, "\nAll requirements"), highlight=False)
 
 
 def _further(found: SceneBudget, each: Budget, drawn: list[dict], reach: float | None) -> list[str]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
+from planner.uncertainty.conformity import COVERAGE
+from scenes.status import is_trusted
 from validation.report import cells
 from validation.strict_json import plain
 
@@ -19,21 +21,25 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
     from planner.uncertainty.conformity import decide
 
-    rows, sigma_image = [], np.sqrt(np.einsum("mm->m", found.covariance_image))
+    rows, combined, sigma_image = [], found.u, np.sqrt(np.einsum("mm->m", found.covariance_image))
     for k, quantity in enumerate(found.quantities):
         zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
-        state, good = str(found.status[k]), bool(np.isfinite(value))
+        state, good, known = str(found.status[k]), bool(np.isfinite(value)), bool(np.isfinite(combined[k]))
+        told = combined[k] if known else spread
         rows.append({
             "name": quantity.name,
             "kind": quantity.kind,
             "unit": found.units[k],
             "value": value,
             "sigma": spread if good else None,
+            "bias": found.bias[k] if good and known else None,
+            "u_bias": found.u_bias[k] if good and known else None,
+            "u": combined[k] if good and known else None,
             "value_image": found.value_image[k] if good else None,
             "sigma_image": sigma_image[k] if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(float(value), float(spread), nominal, zone, status=state),
+            "decision": zone and decide(float(value), float(told), nominal, zone, status=state),
             "status": state,
         })  # fmt: skip
     return plain(rows)
@@ -46,22 +52,47 @@ def covariance(found: measure.Measurements) -> list[list[float | None]]:
 
 def table(rows: list[dict[str, Any]]) -> Table:
     """The same for a terminal."""
-    columns = ("name", "kind", "value", "", "unit", "nominal", "tolerance", "decision", "status")
-    shown = cells.table("Measurands (+- 1 sigma)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
+    columns = (
+        "name",
+        "kind",
+        "value",
+        "u",
+        "unit",
+        "bias off",
+        "u(bias)",
+        "nominal",
+        "tolerance",
+        "decision",
+        "status",
+    )
+    shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
     for row in rows:
-        places = digits(row["sigma"])
+        told = row["sigma"] if row["u"] is None else row["u"]
+        places = digits(told)
         value = "-" if row["value"] is None else f"{row['value']:.{places}f}"
-        sigma = "" if row["sigma"] is None else f"+- {row['sigma']:.{places}f}"
+        sigma = "" if told is None else f"+- {told:.{places}f}"
+        off = ["-" if row[name] is None else f"{row[name]:.2g}" for name in ("bias", "u_bias")]
         nominal, zone = f"{row['nominal']:.6g}", row["tolerance"]
         limits = "-" if zone is None else _limits(zone)
-        about = row["name"], row["kind"], value, sigma, row["unit"]
-        shown.add_row(*about, nominal, limits, row["decision"] or "-", row["status"])
+        about = row["name"], row["kind"], value, sigma, row["unit"], *off
+        shown.add_row(*about, nominal, limits, _decision(row), row["status"])
     return shown
 
 
+def _decision(row: dict[str, Any]) -> str:
+    """With what an undecided value may be off by, where its bias is what keeps it from being decided."""
+    if row["decision"] is None:
+        return "-"
+    if row["decision"] != "undecided" or is_trusted(row["status"]) or row["value"] is None:
+        return row["decision"]
+    reach = "unknown" if row["u_bias"] is None else f"up to {COVERAGE * row['u_bias']:.1g}"
+    return f"undecided (bias {reach})"
+
+
 _CAPTION = (
-    "pass, fail: by more than the expanded uncertainty of 2 sigma within or beyond the tolerance (ISO 14253-1); only a "
-    "value whose status is ok is decided."
+    "u: combined standard uncertainty, of noise and of the bias that a simulation tells and that is taken off; of "
+    "noise alone where there is no light to simulate. pass, fail: by more than 2 u within or beyond the tolerance (ISO "
+    "14253-1); only a value whose status is ok is decided."
 )
 
 

@@ -15,7 +15,7 @@ from scenes.files.image import Size
 from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
-from validation.cli.common import Json, commands, parse_pose, parse_poses, say
+from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -55,6 +55,9 @@ def measure_command(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="PNG", help="Draw the photograph with what was found.")
     ] = None,
+    as_measured: Annotated[
+        bool, typer.Option("--as-measured", help="With SCENE: take no bias off, simulate nothing.")
+    ] = False,
     gamma: recorded.Gamma = None,
     channel: recorded.Channel = None,
     bayer: recorded.Bayer = None,
@@ -63,8 +66,9 @@ def measure_command(
 ) -> None:
     """Measure an image: the measurands of a known scene, or else the shapes that it shows.
 
-    Of a photograph the five most prominent shapes are measured where nothing else is said. Exit status 1 if something
-    cannot be measured; of a photograph's shapes, if none can.
+    With a scene and its light the bias is simulated and taken off; what that is not sure of is u_bias. Of a photograph
+    the five most prominent shapes are measured where nothing else is said. Exit status 1 if something cannot be
+    measured; of a photograph's shapes, if none can.
     """
     import measure
 
@@ -77,6 +81,8 @@ def measure_command(
         "--all": every or None, "--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf,
     }  # fmt: skip
     if scene is None:
+        if as_measured:
+            raise InvalidInput("--as-measured must be left out without a scene, got it")
         wanted = _shapes_wanted(options)
         photo = scenes.photograph.read(file, gamma, channel, bayer)
         found = measure.photograph(
@@ -95,8 +101,29 @@ def measure_command(
 
     known = scenes.load(scene)
     picture = picture_file.read(file, Size.of_camera(known.camera))
-    found = measure.measure(picture, known, *poses, estimator, threshold)
+    shown = scenes.Picture.of(known, *poses)
+    if as_measured or not shown.lights:
+        found = measure.measure(picture, shown, estimator=estimator, threshold=threshold)
+    else:
+        found = _corrected(picture, shown, estimator, threshold)
     _say_measurands(file, found, found.first if known.task is not None else None, as_json)
+
+
+def _corrected(
+    image: np.ndarray, picture: scenes.Picture, estimator: str | None, threshold: float | None
+) -> measure.Measurements:
+    """With the bias taken off that a simulation tells; what is wrong with the image is said before anything is."""
+    import measure
+    from validation.remeasured import Method
+
+    method = Method(estimator or measure.best_estimator(picture.scene), threshold)
+    plain = measure.measure(image, picture, estimator=method.locator, threshold=threshold)
+    if not np.isfinite(plain.value).any():
+        return plain
+    from validation import kept
+
+    with progress("simulating the picture for its bias", "renders"):
+        return measure.corrected(plain, kept.correction(picture, method))
 
 
 def _shapes_wanted(options: dict[str, Any]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from validation.cli import plan_json
 from validation.cli.common import Json, SceneName, check_left_out, check_number, commands, parse_poses, progress, say
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
+from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import planner
@@ -25,7 +26,7 @@ _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 _NOT_CAPABILITY = (
     "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
-    "--views", "--views-share", "--vary", "--hold",
+    "--views", "--views-share", "--vary", "--hold", "--write",
 )  # fmt: skip
 
 Objective = Annotated[
@@ -76,7 +77,13 @@ Check = Annotated[
 ]
 NoCheck = Annotated[bool, typer.Option("--no-check", help="Render nothing.")]
 Map = Annotated[Path | None, typer.Option("--map", metavar="FILE.png", help="Write the maps.")]
-Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Write all pictures there.")]
+Write = Annotated[
+    bool, typer.Option("--write", help="Put the poses into the scene's file, first of its settings; comments stay.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Write plan.html (one page that shows the best setting) and all pictures."),
+]
 ViewCount = Annotated[
     int | None, typer.Option("--views", metavar="N", help="Plan 1 to N pictures that together measure best.")
 ]
@@ -115,6 +122,7 @@ def plan_command(
     no_check: NoCheck = False,
     map_file: Map = None,
     out: Out = None,
+    write: Write = False,
     views: ViewCount = None,
     views_share: ViewsShare = None,
     as_json: Json = False,
@@ -130,6 +138,7 @@ def plan_command(
     several = views is not None or views_share is not None
     if several:
         plan_views.check_options(context, views, views_share)
+    target = _target(scene, edges, several) if write else None
     loaded = scenes.load(scene)
     import planner
 
@@ -157,7 +166,9 @@ def plan_command(
     safe = planner.robust(found, tolerances, limits) if tolerances else None
     checked = _check(found, count) if count else None
     scatter = _check_varied(found) if found.varied and count else None
-    _show(found, checked, safe, seconds, _pictures(found, map_file, out), as_json, scatter)
+    if target:
+        _write(target, found, checked)
+    _show(found, checked, safe, seconds, _pictures(found, checked, map_file, out), target, as_json, scatter)
     _say_unchecked(loaded, bool(count or no_check or as_json))
     if scatter and not scatter.agrees:
         raise typer.Exit(1)
@@ -172,6 +183,23 @@ def _check_numbers(check, separation: float, camera_body, light_body, same_mount
     check_number("--light-body", light_body, 0, 1e12)
     if same_mount and separation > 0:
         raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {separation:g}")
+
+
+def _target(scene: str, edges: str, several: bool) -> Path:
+    """The file that gets the poses, seen to before anything is searched."""
+    from validation.planned_scene import check_writable
+
+    for option, is_given in (("--edges best", edges == "best"), ("--views", several)):
+        if is_given:
+            raise scenes.InvalidInput(f"--write must be left out with {option}, got both")
+    return check_writable(scene)
+
+
+def _write(target: Path, found: planner.Plan, checked: PlanCheck | None) -> None:
+    from validation.planned_scene import write
+
+    best = found if checked is None or checked.proposed is None else checked.proposed
+    write(target, found, best.sensor, best.light)
 
 
 def _say_unchecked(scene: scenes.Scene, said: bool) -> None:
@@ -271,24 +299,36 @@ def _tolerances(texts: list[str], scene: scenes.Scene) -> planner.Tolerances | N
     return tolerances
 
 
-def _pictures(found: planner.Plan, map_file: Path | None, out: Path | None) -> list[Path]:
+def _pictures(found: planner.Plan, checked: PlanCheck | None, map_file: Path | None, out: Path | None) -> list[Path]:
     if map_file is None and out is None:
         return []
     from validation.report import plan_figures  # matplotlib takes half a second to load
 
-    return plan_figures.draw(found, out, map_file) if out else [plan_figures.map_picture(found, map_file)]
+    if out is None:
+        return [plan_figures.map_picture(found, map_file)]
+    return [*plan_figures.draw(found, out, map_file), _page(found, checked, out)]
+
+
+def _page(found: planner.Plan, checked: PlanCheck | None, out: Path) -> Path:
+    """The setting that is proposed as one page, as its models predict it."""
+    from validation.report import page, station
+
+    scene, best = found.scene, checked.proposed if checked and checked.proposed else found
+    made = station.of_picture(scenes.Picture.of(scene, best.sensor, best.light))
+    return page.write_station(made, scene.title or scene.name, out / "plan.html")
 
 
 def _show(
     found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path],
-    as_json: bool, scatter: VaryCheck | None = None,
+    written: Path | None, as_json: bool, scatter: VaryCheck | None = None,
 ) -> None:  # fmt: skip
     """The plan, as JSON or as tables."""
     from validation.report import vary_table
 
     if as_json:
         varied = {"varied": vary_table.facts(found.varied, scatter)}
-        say(plan_json.facts(found, checked, safe, seconds, pictures) | varied, True, "")
+        files = {"pictures": pictures, "written": written}
+        say(plan_json.facts(found, checked, safe, seconds) | plain(files) | varied, True, "")
         return
     from validation.report import plan_table
 
@@ -298,3 +338,5 @@ def _show(
         shown_on.print(vary_table.report(found, scatter, seconds), highlight=False)
     for path in pictures:
         shown_on.print(f"picture: {path}", highlight=False)
+    if written:
+        shown_on.print(f"The poses stand in {written} now.", highlight=False)

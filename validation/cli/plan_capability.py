@@ -26,12 +26,12 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
     if as_json:
         say(facts(scene, found, step, seconds), True, "")
         return
-    from validation.report.cells import number, table
+    from validation.report.cells import number, pose, table
 
     title = f"{scene.title or scene.name}: poses of the smallest worst U / T"
     columns = ("planned for", "sensor", "light", "measurand", "u by noise", "u_c", "U", "U / T", "status")
     rows = [
-        (words, str(placed.sensor), scenes.shown(scenes.pairs(placed.light)), row["name"],
+        (words, pose(placed.sensor), pose(placed.light), row["name"],
          *(f"{row[key]:.3g}" for key in ("repeatability", "u", "U")), number(row["ratio"], ".3f"), row["status"])
         for words, placed in (("U / T", found.best), ("noise alone", found.quiet))
         for row in _rows(placed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import scenes
@@ -15,9 +14,7 @@ if TYPE_CHECKING:
     from validation.plan_check import CheckedSetting, PlanCheck
 
 
-def facts(
-    found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float, pictures: list[Path]
-) -> dict:
+def facts(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float) -> dict:
     """The plan for JSON."""
 
     p = found.prediction
@@ -27,6 +24,7 @@ def facts(
         "model": found.model,
         "sensor": list(found.sensor),
         "light": scenes.pairs(found.light),
+        "steady": found.steady,
         "shares": found.shares,
         "alone": found.alone,
         "edges": list(found.scene.required),
@@ -51,7 +49,6 @@ def facts(
         "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
         **_checked(checked),
         "robust": None if safe is None else _with_poses(safe),
-        "pictures": pictures,
         "seconds": seconds,
     })  # fmt: skip
 

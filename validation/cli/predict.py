@@ -8,6 +8,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput, Pose, several
+from scenes.status import legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -39,6 +40,8 @@ def predict_command(
         say({"scene": loaded.name, "model": model, "settings": rows}, True, "")
     else:
         console().print(_table(loaded, model, rows))
+        for line in legend(each["status"] for row in rows for each in row["measurands"]):
+            console().print(f" {line}", highlight=False)
     good = all(each["variance"] is not None for row in rows for each in row["measurands"])
     raise typer.Exit(0 if good else 1)
 
@@ -71,20 +74,15 @@ def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
 
 
 def _table(scene: scenes.Scene, model: str, rows: list[dict[str, Any]]) -> Table:
-    from validation.report.cells import number, sigma, table
+    from validation.report.cells import number, pose, sigma, table
 
     columns = ("sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma", "status")
     made = table(f"{scene.name}: predicted ({model}, +- 1 sigma)", *columns, words=("measurand", "unit", "status"))
     for row in rows:
-        lights = " ".join(_pose(pose) for pose in row["light"])
         for each in row["measurands"]:
             made.add_row(
-                _pose(row["sensor"]), lights, each["name"], number(each["value"], ".6g"), sigma(each["variance"]),
-                number(each["bias"], ".2g"), each["unit"], number(each["value_image"], ".6g"),
+                pose(row["sensor"]), pose(row["light"]), each["name"], number(each["value"], ".6g"),
+                sigma(each["variance"]), number(each["bias"], ".2g"), each["unit"], number(each["value_image"], ".6g"),
                 sigma(each["variance_image"]), each["status"],
             )  # fmt: skip
     return made
-
-
-def _pose(pose: list[float]) -> str:
-    return f"({pose[0]:.4g}, {pose[1]:.4g})"

@@ -33,6 +33,7 @@ def report_command(
     from validation.batch.store import RunFile
     from validation.report import export
     from validation.report import page as report
+    from validation.report.station import of_run
 
     store = RunFile.reopen(directory)
     try:
@@ -40,7 +41,7 @@ def report_command(
         found = collect(campaign, store)
         out = out or directory
         out.mkdir(parents=True, exist_ok=True)
-        files = report.write(campaign, found, store, out)
+        files = report.write(campaign, found, store, of_run(campaign, found, store), out)
         files += [export.write_csv(found, out / "table.csv"), export.write_json(found, out / "result.json")]
         if parquet:
             files.append(export.write_parquet(found, out / "table.parquet"))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 import scenes
+from scenes.status import legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -46,7 +47,9 @@ def new_command(part: Part, output: Output = None, units: Units = "mm", as_json:
         [
             *(f"Mended: {each}" for each in made.solid.mended),
             f"{path}: {facts['edges']} edges, {facts['circles']} circles",
+            *(["What could be measured, as seen from the setting that is proposed:"] if asked else []),
             *(f"  {each['name']}: {each['status']}" for each in asked),
+            *(f"  {line}" for line in legend(each["status"] for each in asked)),
             f"ice show {path} lists what can be named; "
             + (f"ice plan {path} finds better poses" if asked else "nothing to measure was found"),
         ]

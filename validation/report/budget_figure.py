@@ -1,38 +1,118 @@
-"""Uncertainty budgets as bars."""
+"""Uncertainty budgets as one chart: a bar a requirement in per cent of its tolerance, stacked by source."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
+from markupsafe import Markup
 
+from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.budget import Budget
-from validation.report.canvas import TEXT, WIDTH, save
+from planner.uncertainty.improve import improvements
+from scenes.status import is_trusted
+from validation.report.canvas import TEXT, WIDTH, inline, save
 
-_MOST = 12  # contributions of a measurand that are drawn
-
-
-def draw(budgets: tuple[Budget, ...], path: Path) -> Path:
-    """One panel a measurand: contributions (standard uncertainties in its unit), the largest on top, and u_c."""
-    figure, panels = plt.subplots(
-        len(budgets), 1, figsize=(WIDTH, 0.7 + sum(0.9 + 0.22 * _rows(b) for b in budgets)), squeeze=False,
-        gridspec_kw={"height_ratios": [0.9 + 0.22 * _rows(b) for b in budgets]}, layout="constrained",
-    )  # fmt: skip
-    for panel, budget in zip(panels[:, 0], budgets, strict=True):
-        rows = sorted(budget.contributions, key=lambda row: -abs(row.contribution))[:_MOST]
-        names = [row.source for row in rows] + ["combined"]
-        sizes = [abs(row.contribution) for row in rows] + [budget.u]
-        panel.barh(names, sizes, color=["C0"] * len(rows) + ["C1"])
-        panel.invert_yaxis()
-        panel.set_title(f"{budget.name}: U = {budget.U:.2g} {budget.unit}, k = {budget.k:.3g}", fontsize=11, loc="left")
-        panel.set_xlabel(f"standard uncertainty [{budget.unit}]", fontsize=TEXT)
-        panel.tick_params(labelsize=TEXT)
-        panel.locator_params(axis="x", nbins=4)
-    return save(figure, path)
+_SOURCES = 6  # that have a colour of their own; the others are one
+_LONGEST = 26  # letters of a name
+_LEAST_GAIN = 0.02  # part of U below which an improvement is not told
+_LOOKS = (
+    ("#0b3c5d", ""), ("#e69f00", "//"), ("#7fb2d9", ""), ("#8c1a11", "\\\\"), ("#5c9e6f", ""), ("#cc79a7", "xx"),
+    ("#d9d9d9", ""),
+)  # fmt: skip
+_OTHERS = "all others"
 
 
-def _rows(budget: Budget) -> int:
-    return min(len(budget.contributions), _MOST) + 1
+def parts(budgets: Sequence[Budget], halves: Sequence[float | None]) -> tuple[list[str], np.ndarray]:
+    """What each source makes of U: its share of the variance times U, so that a bar's parts add to U.
+
+    Parameters
+    ----------
+    halves : sequence of M
+        Half of each tolerance zone. Where one is not given, U itself is 100 %.
+
+    Returns
+    -------
+    sources : list of S str
+        Those with the largest parts, and ``all others``.
+    parts : ndarray, shape (M, S)
+        Per cent of half the tolerance zone.
+    """
+    every = {row.source: None for each in budgets for row in each.contributions}
+    table = np.zeros((len(budgets), len(every)))
+    names = list(every)
+    for m, (each, half) in enumerate(zip(budgets, halves, strict=True)):
+        whole = 100.0 if half is None else 100 * each.U / half
+        for row in each.contributions:
+            table[m, names.index(row.source)] = whole * max(row.share, 0.0)
+    leading = sorted(range(len(names)), key=lambda s: (-round(float(table[:, s].max(initial=0)), 9), s))
+    leading = [s for s in leading if table[:, s].max(initial=0) > 0]
+    kept, rest = leading[:_SOURCES], leading[_SOURCES:]
+    shown = np.concatenate([table[:, kept], table[:, rest].sum(1, keepdims=True)], 1) if rest else table[:, kept]
+    return [names[s] for s in kept] + [_OTHERS] * bool(rest), shown
+
+
+def improved(found: SceneBudget) -> list[str]:
+    """What halving a source alone makes of U, a line a source, the most useful first."""
+    gains: dict[str, dict[str, float]] = {}
+    for each in found:
+        for one in improvements(each):
+            if one.gain >= _LEAST_GAIN:
+                gains.setdefault(one.source, {})[each.name] = one.gain
+    order = sorted(gains, key=lambda source: -round(max(gains[source].values()), 6))[:_SOURCES]
+    return [f"Halve {source}: U of {_gained(gains[source])}." for source in order]
+
+
+def _gained(gains: dict[str, float]) -> str:
+    """The requirements that gain most, with what U becomes less by."""
+    best = sorted(gains, key=lambda name: -round(gains[name], 6))
+    shown = ", ".join(f"{name} -{100 * gains[name]:.0f} %" for name in best[:_SOURCES])
+    return f"{shown}, and {len(best) - _SOURCES} more" if len(best) > _SOURCES else shown
+
+
+def _drawn(found: SceneBudget):
+    halves = [each.tolerance and each.tolerance.half for each in found.prediction.measurands]
+    sources, table = parts(found.measurands, halves)
+    count = len(found.measurands)
+    figure, axis = plt.subplots(figsize=(WIDTH, 0.9 + 0.34 * count + 0.2 * (len(sources) + 1)), layout="constrained")
+    left = np.zeros(count)
+    for name, part, (colour, hatch) in zip(sources, table.T, _LOOKS, strict=False):
+        axis.barh(range(count), part, left=left, height=0.62, color=colour, hatch=hatch, edgecolor="black", lw=0.5,
+                  label=name)  # fmt: skip
+        left += part
+    for m, (each, state) in enumerate(zip(found, found.statuses, strict=True)):
+        words = f" {left[m]:.2g} %" if halves[m] is not None else f" U {each.U:.2g} {each.unit}"
+        axis.text(left[m], m, words if is_trusted(state) else f"{words}, {state}", va="center", fontsize=TEXT)
+    _finished(axis, [each.name for each in found], left, any(half is not None for half in halves))
+    return figure
+
+
+def _finished(axis, names: list[str], ends: np.ndarray, toleranced: bool) -> None:
+    """Names beside the bars; the limit, where it is not so far that no bar could be seen beside it."""
+    most = float(ends.max(initial=0))
+    far = toleranced and most < 20
+    if toleranced and not far:
+        axis.axvline(100, color="black", lw=1.4, ls="--", label="limit: U is as large as the tolerance")
+    axis.set(ylim=(len(names) - 0.45, -0.55), xlim=(0, max(1.45 * most, 110 if toleranced and not far else 0, 1e-9)))
+    axis.set_yticks(range(len(names)), [n if len(n) <= _LONGEST else n[: _LONGEST - 1] + "…" for n in names])
+    axis.tick_params(labelsize=TEXT)
+    what = "U, % of the tolerance" if toleranced else "U, each 100 %: no tolerance is given"
+    axis.set_xlabel(f"{what} (limit: 100 %)" if far else what, fontsize=TEXT)
+    axis.figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=1, frameon=False,
+                       fontsize=TEXT)  # fmt: skip
+
+
+def draw(found: SceneBudget, path: Path) -> Path:
+    """The chart as a file."""
+    return save(_drawn(found), path)
+
+
+def drawn(found: SceneBudget, key: str = "budget") -> Markup:
+    """The chart as SVG within a page."""
+    names = ", ".join(f"{each.name} {each.U:.2g} {each.unit}" for each in found)
+    return inline(_drawn(found), key, f"Expanded uncertainties by source: {names}.")

@@ -1,24 +1,12 @@
-"""Uncertainty budgets in a run's report: of every scene that says what is not exactly known, at its first setting."""
+"""The tables of an uncertainty budget in a page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
-from planner.budgeting.budgets import SceneBudget, budget
+from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.budget import Budget
-from scenes import InvalidInput, Picture, Scene, Uncertainty
 from validation.report.budget_table import sentence, summary
-
-
-def budgets_of(scenes: tuple[Scene, ...]) -> Iterator[SceneBudget]:
-    """Budgets of the scenes that have uncertainties and a setting at which all can be measured."""
-    for scene in scenes:
-        if scene.settings and (scene.uncertain or scene.uncertainty != Uncertainty()):
-            try:
-                yield budget(Picture.of(scene, scene.settings[0].sensor, scene.settings[0].lights))
-            except InvalidInput:
-                continue
 
 
 def cells(each: Budget) -> list[list[str]]:

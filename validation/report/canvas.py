@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from markupsafe import Markup, escape
 from matplotlib.text import Text
 
 WIDTH = 5.2  # inches; shown 390 px wide, 10 points are 10 px high
@@ -20,13 +23,39 @@ def save(figure, path: Path) -> Path:
 
     Texts are shown as they are, for names and titles are the user's: only powers along logarithmic axes are formulas.
     """
+    _plain(figure)
+    figure.savefig(path, dpi=_DPI)
+    plt.close(figure)
+    return path
+
+
+def inline(figure, key: str, label: str) -> Markup:
+    """A figure as SVG within a page, its text as text; the figure is forgotten.
+
+    Parameters
+    ----------
+    key : str
+        Tells its identifiers from those of the page's other pictures.
+    label : str
+        What a reader without eyes is told of it.
+    """
+    _plain(figure)
+    written = io.StringIO()
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": key}):
+        figure.savefig(written, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    plt.close(figure)
+    drawn = written.getvalue()
+    drawn = re.sub(r"<metadata>.*?</metadata>", "", drawn[drawn.index("<svg") :], flags=re.DOTALL)
+    drawn = re.sub(r'(?<=\bid=")|(?<=href="#)|(?<=url\(#)', f"{key}-", drawn)
+    return Markup(drawn.replace("<svg", f'<svg role="img" aria-label="{escape(label)}"', 1))
+
+
+def _plain(figure) -> None:
+    """No text of a figure is a formula, but powers along logarithmic axes."""
     axes = [axis for each in figure.axes for axis in (each.xaxis, each.yaxis) if axis.get_scale() == "log"]
     powers = {label for axis in axes for label in axis.get_ticklabels(which="both")}
     for text in figure.findobj(Text):
         text.set_parse_math(text in powers)
-    figure.savefig(path, dpi=_DPI)
-    plt.close(figure)
-    return path
 
 
 def legend_below(axis, columns: int = 1, **how) -> None:

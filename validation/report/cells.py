@@ -8,7 +8,8 @@ from typing import Any
 
 from rich.table import Table
 
-from scenes import Pose
+from scenes import Tolerance
+from scenes.pose import several
 
 
 def table(
@@ -47,12 +48,24 @@ def sigma(variance: float | None) -> str:
     return number(variance if variance is None else math.sqrt(variance))
 
 
-def pose(poses: Pose | tuple[Pose, ...]) -> str:
-    """A pose, or several, to a tenth of a degree.
+def pose(poses: Any) -> str:
+    """A pose or a pair of numbers, or several, degrees, always to a tenth.
 
-    >>> pose(Pose(15, 315)), pose(())
-    ('(15.0, 315.0)', '-')
+    >>> from scenes import Pose
+    >>> pose(Pose(15, 315)), pose((15, 315)), pose([Pose(15, 315), Pose(60, 90)]), pose(())
+    ('(15.0, 315.0)', '(15.0, 315.0)', '(15.0, 315.0) (60.0, 90.0)', '-')
     """
-    if not isinstance(poses, Pose):
-        return " ".join(map(pose, poses)) or "-"
-    return f"({poses.polar_deg:.1f}, {poses.azimuth_deg:.1f})"
+    return " ".join("({:.1f}, {:.1f})".format(*each) for each in several(poses)) or "-"
+
+
+def zone(tolerance: Tolerance | None) -> str:
+    """A tolerance as on a drawing.
+
+    >>> zone(Tolerance(plus=0.02, minus=0.02)), zone(Tolerance(plus=0.02, minus=0.0)), zone(None)
+    ('±0.02', '+0.02 -0', '-')
+    """
+    if tolerance is None:
+        return "-"
+    if tolerance.plus == tolerance.minus:
+        return f"±{tolerance.plus:g}"
+    return f"+{tolerance.plus:g} -{tolerance.minus:g}"

@@ -7,7 +7,7 @@ import math
 from rich.table import Table
 
 from render.phenomena import Decision, Effect
-from scenes import pairs, shown
+from scenes import pairs
 from validation.effects_check import RENDERED, Switched
 from validation.report import cells
 from validation.strict_json import plain
@@ -80,7 +80,7 @@ def check_table(rows: list[Switched]) -> Table:
 
 def _switched(row: Switched) -> list[str]:
     return [
-        f"{row.setting.sensor} {shown(pairs(row.setting.light))}",
+        f"{cells.pose(row.setting.sensor)} {cells.pose(row.setting.light)}",
         row.name,
         f"{row.bias_px:+.4f}",
         f"{_number(row.estimated.bias_px)} +{row.resolution_px:.4f}",

@@ -5,10 +5,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenes.status import legend
 from validation.batch.result import Validation
+from validation.report.cells import pose
 from validation.statistics import LEVEL
+
+if TYPE_CHECKING:
+    from validation.report.station import Station
 
 _LOCATORS = {
     "gradient": "zero of the second derivative",
@@ -113,14 +118,54 @@ How to read this
 """
 
 
+_WRONG = {
+    "rows": "some values scatter differently",
+    "pooled": "all values together scatter differently",
+    "bias": "mean values are off by more than is allowed",
+    "not measured": "most could not be measured",
+    "not proven": "none is proven",
+}
+
+
+def plain_verdict(found: Validation) -> str:
+    """What the verdict says, in plain words."""
+    verdict = found.verdict
+    if not verdict.agrees:
+        reasons = ", and ".join(_WRONG.get(reason, reason) for reason in verdict.reasons) or "no test was passed"
+        return f"No: {reasons} than was predicted." if "scatter" in reasons else f"No: {reasons}."
+    images = max(row.main.n for row in found.rows)
+    return (
+        f"Yes: {images} noisy pictures of each setting were measured, and the values scatter as predicted; "
+        f"{verdict.inside} of {verdict.rows} lie in their 95 % interval, where chance alone leaves "
+        f"{_expected(verdict.rows)}."
+    )
+
+
+def _expected(rows: int) -> str:
+    """How many of so many 95 % intervals hold the true value, about.
+
+    >>> _expected(20), _expected(3)
+    ('about 19', 'nearly all')
+    """
+    return f"about {0.95 * rows:.0f}" if 0.05 * rows >= 0.5 else "nearly all"
+
+
+def station_title(found: Validation, station: Station) -> str:
+    """Of the table of a run's best setting."""
+    lights = station.picture.lights
+    where = f"sensor {pose(station.picture.sensor)}" + (f", light {pose(lights)}" if lights else "")
+    best = f", the best of {len(found.rows)}" if len(found.rows) > 1 else ""
+    return f"\nHow well each requirement is measured in setting {station.number}{best}: {where}"
+
+
 def directory_line(directory: Path) -> str:
     """Where a run's files are."""
-    return f"Files: {directory} (table.csv, measurands.csv, result.json, figures/)"
+    return f"Files: {directory} (report.html, report.md, table.csv, measurands.csv, result.json, figures/)"
 
 
 def next_line(found: Validation, scene: str | None, directory: Path) -> str:
-    """Where the report is, and what to try next, by the verdict; ``scene`` as the commands take it, None of several."""
-    report = f"Next: `ice report {shlex.quote(str(directory))}` writes {directory / 'report.html'}"
+    """Where the page is, and what to try next, by the verdict; ``scene`` as the commands take it, None of several."""
+    report = f"Next: look at {directory / 'report.html'}"
     if scene is None:
         return f"{report}."
     scene = shlex.quote(scene)

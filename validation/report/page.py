@@ -1,61 +1,118 @@
-"""The report of a run: one self-contained HTML page, and the same tables as Markdown."""
+"""One page a station: how well each requirement is measured, the proof, and how it was done; the tables as Markdown."""
 
 from __future__ import annotations
 
-import base64
 import re
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import jinja2
-import numpy as np
 from markupsafe import Markup, escape
 
 from planner.budgeting.budgets import SceneBudget
 from validation.batch.campaign import Campaign
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.report import budget_figure, budget_section, budget_table, diagnostics, figures, guide, page_tables
+from validation.report import (
+    budget_figure,
+    budget_section,
+    budget_table,
+    guide,
+    page_tables,
+    proof_figures,
+    settings_table,
+    station_sketch,
+    station_table,
+    station_view,
+)
+from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
+from validation.report.requirements import next_step, sentence
+from validation.report.station import Station, halves_of
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A PNG, base64, with its text alternative and caption."""
+class Plot:
+    """A picture, SVG, and its caption."""
 
-    data: str
-    alt: str
+    drawn: Markup
     caption: str
 
 
 @dataclass(frozen=True)
 class Section:
+    """A heading and what is below it: an answer in words, the verdict, plots, points, tables, and tables to unfold."""
+
     heading: str
+    answer: str = ""
+    verdict: str = ""
+    plots: list[Plot] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
-    pictures: list[Picture] = field(default_factory=list)
+    folded: list[Table] = field(default_factory=list)
 
 
-def write(campaign: Campaign, found: Validation, store: RunFile, directory: Path) -> list[Path]:
-    """Write report.html and report.md to a directory; their paths."""
-    context = {
-        "name": found.scene,
-        "title": found.title or found.scene,
-        "verdict": found.verdict.text,
-        "agrees": found.verdict.agrees,
-        "sections": _sections(campaign, found, store),
-    }
-    loader = jinja2.PackageLoader("validation.report")
-    paths = []
-    for suffix, escaped in ((".html", True), (".md", False)):
-        environment = jinja2.Environment(
-            loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined
-        )
-        environment.filters |= {"md": markdown, "words": words}
-        paths.append(directory / f"report{suffix}")
-        text = environment.get_template(f"report{suffix}.j2").render(context)
-        paths[-1].write_text(text, encoding="utf-8")
+def write(campaign: Campaign, found: Validation, store: RunFile, station: Station, directory: Path) -> list[Path]:
+    """Write report.html and report.md of a run to a directory; their paths."""
+    sections = [_proof(campaign, found, store), *_budget(station.budget)]
+    if len(found.rows) > 1:
+        sections.insert(0, _settings(campaign, found, station))
+    if found.refused:
+        sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
+    sections.append(_done(found, store))
+    context = _context(station, found.title or found.scene, sections) | {"agrees": found.verdict.agrees}
+    paths = [directory / "report.html", directory / "report.md"]
+    paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
+    paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
     return paths
+
+
+def write_station(station: Station, title: str, path: Path) -> Path:
+    """Write the page of a station that was not rendered: its first screen, and its budget."""
+    context = _context(station, title, _budget(station.budget)) | {"agrees": True}
+    path.write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
+    return path
+
+
+def _environment(escaped: bool) -> jinja2.Environment:
+    loader = jinja2.PackageLoader("validation.report")
+    made = jinja2.Environment(loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined)
+    made.filters |= {"md": markdown, "words": words}
+    return made
+
+
+def _context(station: Station, title: str, sections: list[Section]) -> dict[str, Any]:
+    return {
+        "name": station.picture.scene.name,
+        "title": title,
+        "sections": sections,
+        "station": first_screen(station),
+    }
+
+
+def first_screen(station: Station) -> dict[str, Any]:
+    """What the template of a page's first screen takes."""
+    found, picture = station.requirements, station.picture
+    told = station_sketch.told(picture)
+    number = f"Setting {station.number}. " if station.number else ""
+    how = "" if station.image is not None else " Drawn from the model: no shadows, no light between surfaces."
+    named = "; ".join(f"{each.number} {each.name}: {each.grade}" for each in found)
+    grades = dict.fromkeys(each.grade for each in found)
+    table = station_table.table(found)
+    return {
+        "sentence": sentence(found),
+        "next": next_step(found),
+        "sketch": station_sketch.draw(picture),
+        "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
+        "told": told,
+        "caption": f"{number}What is measured, as the camera sees it.{how}",
+        "key": [(grade, LOOKS[grade]) for grade in grades],
+        "columns": station_table.COLUMNS,
+        "lines": station_table.lines(found),
+        "note": station_table.NOTE,
+        "section": Section("Requirements", answer=f"{number}{told}.", tables=[table]),
+    }
 
 
 def words(text: str) -> Markup:
@@ -81,91 +138,50 @@ def markdown(text: str) -> str:
     return " ".join(text.split())
 
 
-def _sections(campaign: Campaign, found: Validation, store: RunFile) -> list[Section]:
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        drawn = figures.draw(campaign, found, store, folder)
-        sections = [
-            Section("Predicted against measured", [page_tables.ratios(found)], [_agreement(found, drawn[0])]),
-            Section("In the scene's unit", [page_tables.units(found)]),
-            Section("Variance in the image", [page_tables.variances(found)]),
-            Section("Residuals", [], [_residuals(found, folder)]),
-            Section("Distribution of the distances", [], [_distribution(found, store, folder)]),
-            Section("Estimators", [page_tables.estimators(found)]),
-        ]
-        effects = page_tables.effects(found, store)
-        if effects.rows:
-            sections.append(Section("Effects, on and off", [effects]))
-        if found.refused:
-            sections.append(Section("Settings without a result", [page_tables.refused(found)]))
-        sections += [_budget(each, folder) for each in budget_section.budgets_of(campaign.scenes)]
-        sections.append(Section("What it cost", [], [_time(found, folder)]))
-        sections.append(Section("The run", [page_tables.facts(found, store)]))
-        sections.append(Section("Images and edge pixels", [], [_images(path) for path in drawn[1:]]))
-    return sections
+def _settings(campaign: Campaign, found: Validation, station: Station) -> Section:
+    table = settings_table.table(found, halves_of(campaign), station.number)
+    answer = f"{len(found.rows)} settings were measured; shown above is setting {station.number}, the best."
+    return Section("All settings, the best first", answer, tables=[table])
 
 
-def _budget(found: SceneBudget, folder: Path) -> Section:
-    scene = found.picture.scene
-    tables = [
-        Table(
-            f"{each.name} [{each.unit}]",
-            budget_table.COLUMNS,
-            budget_section.cells(each),
-            budget_section.note(found, m),
-            advice=guide.advice(True)["budget"],
-        )
+def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
+    lines = proof_figures.lines_of(found, halves_of(campaign))
+    forest, bias = proof_figures.forest(lines), proof_figures.bias(lines)
+    many = proof_figures.grouped_told(lines)
+    some = "" if len(found.rows) <= proof_figures.MOST else f" Of {proof_figures.MOST} of {len(found.rows)} settings."
+    read = many + some
+    plots = [
+        Plot(forest, "Scatter of the measured values against the predicted one. Dots: 1 lies inside the interval; "
+             "diamonds: it does not, as happens by chance in one of 20; crosses: not proven, so not judged." + read),
+        Plot(bias, proof_figures.bias_told(lines) + many),
+        Plot(proof_figures.distributions(found, store),
+             "All measured values of each requirement (bars) against what is predicted (line)."),
+    ]  # fmt: skip
+    folded = [page_tables.ratios(found), page_tables.units(found), page_tables.variances(found),
+              page_tables.estimators(found)]  # fmt: skip
+    answer = guide.plain_verdict(found)
+    return Section("Are these uncertainties true?", answer, found.verdict.text, plots, folded=folded)
+
+
+def _budget(found: SceneBudget | None) -> list[Section]:
+    if found is None:
+        return []
+    caption = (
+        "Each bar is U of a requirement, divided by what its sources add to the variance: the longest part is the one "
+        "to improve. `ice budget SCENE --reach U` says how well a source must be known for a wanted U."
+    )
+    folded = [
+        Table(f"{each.name} [{each.unit}]", budget_table.COLUMNS, budget_section.cells(each),
+              budget_section.note(found, m))
         for m, each in enumerate(found)
+    ]  # fmt: skip
+    plots = [Plot(budget_figure.drawn(found), caption)]
+    return [
+        Section("Where the uncertainty comes from", plots=plots, points=budget_figure.improved(found), folded=folded)
     ]
-    caption = f"Standard uncertainties of {scene.name}, sensor {found.picture.sensor}."
-    drawn = budget_figure.draw(found.measurands, folder / f"budget_{scene.name}.png")
-    return Section(f"Uncertainty budget of {scene.name}", tables, [_picture(drawn, caption, caption)])
 
 
-def _agreement(found: Validation, path: Path) -> Picture:
-    ratios = np.array([row.main.ratio for row in found.rows if row.main.ratio])
-    spread = f", their ratio from {ratios.min():.2f} to {ratios.max():.2f}" if ratios.size else ""
-    alt = (
-        f"Measured against predicted variance of {ratios.size} settings{spread}; {found.verdict.inside} agree at 95 %."
-    )
-    return _picture(path, alt, "Measured against predicted variance, with 95 % intervals; below, their ratio.")
-
-
-def _residuals(found: Validation, folder: Path) -> Picture:
-    values = diagnostics.residuals(found)
-    reach = f", from {values.min():+.1f} to {values.max():+.1f} standard errors" if values.size else ""
-    caption = "ln(measured / predicted variance) over its standard error; dashed: beyond it the verdict rejects."
-    path = diagnostics.draw_residuals(found, folder / "residuals.png")
-    return _picture(path, f"Residuals of {values.size} settings{reach}.", caption)
-
-
-def _distribution(found: Validation, store: RunFile, folder: Path) -> Picture:
-    distances = diagnostics.Distances.of(found, store)
-    path = diagnostics.draw_distribution(distances, folder / "distribution.png")
-    alt = (
-        f"Histogram and normal plot of {distances.total} distances: {distances.inside(1):.1%} lie within one predicted "
-        f"sigma and {distances.inside(2):.1%} within two; a normal distribution has 68.3 % and 95.4 %."
-    )
-    return _picture(path, alt, "All distances, less their setting's mean, over the predicted sigma. " + alt)
-
-
-def _time(found: Validation, folder: Path) -> Picture:
-    spent = {name: value for name, value in found.seconds.items() if name not in ("wall", "workers")}
-    images = sum(row.main.n for row in found.rows)
-    total = sum(spent.values())
-    alt = "Working seconds: " + ", ".join(f"{name} {value:.1f}" for name, value in spent.items()) + "."
-    caption = f"{total:.1f} working seconds for {images} images: {1e3 * total / max(images, 1):.2f} ms an image."
-    return _picture(diagnostics.draw_time(found, folder / "time.png"), alt, caption)
-
-
-def _images(path: Path) -> Picture:
-    parts = path.stem.split("_")
-    kind = {"images": "Images", "edges": "Edge pixels of canny"}[parts[-1]]
-    text = (
-        f"{kind} from sensor ({parts[1]}, {parts[2]}), one a light{': ' if parts[3:-1] else ''}{' '.join(parts[3:-1])}"
-    )
-    return _picture(path, f"{text}.", text + ".")
-
-
-def _picture(path: Path, alt: str, caption: str) -> Picture:
-    return Picture(base64.b64encode(path.read_bytes()).decode("ascii"), alt, caption)
+def _done(found: Validation, store: RunFile) -> Section:
+    folded = [page_tables.facts(found, store)]
+    effects = page_tables.effects(found, store)
+    return Section("How it was done", folded=folded + [effects] * bool(effects.rows))

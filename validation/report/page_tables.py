@@ -28,7 +28,8 @@ _ROWS = 64  # rows of the table of settings without a result
 
 @dataclass(frozen=True)
 class Table:
-    """Columns and cells as text, terms and what to do next; ``words``: of sentences rather than numbers."""
+    """Columns and cells as text, terms and what to do next; ``words``: of sentences rather than numbers; ``chosen``:
+    the row that stands out."""
 
     label: str
     columns: list[str]
@@ -36,6 +37,7 @@ class Table:
     note: str = ""
     words: bool = False
     advice: str = ""
+    chosen: int | None = None
 
 
 def _key(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:

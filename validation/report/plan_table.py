@@ -9,10 +9,21 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from planner.search.candidates import Candidate
+from planner.search.setting_up import how_far
 from render import Tolerance
+from scenes import Scene
+from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
+
+_MODELS = {
+    "calibrated": "the formula of camera, light, surface and noise (model calibrated)",
+    "paper": "the paper's formula (model paper), which is right up to one factor",
+    "bound": "what no unbiased measurement can beat (model bound)",
+}
+_WHERE = {"object": "on the object", "image": "in the image"}
 
 
 def report(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float) -> Group:
@@ -36,10 +47,11 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
         return _head_of_several(found, edges, seconds)
     return (
         f"{found.scene.title or found.scene.name}\n"
-        f"Best {found.objective} variance ({found.model} model), required edges {edges}:\n"
-        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}\n"
-        f"  standard deviation {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]},"
-        f" {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]} in the image\n"
+        f"The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:\n"
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}\n"
+        f"  One picture's sigma is {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]};"
+        f" in the image {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]}.\n"
+        f"  Least variance {_WHERE[found.objective]}, by {_MODELS[found.model]}; measured from the edges {edges}.\n"
         + "".join(f"{line}\n" for line in _textures(p))
         + _searched(found, seconds)
     )
@@ -47,17 +59,19 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
 
 def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
     p = found.prediction
-    how = "worst ratio" if found.over == "minimax" else "weighted sum of the squared ratios"
+    how = "largest ratio" if found.over == "minimax" else "weighted sum of the squared ratios"
     lines = [
         found.scene.title or found.scene.name,
-        f"Least {how} of sigma to tolerance ({found.model} model), required edges {edges}:",
-        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}, {p.status}",
-        f"  Limited by {found.limiting}: sigma is {p.worst_ratio:.3g} of its tolerance.",
+        "The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:",
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}",
+        f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from the edges {edges}.",
+        f"  Limited by {found.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance.",
     ]
     for each in p.measurands:
-        ratio = "" if each.ratio is None else f", {each.ratio:.3g} of +-{each.tolerance.half:g}"
+        part = "" if each.ratio is None else f", {100 * each.ratio:.3g} % of +-{each.tolerance.half:g}"
         sigma = f"{each.variance_object**0.5:.3g} {each.unit}"
-        lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{ratio}, {each.status}")
+        lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{part}, {each.status}")
+    lines += [f"  {line}" for line in legend(each.status for each in p.measurands)]
     return "\n".join([*lines, *_textures(p), _searched(found, seconds)])
 
 
@@ -81,9 +95,11 @@ def _over_parts(each: planner.Forecast) -> str:
 
 def _searched(found: planner.Plan, seconds: float) -> str:
     lines = [
-        f"  {found.pairs} pairs in {seconds:.1f} s, {found.evaluated} of them evaluated one by one",
+        f"  Found among {found.pairs} pairs of places in {seconds:.1f} s{_ruled_out(found)}.",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if not found.steady:
+        lines.append(f"  Hard to set up: {_how_far(found.scene)} degrees off something cannot be measured any more.")
     if found.shares:
         lines.insert(
             0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
@@ -91,10 +107,28 @@ def _searched(found: planner.Plan, seconds: float) -> str:
     if found.set_aside:
         many = len(found.set_aside)
         lines.append(
-            f"  {many} better setting{'s' * (many > 1)} set aside, {found.set_aside[0].variance / found.variance:.3g}"
-            " of what is minimised: there more of what is measured is clutter."
+            f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {_part(found)} of this one's"
+            " variance): more of the values there would be biased by what lies around their edges (clutter)."
         )
     return "\n".join(lines)
+
+
+def _how_far(scene: Scene) -> str:
+    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
+
+
+def _part(found: planner.Plan) -> str:
+    return f"{100 * found.set_aside[0].variance / found.variance:.0f} %"
+
+
+def _ruled_out(found: planner.Plan) -> str:
+    """How many pairs a lower bound left to be evaluated, where it left out any."""
+    return f"; a lower bound ruled out all but {found.evaluated}" if found.evaluated < found.pairs else ""
+
+
+def _state(status: str) -> str:
+    """A status with what it means, and what to do."""
+    return f"ok, {MEANINGS[status]}" if is_trusted(status) else legend([status])[0].removesuffix(".")
 
 
 def _alone(found: planner.Plan) -> str:
@@ -111,37 +145,63 @@ def _units(found: planner.Plan) -> tuple[str, str]:
 
 
 def _trace(found: planner.Plan, units: tuple[str, str]) -> Table:
-    gap = "" if found.gap is None else f", {100 * found.gap:.1f} % above the best"
-    table = _table(f"\nAlternating search{gap}", "fixed", "", "found", "", _minimised(found, units))
+    table = _table(f"\n{_alternating(found)}", "held fixed", "", "found", "", _minimised(found, units))
     for step in found.trace:
         row = step.fixed, _pose(step.fixed_pose), step.found, _pose(step.found_pose), f"{step.variance:.4g}"
         table.add_row(*row)
     return table
 
 
+def _alternating(found: planner.Plan) -> str:
+    """What the paper's search comes to."""
+    name = "The paper's search, sensor and light by turns (alternating search)"
+    if found.gap is None:
+        return name
+    if not math.isfinite(found.gap):
+        return f"{name}: it finds no place from which all can be measured"
+    return f"{name}: its variance ends {100 * found.gap:.1f} % above the best"
+
+
 def _minimised(found: planner.Plan, units: tuple[str, str]) -> str:
     """What is minimised, in words."""
     if len(found.prediction.measurands) > 1:
-        return "worst ratio^2" if found.over == "minimax" else "sum of ratios^2"
+        return "largest ratio^2" if found.over == "minimax" else "sum of ratios^2"
     return f"variance, {units[0 if found.objective == 'object' else 1]}^2"
 
 
 def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     names = (f"object, 1e-6 {units[0]}^2", f"image, 1e-6 {units[1]}^2")
-    best, several = found.candidates[0], len(found.prediction.measurands) > 1
+    best, several = _as_candidate(found), len(found.prediction.measurands) > 1
     if several:
         names = ("limited by", _minimised(found, units))
-    table = _table("\nClearly different settings, the best first", "sensor", "light", "edges", *names, "over best")
-    for c in found.candidates:
-        ratio = c.variance / best.variance
+    table = _table("\nClearly different settings, the best first", "", "sensor", "light", "edges", *names, "over best")
+    first = found.candidates[0]
+    itself = [*map(_pose, (first.sensor, first.light))] == [*map(_pose, (best.sensor, best.light))]
+    for c in (best, *found.candidates[itself:]):
+        mark, ratio = "best" if c is best else "", c.variance / best.variance
         if several:
             table.add_row(
-                _pose(c.sensor), _pose(c.light), " ".join(c.edges), c.limiting, f"{c.variance:.4g}", f"{ratio:.3f}"
+                mark,
+                _pose(c.sensor),
+                _pose(c.light),
+                " ".join(c.edges),
+                c.limiting,
+                f"{c.variance:.4g}",
+                f"{ratio:.3f}",
             )
             continue
         values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
-        table.add_row(_pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
+        table.add_row(mark, _pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
     return table
+
+
+def _as_candidate(found: planner.Plan) -> Candidate:
+    """The plan itself as a row of its table."""
+    p = found.prediction
+    return Candidate(
+        sensor=found.sensor, light=found.light, edges=tuple(found.scene.required), variance=found.variance,
+        variance_object=p.variance_object, variance_image=p.variance_image, limiting=found.limiting,
+    )  # fmt: skip
 
 
 def _reading(found: planner.Plan) -> str:
@@ -149,10 +209,10 @@ def _reading(found: planner.Plan) -> str:
     several = len(found.prediction.measurands) > 1
     what = "what is minimised" if several else "its variance in the object and in the image"
     return (
-        "  Poses are (polar angle, azimuth), degrees. Beside them "
-        f"{what}; over best: over that of the first row.\n"
+        f"  best: the place above, found between the grid's; the others are places of the grid. Beside them {what};\n"
+        "  over best: over that of the first row.\n"
         "  Where the best place is taken, another row will do; `--sensor P,A` or `--light P,A` holds one fixed, "
-        "`--map FILE.png` draws."
+        "`--out DIR` draws all of it, as one page plan.html, too."
     )
 
 

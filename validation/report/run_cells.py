@@ -6,10 +6,10 @@ import heapq
 import math
 from collections.abc import Iterable
 
-from scenes import shown
 from validation.batch.measurands import JudgedMeasurand
 from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
+from validation.report.cells import pose
 
 _ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
@@ -35,7 +35,7 @@ def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list
     cells = {
         row.index: [
             *([row.scene] if many else []), *(str(row.parameters[key]) for key in keys),
-            shown(row.sensor), shown(row.light),
+            pose(row.sensor), pose(row.light),
         ]
         for row in rows
     }  # fmt: skip

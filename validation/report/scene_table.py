@@ -10,9 +10,11 @@ from rich.console import Group
 from rich.text import Text
 
 from scenes import AnyLight, Curved, Mesh, Scene
+from scenes.measurands.features import place_of
+from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
 from scenes.parts.solid import Edge, Solid
-from validation.report.cells import table
+from validation.report.cells import table, zone
 from validation.strict_json import plain
 
 
@@ -75,12 +77,13 @@ def report(scene: Scene) -> Group:
     return Group(*parts, *(made for made in found if made.row_count), Text(_smooth(scene)))
 
 
-_WORDS = ("name", "kind", "mount", "")
+_WORDS = ("name", "kind", "of", "mount", "")
 
 
 def _tables(scene: Scene) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """Title, columns and rows of each table."""
     known = facts(scene)
+    yield "What is measured", ("name", "kind", "of", "tolerance"), list(_requirements(scene))
     yield "Vertices", ("name", *"xyz"), [(each["name"], *_place(each["at"])) for each in known["vertices"]]
     yield "Edges", ("name", "from", "to", "length", ""), [
         (each["name"], *each["ends"], _number(each["length"]), "" if each["convex"] else "inner")
@@ -107,6 +110,18 @@ def _tables(scene: Scene) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str
         (light.kind, light.mount, *(f"{value:.4g}" for value in (light.distance, light.intensity, light.half_size)))
         for light in scene.lights
     ]  # fmt: skip
+
+
+def _requirements(scene: Scene) -> Iterator[tuple[str, ...]]:
+    """A row a number that the scene asks for; none of a scene that asks for nothing."""
+    for each in quantities_of(scene.task, scene.measurands):
+        unit = scene.unit_of(each)
+        yield (
+            each.name,
+            each.kind,
+            " to ".join(map(place_of, each.features)),
+            f"{zone(each.tolerance)} {unit}".replace("±", "+-"),
+        )
 
 
 def _place(at: list[float]) -> tuple[str, ...]:

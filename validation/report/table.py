@@ -6,11 +6,11 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes import shown
 from scenes.status import legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report import guide
+from validation.report.cells import pose
 from validation.report.cells import table as _table
 from validation.report.run_cells import (
     failed,
@@ -39,7 +39,7 @@ def report(found: Validation, explained: bool = False) -> Group:
     parts += [
         *_correlations(found),
         _time(found),
-        Text(),
+        Text(f"\n{guide.plain_verdict(found)}"),
         Text(found.verdict.text, style="bold green" if found.verdict.agrees else "bold red"),
         _lines(guide.verdict_terms()),
     ]
@@ -131,7 +131,7 @@ def _measurands(found: Validation) -> list[Table | Text]:
 def _search(found: Validation) -> Table:
     columns = ("sensor", "light", "paper ICE", "ours ICE", "ours/paper")
     rows = [
-        (shown(sensor), shown(light), number(theirs, 4), number(ours, 4), number(ours / theirs if theirs else None))
+        (pose(sensor), pose(light), number(theirs, 4), number(ours, 4), number(ours / theirs if theirs else None))
         for _, sensor, light, theirs, ours in found.search
     ]
     return _table("\nTable 1 of the paper (its search), same free scale", *columns, rows=rows)

@@ -492,7 +492,7 @@ def _words():
             for each in ((20, 200), ((20, 200), (31, 1)), ((None, None), (1, 2)), (None, None))
         ],
         "dumps": [refused(partial(strict_json.dumps, each)) for each in documents],
-        "toml": [written.toml(each) for each in tables],
+        "toml": [written.edited("", each) for each in tables],
         "lines": [errors.one_line(text) for text in ("a\nb", "x" * 999, "", "a\tb")],
         "advice": [guide.advice(each) for each in (True, False)],
     }

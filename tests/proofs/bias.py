@@ -1,0 +1,137 @@
+"""``python -m tests.proofs bias``: is what is left of a corrected bias as large as it is told?
+
+The part that is measured reflects otherwise than its scene says, each surface by up to 10 %, and each light stands up
+to 1 % of its distance elsewhere; it is rendered with rays of its own. Who measures it knows nothing of that: the bias
+of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures has to scatter
+by 1 at most where a value depends on it, and over the combined uncertainty single noisy values have to scatter by 1
+within 10 %, beyond chance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import typer
+from scipy import stats
+
+import measure
+import render
+import scenes
+from scenes import Picture, Pose, Scene
+from scenes.status import is_trusted
+from validation import simulation
+from validation.remeasured import Method
+
+REFLECTANCE, LIGHT = 0.1, 0.01  # largest deviations, uniformly drawn
+WITHIN = 0.1  # of 1, the spread of pulls
+_SCENES = ("bracket", "plate", "grey_floor")
+_SEEDS = 1000  # renders of true pictures begin here, corrections at 0
+
+
+@dataclass(frozen=True)
+class Pulls:
+    """What is left in true pictures, (trials, M): noise-free over u(bias), and noisy over the combined uncertainty."""
+
+    scene: str
+    names: tuple[str, ...]
+    status: tuple[str, ...]
+    off: np.ndarray
+    quiet: np.ndarray
+    noisy: np.ndarray
+
+    @property
+    def trusted(self) -> np.ndarray:
+        """Which of the M values are `ok`."""
+        return np.array([bool(is_trusted(state)) for state in self.status])
+
+
+def deviating(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A scene whose surfaces reflect otherwise, each by a factor of its own."""
+    update = {"material": scene.material.dimmed(_factor(rng))}
+    update["materials"] = tuple(each.dimmed(_factor(rng)) for each in scene.materials)
+    if scene.floor is not None:
+        update["floor"] = scene.floor.tried(reflectance=(1 - _factor(rng)) * scene.floor.reflectance)
+    lights = tuple(light.tried(distance=(1 + rng.uniform(-LIGHT, LIGHT)) * light.distance) for light in scene.lights)
+    update |= {"light": lights[0]} if scene.light is not None else {"several_lights": lights}
+    return scene.tried(**update)
+
+
+def _factor(rng: np.random.Generator) -> float:
+    """A part less, negative: more; a Lambertian surface cannot reflect more than all, but its renders may."""
+    return float(rng.uniform(-REFLECTANCE, REFLECTANCE))
+
+
+def moved(pose: Pose, rng: np.random.Generator) -> Pose:
+    """A light's pose, off by up to 1 % of its distance along two directions across its beam, independently."""
+    p, a = np.radians(list(pose))
+    away = np.array([math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)])
+    south = np.array([math.cos(p) * math.cos(a), math.cos(p) * math.sin(a), -math.sin(p)])
+    east = np.array([-math.sin(a), math.cos(a), 0.0])
+    x, y, z = away + rng.uniform(-LIGHT, LIGHT) * south + rng.uniform(-LIGHT, LIGHT) * east
+    return Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
+
+
+def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: str | None = None) -> Pulls:
+    """Of a picture, its reflectances and lights drawn anew in each trial."""
+    scene, rng = picture.scene, np.random.default_rng(seed)
+    method = Method(estimator or measure.best_estimator(scene))
+    off = simulation.simulated(picture, method)
+    true, left, noisy = _true(picture, off), [], []
+    for trial in range(trials):
+        actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
+        clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial))
+        exposed = render.expose(clean, scene.noise, rng, images)
+        found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
+        left.append((found.value[0] - true) / off.u_bias)
+        noisy += list((found.value[1:] - true) / np.hypot(off.sigma, off.u_bias))
+    names = tuple(quantity.name for quantity in scene.quantities)
+    return Pulls(scene.name, names, off.status, off.bias / off.sigma, np.array(left), np.array(noisy))
+
+
+def _true(picture: Picture, off: measure.Correction) -> np.ndarray:
+    """The object's own values."""
+    clean = render.image(picture, quality=render.Quality(seed=_SEEDS - 1))
+    found = measure.propagate(clean, picture, estimator=off.estimator).measurands
+    return found.value - found.bias
+
+
+def _pictures(names: list[str], poses: int) -> Iterator[Picture]:
+    for name in names:
+        scene = scenes.load(name)
+        for setting in scene.settings[:poses]:
+            yield Picture.of(scene, setting.sensor, setting.light)
+
+
+def bias(
+    scene: Annotated[list[str], typer.Option(help="Bundled names; may be repeated.")] = list(_SCENES),  # noqa: B006
+    poses: Annotated[int, typer.Option(help="Settings of each.")] = 2,
+    trials: Annotated[int, typer.Option()] = 15,
+    images: Annotated[int, typer.Option(help="Noisy images a trial.")] = 20,
+    seed: Annotated[int, typer.Option()] = 1,
+) -> None:
+    """Pulls of corrected values where reflectances are off by up to 10 % and lights by 1 %; half an hour."""
+    quiet, noisy = [], []
+    for picture in _pictures(scene, poses):
+        found = pulls(picture, trials, seed, images)
+        for m, name in enumerate(found.names):
+            print(
+                f"{found.scene} {picture.sensor} {name}: {found.status[m]}, bias {found.off[m]:+.2f} sigma taken off, "
+                f"left over u(bias) {rms(found.quiet[:, m]):.2f} rms, pull of values {rms(found.noisy[:, m]):.2f}",
+                flush=True,
+            )
+        quiet.append(found.quiet[:, found.trusted].ravel())
+        noisy.append(found.noisy[:, found.trusted].ravel())
+    spread, count = rms(np.concatenate(noisy)), sum(each.size for each in noisy)
+    low, high = np.sqrt(stats.chi2.ppf((0.005, 0.995), count) / count)
+    print(f"All: left over u(bias) {rms(np.concatenate(quiet)):.3f}, pulls {spread:.3f}; 1 within 10 % is asked.")
+    raise typer.Exit(0 if (1 - WITHIN) * low <= spread <= (1 + WITHIN) * high else 1)
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square of those that are known."""
+    good = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(good**2))) if good.size else math.nan

@@ -1,0 +1,172 @@
+"""A bias that is simulated and taken off, against exact images that share nothing with the renderer."""
+
+import json
+
+import numpy as np
+import pytest
+
+import measure
+import render
+from measure import Images
+from scenes import InvalidInput, Picture, Pose
+from scenes.status import corrected
+from tests.oracle import block_image
+from validation import kept, simulation
+from validation.remeasured import Method
+
+ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
+
+
+@pytest.fixture(scope="module")
+def small(task1):
+    """Task1 at 96 x 90 px, where nearly every edge has a neighbour."""
+    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
+    return task1.model_copy(update={"camera": camera})
+
+
+@pytest.fixture(scope="module")
+def crowded(small):
+    """(picture, exact image, other render) at random poses at which the classic locator is off by 0.5 sigma or more."""
+    rng, found = np.random.default_rng(7), []
+    while len(found) < 3:
+        sensor, light = (Pose(*rng.uniform((low, 0), (60, 360))) for low in (5, 2))
+        picture = Picture.of(small, sensor, light)
+        exact = block_image(small, sensor, light)
+        told = measure.propagate(exact, picture).measurands
+        if np.isfinite(told.value[0]) and abs(told.bias[0]) > 0.5 * np.sqrt(told.covariance[0, 0]):
+            renders = tuple(render.image(picture, quality=render.Quality(seed=seed)) for seed in (1, 2))
+            found.append((picture, exact, renders))
+    return found
+
+
+@pytest.mark.render
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_what_is_left_of_an_exact_image_is_what_it_is_told_with(crowded, estimator):
+    """By every estimator; the correction's own noise is all that is left, and half or twice of it leaves more."""
+    left, raw, told = [], [], []
+    for picture, exact, renders in crowded:
+        off = measure.correction(Images(renders), picture, estimator)
+        found = measure.measure(exact, picture, correction=off)
+        if not np.isfinite(found.value[0]):
+            continue
+        true = _length(picture)
+        left.append((found.value[0] - true) / off.sigma[0])
+        raw.append(off.bias[0] / off.sigma[0])
+        told.append(off.u_bias[0] / off.sigma[0])
+    left, raw, told = map(np.array, (left, raw, told))
+    assert len(left) >= 2
+    assert np.abs(left).max() < 0.15  # margin: half of what `ok` allows, five times the renders' noise
+    if estimator in ("gradient", "canny"):
+        assert np.abs(raw).max() > 0.5
+        assert np.abs(left + raw / 2).max() > 0.25  # a correction of half, or of twice as much, is seen
+    assert told.max() < 0.2
+
+
+def _length(picture):
+    """The true distance of the task's two corners, from the block's own vertices."""
+    task, solid = picture.scene.task, picture.scene.solid
+    ends = [solid.vertices[solid.vertex_names.index(corner.vertex)] for corner in (task.start, task.end)]
+    return float(np.linalg.norm(ends[1] - ends[0]))
+
+
+@pytest.mark.render
+def test_a_value_is_decided_only_once_its_bias_is_off(crowded):
+    """`clutter` is undecided; corrected it passes, its status ok; with a doubt beyond noise and tolerance it stays."""
+    picture, exact, renders = crowded[0]
+    plain = measure.measure(exact, picture, estimator="gradient")
+    assert plain.status.tolist() == ["clutter"]
+    assert plain.bias.tolist() == [0.0]
+    assert np.isnan([plain.u_bias, plain.u]).all()
+    off = measure.correction(Images(renders), picture)
+    found = measure.measure(exact, picture, correction=off)
+    assert found.status.tolist() == ["ok"]
+    assert found.u == pytest.approx(np.sqrt(found.sigma**2 + off.u_bias**2))
+    assert found.first.value_px == pytest.approx(plain.first.value_px - off.bias_image[0])
+    doubtful = Images(renders, known={"light_place": (2 * off.sigma, 2 * off.sigma)})
+    found = measure.measure(exact, picture, correction=measure.correction(doubtful, picture))
+    assert found.status.tolist() == ["clutter"]
+    assert found.u_bias == pytest.approx(np.hypot(2 * off.sigma, off.u_bias))
+
+
+@pytest.mark.render
+def test_each_source_counts_by_what_it_moves(small, crowded):
+    """Two images of other parts' poses as changed inputs: the root sum square of what they move the value by."""
+    picture, exact, renders = crowded[0]
+    moved = []
+    for polar in (0.02, -0.05):
+        sensor = Pose(picture.sensor.polar_deg + polar, picture.sensor.azimuth_deg)
+        moved.append(block_image(small, sensor, picture.lights[0]))
+    values = [measure.measure(image, picture, estimator="gradient").value[0] for image in (exact, *moved)]
+    off = measure.correction(Images((exact, renders[1]), {"pose": tuple(moved)}), picture)
+    expected = np.sqrt((values[1] - values[0]) ** 2 + (values[2] - values[0]) ** 2)
+    assert off.sources["pose"] == pytest.approx(expected, rel=1e-6)
+    assert off.u_bias[0] ** 2 == pytest.approx(expected**2 + off.sources["rendering"][0] ** 2)
+
+
+def test_one_rule_for_statuses():
+    """Small beside the noise or the tolerance; what is not measured in the simulation is not measured."""
+    assert corrected("ok", "ok", 0.9, 1.0) == "ok"
+    assert corrected("ok", "ok", 1.1, 1.0) == "clutter"
+    assert corrected("clutter", "ok", 1.1, 1.0, 10.0) == "clutter"
+    assert corrected("clutter", "ok", 1.1, 1.0, 12.0) == "ok"
+    assert corrected("ok", "ok", float("inf"), 1.0, 1e9) == "clutter"
+    assert corrected("ok", "ok", float("nan"), 1.0, 1e9) == "clutter"
+    assert corrected("clutter", "ambiguous", 0.0, 1.0) == "ambiguous"
+    assert corrected("compressed", "ok", 0.0, 1.0) == "compressed"
+    assert corrected("not_visible", "ok", 0.0, 1.0) == "not_visible"
+
+
+def test_bad_input_is_one_line(small):
+    known, unknown = Picture.of(small, (30, 90), (15, 270)), Picture.of(small, (30, 90))
+    image = np.zeros((90, 96))
+    with pytest.raises(InvalidInput, match="renders must be at least one noise-free image, got none"):
+        measure.correction(Images(()), known)
+    with pytest.raises(InvalidInput, match="light must be a pose to correct the bias, got nothing"):
+        measure.correction(Images((image,)), unknown)
+
+
+@pytest.mark.render
+def test_a_correction_must_be_of_what_is_measured(crowded):
+    picture, exact, renders = crowded[0]
+    off = measure.correction(Images(renders), picture)
+    with pytest.raises(InvalidInput, match="estimator must be that of the correction, gradient, got strip"):
+        measure.measure(exact, picture, estimator="strip", correction=off)
+
+
+@pytest.mark.render
+def test_the_simulation_is_kept(small, tmp_path, monkeypatch):
+    """The second time it is read; a file that is damaged, or of another scene, is not."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    picture, method, made = Picture.of(small, (30, 90), (15, 270)), Method("gradient"), []
+    simulate = simulation.simulated
+    monkeypatch.setattr(simulation, "simulated", lambda *given: made.append(given) or simulate(*given))
+    first, second = (kept.correction(picture, method) for _ in range(2))
+    assert len(made) == 1
+    for name in ("bias", "bias_image", "covariance", "covariance_image", "u_bias", "u_bias_image"):
+        assert getattr(second, name) == pytest.approx(getattr(first, name), rel=1e-15)
+    assert second.status == first.status
+    (file,) = tmp_path.rglob("*.json")
+    whole = json.loads(file.read_text())
+    for text in ("", "{", json.dumps(whole | {"bias": [1.0, 2.0]}), json.dumps(whole | {"simulated": ["fine"]})):
+        file.write_text(text)
+        kept.correction(picture, method)
+    assert len(made) == 5
+    brighter = picture.with_scene(small.model_copy(update={"noise": small.noise.tried(sigma=9.0)}))
+    kept.correction(brighter, method)
+    assert len(made) == 6
+    assert len(list(tmp_path.rglob("*.json"))) == 2
+
+
+def test_lights_stand_a_step_beside():
+    """Both directions are a degree away and across each other, at the pole, too (spherical cosine rule by hand)."""
+    for pose in (Pose(40, 30), Pose(0, 10), Pose(180, 0), Pose(179.9, 300)):
+        places = [_unit(each) for each in (pose, *simulation._beside(pose, 1.0))]
+        here, along, across = places
+        for other in (along, across):
+            assert np.degrees(np.arccos(np.clip(here @ other, -1, 1))) == pytest.approx(1.0, rel=0.02)
+        assert abs((along - here) @ (across - here)) < 0.02 * np.radians(1.0) ** 2
+
+
+def _unit(pose):
+    polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
+    return np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])

@@ -1,0 +1,235 @@
+"""The page of a station: grades, sentences, balloons, the sketch and the budget's chart, each by its own arithmetic."""
+
+import math
+import re
+from itertools import combinations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import planner
+import scenes
+from scenes import Picture, Tolerance
+from scenes.status import MEANINGS, MEASURED, REMEDIES, legend
+from validation.report import (
+    budget_figure,
+    canvas,
+    page,
+    proof_figures,
+    requirements,
+    station,
+    station_sketch,
+    station_table,
+    station_view,
+)
+from validation.report.requirements import Grade, Requirement
+
+TOLERANCE = Tolerance(plus=0.03, minus=0.01)  # half of the zone: 0.02
+
+
+def required(number=1, u=0.001, status="ok", tolerance=TOLERANCE, name="bore"):
+    return Requirement(number, name, "mm", 4.0, tolerance, 0.0005, 0.0001, None, u, status, "pixel noise, 90 %")
+
+
+@pytest.fixture(scope="module")
+def plate():
+    scene = scenes.load("plate")
+    return Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    scene = scenes.load("calibrated_rig")
+    return Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+
+@pytest.mark.parametrize(
+    ("u", "status", "tolerance", "grade"),
+    [
+        (0.0049, "ok", TOLERANCE, Grade.WELL),
+        (0.0051, "ok", TOLERANCE, Grade.WITHIN),
+        (0.0199, "ok", TOLERANCE, Grade.WITHIN),
+        (0.0201, "ok", TOLERANCE, Grade.OVER),
+        (None, "ok", TOLERANCE, Grade.OVER),
+        (0.0049, "ok", None, Grade.OPEN),
+        (0.0049, "clutter", TOLERANCE, Grade.DOUBT),
+        (0.0049, "clutter", None, Grade.DOUBT),
+    ],
+)
+def test_grades_are_of_half_the_zone(u, status, tolerance, grade):
+    """A quarter of it, a test uncertainty ratio of 4, and all of it are the limits; nothing doubtful is graded by U."""
+    assert required(u=u, status=status, tolerance=tolerance).grade == grade
+
+
+def test_the_sentence_counts_all_and_names_what_is_wrong():
+    several = [required(k, name=f"r{k}") for k in range(1, 9)]
+    several += [required(9, u=0.01, name="step"), required(10, status="clutter", name="square")]
+    text = requirements.sentence(several)
+    assert text.startswith("8 of 10 requirements are measured well within tolerance: U is at most 25 % of it. Step is ")
+    assert text.endswith(f"Square is not proven, for {MEANINGS['clutter']} (clutter).")
+    assert requirements.next_step(several) == f"For square: {REMEDIES['clutter']}."
+    assert requirements.next_step(several[:9]) == "Improve step first; most of it comes from pixel noise."
+    assert requirements.next_step(several[:8]) == ""
+    assert requirements.sentence(several[:8]).startswith("All 8 requirements are measured well within tolerance")
+    assert requirements.sentence(several[:1]).startswith("The requirement is measured well within tolerance")
+
+
+def test_every_status_says_what_to_do():
+    assert set(REMEDIES) == set(MEANINGS)
+    assert all(REMEDIES[status] for status in MEANINGS if status != "ok")
+    assert all(line.endswith(f"; {REMEDIES[line.split(':')[0]]}.") for line in legend(MEANINGS))
+
+
+def test_requirements_are_the_forecasts_beside_the_budgets_u(plate):
+    found, told = requirements.predicted(plate), planner.predict(plate).measurands
+    u = {each.name: each.U for each in planner.budget(plate).measurands}
+    for each, forecast in zip(found, told, strict=True):
+        assert (each.name, each.status, each.nominal) == (forecast.name, forecast.status, forecast.nominal)
+        assert each.sigma == pytest.approx(math.sqrt(forecast.variance_object))
+        assert pytest.approx(u[each.name]) == each.U
+        assert 1.9 * each.sigma < each.U
+
+
+def test_one_that_cannot_be_measured_takes_nothing_from_the_others(plate):
+    """As the second of five, its variance infinite: the others keep their U."""
+    sigmas = [math.sqrt(each.variance_object) for each in planner.predict(plate).measurands]
+    sigmas[1] = math.inf
+    found = requirements.measurable_budget(plate, variances=[s * s for s in sigmas])
+    assert [each.name for each in found] == ["hole to corner", "length", "square", "hole from front"]
+    states = ["ok", "low_contrast", "ok", "ok", "ok"]
+    made = requirements.requirements(plate, sigmas, [0.0] * 5, found, states)
+    assert [each.U is None for each in made] == [False, True, False, False, False]
+    assert made[1].grade == Grade.DOUBT
+    assert "Bore is not proven" in requirements.sentence(made)
+    whole = {each.name: each.U for each in planner.budget(plate).measurands}
+    assert pytest.approx(whole["length"]) == made[2].U
+
+
+def crossing(one, other):
+    """Whether two segments cross: each has the other's ends on both sides."""
+
+    def side(a, b, c):
+        return np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+    return side(*one, other[0]) * side(*one, other[1]) < 0 and side(*other, one[0]) * side(*other, one[1]) < 0
+
+
+@pytest.mark.parametrize("count", [1, 7, 30, 60])
+def test_balloons_keep_apart_and_their_leaders_do_not_cross(count, rng):
+    """Random anchors, some of them in the same place; of very many some stand closer."""
+    size, corner = np.array([4.0, 3.0]), np.array([0.5, 0.3])
+    anchors = [corner + rng.random((1 + k % 3, 2)) * size for k in range(count)]
+    if count > 5:
+        anchors[5] = anchors[2]
+    spots, tied = station_view.balloons(anchors, size, corner)
+    assert all((each == one).all(1).any() for each, one in zip(anchors, tied, strict=True))
+    outside = (spots < corner) | (spots > corner + size)
+    assert outside.any(1).all()
+    apart = min((np.linalg.norm(a - b) for a, b in combinations(spots, 2)), default=1.0)
+    assert apart > (0.25 if count < 40 else 0.1)
+    leaders = list(zip(tied, spots, strict=True))
+    assert not any(crossing(a, b) for a, b in combinations(leaders, 2))
+
+
+def test_marks_lie_on_what_is_measured(plate):
+    """Of a diameter the rim, all of it as far from the bore's centre as it is; of a width the foot is on the side."""
+    scene, marks = plate.scene, station_view.marks(plate)
+    names = [quantity.name for quantity in scene.quantities]
+    rim = marks[names.index("bore")].lines[0]
+    circle = scene.solid.circle("c2")
+    from imaging.geometry.projection import project
+
+    pose = np.array(list(plate.sensor))
+    around = project(circle.centre + circle.radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0.0]]), pose, scene.camera)
+    for point in around:
+        assert np.linalg.norm(rim - point, axis=1).min() < 0.05 * np.ptp(rim[:, 0])
+    *_, between = marks[names.index("length")].lines
+    ends = scene.solid.vertices[list(scene.solid.edge("e4").ends)]
+    assert between[0] == pytest.approx(project(ends.mean(0)[None], pose, scene.camera)[0])
+    (a, b), foot = project(scene.solid.vertices[list(scene.solid.edge("e11").ends)], pose, scene.camera), between[1]
+    along, off = b - a, foot - a
+    assert abs(along[0] * off[1] - along[1] * off[0]) / np.hypot(*along) < 1e-6
+
+
+def test_the_sketch_is_to_scale(plate):
+    """From the side the camera stands at its distance, its polar angle from up; from above at the part of it across."""
+    side, above = station_sketch.axes_of(plate)
+    polar, azimuth = np.radians(list(plate.sensor))
+    eye = 100.0 * np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    assert side @ eye == pytest.approx([100 * np.sin(polar), 100 * np.cos(polar)])
+    assert above @ eye == pytest.approx([100 * np.sin(polar), 0.0], abs=1e-9)
+    for pair in (side, above):
+        assert pair @ pair.T == pytest.approx(np.eye(2))
+    assert "camera 100 cm away, 15.0° from the vertical, azimuth 85.0°; lamp 100 cm away" in station_sketch.told(plate)
+
+
+def test_a_bars_parts_add_to_u_in_per_cent_of_the_tolerance(rig):
+    found = planner.budget(rig)
+    sources, table = budget_figure.parts(found.measurands, [0.02])
+    (each,) = found.measurands
+    assert table.sum() == pytest.approx(100 * each.U / 0.02)
+    assert sources[-1] == "all others"
+    shares = {row.source: row.contribution**2 / each.u**2 for row in each.contributions}
+    largest = max(shares, key=shares.get)
+    assert sources[0] == largest
+    assert table[0, 0] == pytest.approx(100 * each.U / 0.02 * shares[largest])
+    assert budget_figure.parts(found.measurands, [None])[1].sum() == pytest.approx(100)
+
+
+def test_what_halving_a_source_gains_is_told(rig):
+    """Of the largest: by hand, k being the same."""
+    found = planner.budget(rig)
+    (each,) = found.measurands
+    best = max(each.contributions, key=lambda row: row.contribution)
+    gain = 1 - math.sqrt(1 - 0.75 * best.contribution**2 / each.u**2)
+    assert budget_figure.improved(found)[0] == f"Halve {best.source}: U of {each.name} -{100 * gain:.0f} %."
+
+
+def test_names_are_text_within_a_picture():
+    """A name that is markup, or a formula, stays what it is; identifiers carry the picture's key."""
+    figure, axis = plt.subplots()
+    axis.set_title('<script>alert("x")</script> $\\frac{1}{2}$ & "')
+    drawn = str(canvas.inline(figure, "key", '"><script>alert(1)</script>'))
+    assert "<script" not in drawn
+    assert "$\\frac{1}{2}$" in drawn
+    identifiers = re.findall(r'id="([^"]*)"', drawn)
+    assert identifiers
+    assert all(each.startswith("key-") for each in identifiers)
+    assert set(re.findall(r"url\(#([^)]*)\)", drawn)) <= set(identifiers)
+    assert set(re.findall(r'href="#([^"]*)"', drawn)) <= set(identifiers)
+
+
+def test_the_tables_cells_say_unit_zone_and_part():
+    made = station_table.lines([required(3, u=0.004), required(4, status="clutter"), required(5, tolerance=None)])
+    assert made[0].cells[:5] == ("bore", "4 mm", "+0.03 -0.01", "0.00050", "+0.00010")
+    assert made[0].cells[5:] == ("0.0040", "20 %", "well within tolerance", "pixel noise, 90 %")
+    assert made[0].part == pytest.approx(0.2)
+    assert (made[1].part, made[1].cells[5], made[1].cells[7]) == (None, "-", "not proven: clutter")
+    assert (made[2].part, made[2].cells[2], made[2].cells[7]) == (None, "-", "no tolerance given")
+
+
+def test_grades_differ_without_colour():
+    """Each has a shape, a border or a fill of its own: no two alike when all colours are greys."""
+    looks = station_table.LOOKS
+    shapes = {grade: (look.path, look.fill == look.border) for grade, look in looks.items()}
+    assert len(set(shapes.values())) == len(looks) == len(Grade)
+
+
+def test_many_lines_are_grouped_and_the_farthest_named():
+    lines = [
+        proof_figures.Line(f"r{k % 3}", k % 3 + 1, k + 1, "ok", 1.0 + 0.001 * k, 0.9, 1.2, 50, 0.0, 0.1, 1.0, None)
+        for k in range(90)
+    ]
+    drawn = str(proof_figures.forest(lines))
+    assert "r0, 30 settings" in drawn
+    assert "r2, setting 90" in drawn
+    assert "setting 45" not in drawn
+
+
+def test_the_page_of_a_picture_needs_no_render(plate, tmp_path):
+    written = page.write_station(station.of_picture(plate), "A <b>plate</b>", tmp_path / "plan.html").read_text()
+    assert "A &lt;b&gt;plate&lt;/b&gt;" in written
+    assert "Drawn from the model" in written
+    assert written.count('<svg role="img"') == 3
+    assert all(status in MEASURED for status in (each.status for each in requirements.predicted(plate)))

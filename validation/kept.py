@@ -1,0 +1,147 @@
+"""Corrections kept on disk, so that the next picture of the same setting waits for no render.
+
+One small JSON file a picture and method, in the user's folder for what can be made anew: ``ice-vision`` in
+``$XDG_CACHE_HOME``, or in ``~/.cache`` where that is not set. Its name is a digest of all that the numbers depend on,
+the program's code included. A file that is not as it was written is made anew; a folder that cannot be written to keeps
+nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+import imaging
+import measure
+import render
+import scenes
+from measure import Correction
+from render import variant as variants
+from scenes import Picture
+from scenes.status import ALL
+from validation import simulation
+from validation.remeasured import Method
+from validation.simulation import How
+
+_LARGEST = 1 << 24  # bytes of a file
+_Numbers = list[float | None]
+
+
+class _Kept(BaseModel):
+    """A `Correction` of M measurands; null is NaN, or infinite where it is a standard uncertainty."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    bias: _Numbers
+    bias_image: _Numbers
+    sources: dict[str, _Numbers]
+    sources_image: dict[str, _Numbers]
+    covariance: list[_Numbers]
+    covariance_image: list[_Numbers]
+    simulated: list[Annotated[str, Field(max_length=40)]]
+
+
+def correction(picture: Picture, method: Method, how: How = How()) -> Correction:
+    """As `validation.simulation.simulated`, from disk where it has been made before."""
+    file = folder() / f"{_digest(picture, method, how)}.json"
+    found = _read(file, picture, method)
+    if found is None:
+        found = simulation.simulated(picture, method, how)
+        _write(file, found)
+    return found
+
+
+def folder() -> Path:
+    """Where they are kept."""
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (given if given.is_absolute() else Path.home() / ".cache") / "ice-vision" / "corrections"
+
+
+def _digest(picture: Picture, method: Method, how: How) -> str:
+    said = {
+        "scene": picture.scene.model_dump(mode="json", by_alias=True),
+        "sensor": list(picture.sensor),
+        "lights": [list(pose) for pose in picture.lights],
+        "method": asdict(method),
+        "how": asdict(how) | {"variant": how.variant or variants.choose()},
+    }
+    made = hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode())
+    bodies = picture.scene.bodies
+    for part in (bodies.vertices, bodies.triangles):
+        made.update(np.ascontiguousarray(part).tobytes())
+    made.update(repr(picture.scene.solid.curved).encode())
+    made.update(_code())
+    return made.hexdigest()[:32]
+
+
+@functools.cache
+def _code() -> bytes:
+    """Digest of the code that makes the numbers."""
+    folders = [Path(package.__file__).parent for package in (scenes, imaging, render, measure)]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [Path(simulation.__file__)]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()
+
+
+def _read(file: Path, picture: Picture, method: Method) -> Correction | None:
+    """None where there is none, or it is not as it was written."""
+    try:
+        if file.stat().st_size > _LARGEST:
+            return None
+        kept = _Kept.model_validate_json(file.read_bytes())
+    except (OSError, ValidationError):
+        return None
+    quantities, count = picture.scene.quantities, len(picture.scene.quantities)
+    found = Correction(
+        quantities, method.locator, method.threshold, _array(kept.bias), _array(kept.bias_image),
+        {name: _array(some, np.inf) for name, some in kept.sources.items()},
+        {name: _array(some, np.inf) for name, some in kept.sources_image.items()},
+        *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated),
+    )  # fmt: skip
+    vectors = (found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values())
+    whole = all(each.shape == (count,) for each in vectors)
+    whole &= all(each.shape == (count, count) for each in (found.covariance, found.covariance_image))
+    return found if whole and len(found.simulated) == count and set(found.simulated) <= ALL else None
+
+
+def _square(rows: list[_Numbers]) -> np.ndarray:
+    """A covariance, infinite on its diagonal where there is no value."""
+    if len({len(row) for row in rows}) != 1:
+        return np.zeros((0, 0))
+    told = np.array([_array(row) for row in rows])
+    diagonal = np.eye(*told.shape, dtype=bool)
+    return np.where(np.isnan(told) & diagonal, np.inf, told)
+
+
+def _array(numbers: _Numbers, nothing: float = np.nan) -> np.ndarray:
+    return np.array([nothing if number is None else number for number in numbers], float)
+
+
+def _write(file: Path, found: Correction) -> None:
+    facts = {
+        "bias": found.bias, "bias_image": found.bias_image, "sources": found.sources,
+        "sources_image": found.sources_image, "covariance": found.covariance,
+        "covariance_image": found.covariance_image, "simulated": list(found.simulated),
+    }  # fmt: skip
+    part = file.with_suffix(f".{os.getpid()}")
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(json.dumps(_plain(facts)), encoding="utf-8")
+        part.replace(file)
+
+
+def _plain(value):
+    """Lists of numbers; null for what is not finite."""
+    if isinstance(value, dict):
+        return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, np.ndarray):
+        return [_plain(inner) if inner.ndim else (float(inner) if np.isfinite(inner) else None) for inner in value]
+    return value

@@ -1,0 +1,221 @@
+"""The requirements of a drawing at one station: how well each is measured against its tolerance, and why not better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+import planner
+from planner.budgeting.budgets import SceneBudget, budget
+from planner.uncertainty.budget import Budget
+from scenes import InvalidInput, Picture, Tolerance
+from scenes.results import finite
+from scenes.status import MEANINGS, OK, REMEDIES, WORST_FIRST, is_trusted
+
+_WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
+_NAMED = 4  # requirements that a sentence names
+
+
+class Grade(StrEnum):
+    """What the expanded uncertainty is against half of the tolerance zone."""
+
+    WELL = "well within tolerance"
+    WITHIN = "within tolerance"
+    OVER = "too uncertain"
+    OPEN = "no tolerance given"
+    DOUBT = "not proven"
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One number that a drawing asks for, as a station measures it.
+
+    Attributes
+    ----------
+    number : int
+        Of its balloon, from 1.
+    name, unit : str
+    nominal : float
+    tolerance : Tolerance or None
+    sigma : float
+        Standard deviation of one picture's value by noise; infinite where it cannot be measured.
+    bias : float or None
+        Mean error, measured where there is a run, else predicted; None where it is not known.
+    u_bias : float or None
+        Standard uncertainty of the bias; None where nothing is said of it.
+    U : float or None
+        Expanded uncertainty (95 %); None where it cannot be measured.
+    status : str
+    limits : str
+        The source with the largest share of the variance, and that share; empty where there is no budget.
+    """
+
+    number: int
+    name: str
+    unit: str
+    nominal: float
+    tolerance: Tolerance | None
+    sigma: float
+    bias: float | None
+    u_bias: float | None
+    U: float | None
+    status: str
+    limits: str
+
+    @property
+    def ratio(self) -> float | None:
+        """U over half of the tolerance zone; None without either, or where the value is not to be relied on."""
+        if self.tolerance is None or self.U is None or not is_trusted(self.status):
+            return None
+        return self.U / self.tolerance.half
+
+    @property
+    def grade(self) -> Grade:
+        if not is_trusted(self.status):
+            return Grade.DOUBT
+        if self.tolerance is None:
+            return Grade.OPEN
+        if self.ratio is None or self.ratio > 1:
+            return Grade.OVER
+        return Grade.WELL if self.ratio <= _WELL else Grade.WITHIN
+
+
+def predicted(picture: Picture, p: float = 0.95) -> tuple[Requirement, ...]:
+    """Of a picture, from its models alone."""
+    told = planner.predict(picture).measurands
+    return requirements(
+        picture,
+        sigmas=[math.sqrt(each.variance_object) for each in told],
+        biases=[finite(each.bias_object) for each in told],
+        found=measurable_budget(picture, p=p),
+    )
+
+
+def requirements(
+    picture: Picture,
+    sigmas: Sequence[float],
+    biases: Sequence[float | None],
+    found: SceneBudget | None,
+    statuses: Sequence[str] | None = None,
+    u_biases: Sequence[float | None] | None = None,
+) -> tuple[Requirement, ...]:
+    """One for each quantity of a picture's scene, in its order.
+
+    Parameters
+    ----------
+    sigmas, biases, statuses, u_biases : sequences of M
+        The scene's unit, or degrees. ``statuses`` are the predicted ones where not given.
+    found : SceneBudget or None
+        Of those that can be measured.
+    """
+    told, known = planner.predict(picture).measurands, {} if found is None else {each.name: each for each in found}
+    return tuple(
+        Requirement(
+            number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
+            sigma=sigmas[m], bias=biases[m], u_bias=u_biases[m] if u_biases else getattr(each, "u_bias", None),
+            U=known[each.name].U if each.name in known and math.isfinite(sigmas[m]) else None,
+            status=each.status if statuses is None else statuses[m],
+            limits=_limits(known[each.name]) if each.name in known else "",
+        )
+        for m, each in enumerate(told)
+    )  # fmt: skip
+
+
+def measurable_budget(
+    picture: Picture,
+    variances: Sequence[float] | None = None,
+    biases: Sequence[float] | None = None,
+    statuses: Sequence[str] | None = None,
+    p: float = 0.95,
+) -> SceneBudget | None:
+    """The budget of those measurands that can be measured in a picture; None where there are none.
+
+    ``variances``, ``biases`` and ``statuses`` of all M as of `planner.budgeting.budgets.budget`.
+    """
+    told, scene = planner.predict(picture).measurands, picture.scene
+    good = [math.isfinite(each.variance_object) for each in told]
+    for given in (variances, biases):
+        good = [fine and (given is None or math.isfinite(given[m])) for m, fine in enumerate(good)]
+    if not all(good):
+        kept, places = [], []
+        for each in scene.measurands:
+            own = [[q.name for q in scene.quantities].index(quantity.name) for quantity in each.quantities]
+            if all(good[m] for m in own):
+                kept.append(each)
+                places += own
+        if scene.task is not None or not kept:
+            return None
+        picture = picture.with_scene(scene.model_copy(update={"measurands": tuple(kept)}))
+    else:
+        places = list(range(len(good)))
+    some = [None if each is None else [each[m] for m in places] for each in (variances, biases, statuses)]
+    arrays = [None if each is None else np.array(each, float) for each in some[:2]]
+    try:
+        return budget(picture, variances=arrays[0], biases=arrays[1], statuses=some[2] and tuple(some[2]), p=p)
+    except InvalidInput:
+        return None
+
+
+def _limits(found: Budget) -> str:
+    worst = max(found.contributions, key=lambda row: round(row.share, 9), default=None)
+    return "" if worst is None or not worst.share > 0 else f"{worst.source}, {100 * worst.share:.0f} %"
+
+
+def sentence(found: Sequence[Requirement]) -> str:
+    """How well all of them are measured, in plain words."""
+    grades = [each.grade for each in found]
+    parts = []
+    if good := grades.count(Grade.WELL):
+        parts.append(
+            f"{_count(good, len(found))} measured well within tolerance: U is at most {100 * _WELL:.0f} % of it"
+        )
+    for grade, words in (
+        (Grade.WITHIN, f"measured within tolerance, with a U above {100 * _WELL:.0f} % of it"),
+        (Grade.OVER, "measured with a U that is larger than the tolerance"),
+        (Grade.OPEN, "measured; no tolerance is given to compare with"),
+    ):
+        if some := [each for each in found if each.grade == grade]:
+            parts.append(f"{_which(some, len(found))} {words}")
+    for status in WORST_FIRST:
+        if status != OK and (some := [each for each in found if each.status == status]):
+            parts.append(f"{_which(some, len(found))} not proven, for {MEANINGS[status]} ({status})")
+    return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
+
+
+def _count(some: int, every: int) -> str:
+    if every == 1:
+        return "The requirement is"
+    return f"all {every} requirements are" if some == every else f"{some} of {every} requirements {_are(some)}"
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _which(some: Sequence[Requirement], every: int) -> str:
+    """By name where they are few."""
+    if len(some) > _NAMED or len(some) == every:
+        return _count(len(some), every) if every > 1 else f"{some[0].name} is"
+    names = [each.name for each in some]
+    joined = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"{joined} {_are(len(names))}"
+
+
+def next_step(found: Sequence[Requirement]) -> str:
+    """What to do about the worst of them; empty where nothing is asked for."""
+    worst = next((status for status in WORST_FIRST if status != OK and any(r.status == status for r in found)), None)
+    if worst:
+        names = ", ".join(each.name for each in found if each.status == worst)
+        return f"For {names}: {REMEDIES[worst]}."
+    over = [each for each in found if each.grade in (Grade.OVER, Grade.WITHIN)]
+    if over:
+        worst = max(over, key=lambda each: (round(each.ratio or math.inf, 9), -each.number))
+        limit = f"; most of it comes from {worst.limits.rsplit(',', 1)[0]}" if worst.limits else ""
+        return f"Improve {worst.name} first{limit}."
+    if all(each.grade == Grade.OPEN for each in found):
+        return "Give each requirement its tolerance in the scene, then U can be compared with it."
+    return ""

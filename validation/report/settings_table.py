@@ -1,0 +1,45 @@
+"""All settings of a run, the best first: where camera and lamp stand, and what is not proven there."""
+
+from __future__ import annotations
+
+import heapq
+
+from scenes.status import counted, is_trusted
+from validation.batch.result import Validation
+from validation.batch.rows import Row
+from validation.report.page_tables import Table
+from validation.report.run_cells import names, small_sigma
+from validation.report.station import merit
+
+_ROWS = 32  # table.csv has all
+
+
+def table(found: Validation, halves: dict[str, float], chosen: int | None) -> Table:
+    """The table; ``halves`` of the tolerance zones by name, ``chosen`` the number of the setting that is shown."""
+    rows = heapq.nsmallest(_ROWS, found.rows, key=lambda row: (*merit(row, halves), row.index))
+    headings, cells = names(found, rows)
+    columns = ["setting", *headings, "largest sigma", "proven", "not proven"]
+    lines = [[str(row.index + 1), *cells[row.index], _largest(row, halves), _proven(row), _doubtful(row)]
+             for row in rows]  # fmt: skip
+    note = f"The best {_ROWS} of {len(found.rows)}; all are in table.csv." if len(found.rows) > _ROWS else ""
+    what = "largest sigma: of the requirement whose sigma is largest against its tolerance, in per cent of it."
+    where = next((i for i, row in enumerate(rows) if row.index + 1 == chosen), None)
+    return Table("All settings, the best first", columns, lines, " ".join([what, note]).strip(), chosen=where)
+
+
+def _largest(row: Row, halves: dict[str, float]) -> str:
+    known = [(each.predicted**0.5 / halves[each.name], each.name) for each in row.measurands if each.name in halves]
+    if known:
+        part, name = max(known, key=lambda pair: round(pair[0], 9))
+        return f"{100 * part:.2g} % ({name})"
+    first = row.measurands[0]
+    return f"{small_sigma(first.predicted)} {first.unit}"
+
+
+def _proven(row: Row) -> str:
+    return f"{sum(is_trusted(each.status) for each in row.measurands)} of {len(row.measurands)}"
+
+
+def _doubtful(row: Row) -> str:
+    """Statuses and their numbers."""
+    return counted(each.status for each in row.measurands if not is_trusted(each.status)) or "-"

@@ -1,0 +1,106 @@
+"""One station: a picture, the requirements as it measures them, and the budget behind their uncertainties."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.budgeting.budgets import SceneBudget
+from scenes import Picture
+from scenes.status import is_trusted
+from validation.batch.campaign import Campaign
+from validation.batch.measurands import column
+from validation.batch.result import Validation
+from validation.batch.rows import Row
+from validation.batch.store import RunFile
+from validation.report.requirements import Requirement, measurable_budget, predicted, requirements
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """What the first screen of a page shows.
+
+    ``image`` is a noise-free render or a photograph, grey levels (height, width), None where there is none; ``number``
+    that of the setting in its run, from 1, None outside of a run.
+    """
+
+    picture: Picture
+    requirements: tuple[Requirement, ...]
+    budget: SceneBudget | None
+    image: np.ndarray | None = None
+    number: int | None = None
+
+
+def of_picture(picture: Picture, p: float = 0.95) -> Station:
+    """As the models predict it."""
+    return Station(picture, predicted(picture, p), measurable_budget(picture, p=p))
+
+
+def of_budget(found: SceneBudget) -> Station:
+    """Of a budget that is known, with its statuses and its noise."""
+    told = found.prediction.measurands
+    made = requirements(
+        found.picture,
+        sigmas=[each.repeatability for each in found],
+        biases=[each.bias_object if math.isfinite(each.bias_object) else None for each in told],
+        found=found,
+        statuses=found.statuses,
+    )
+    return Station(found.picture, made, found)
+
+
+def of_run(campaign: Campaign, found: Validation, store: RunFile) -> Station:
+    """The best setting of a run, with what was measured there."""
+    row = best(found, halves_of(campaign))
+    picture, rows = campaign.case(row.index).picture, row.measurands
+    clean = None if store.identity().get("photos") else _biases(row, store)
+    statuses = [each.status for each in rows]
+    known = measurable_budget(picture, [each.predicted for each in rows], clean, statuses)
+    made = requirements(
+        picture,
+        sigmas=[math.sqrt(each.predicted) for each in rows],
+        biases=[each.bias for each in rows],
+        found=known,
+        statuses=statuses,
+        u_biases=[getattr(each, "u_bias", None) for each in rows],
+    )
+    image = store.image(row.index) if store.has_image(row.index) else None
+    return Station(picture, made, known, image, row.index + 1)
+
+
+def _biases(row: Row, store: RunFile) -> list[float]:
+    """Of each measurand in the noise-free image."""
+    values = (store.propagated(row.index, column(row.main.method, k))[1] for k in range(len(row.measurands)))
+    return [value - each.value for value, each in zip(values, row.measurands, strict=True)]
+
+
+def halves_of(campaign: Campaign) -> dict[str, float]:
+    """Half of each tolerance zone by name of the requirement, of those that have one."""
+    every = (quantity for scene in campaign.scenes for quantity in scene.quantities)
+    return {quantity.name: quantity.tolerance.half for quantity in every if quantity.tolerance}
+
+
+def best(found: Validation, halves: dict[str, float]) -> Row:
+    """The setting at which most requirements are proven, and of several such that with the least uncertainty.
+
+    That is the largest sigma against its tolerance, or, of scenes without tolerances, the product of all sigmas.
+    """
+    return min(found.rows, key=lambda row: (*merit(row, halves), row.index))
+
+
+def merit(row: Row, halves: dict[str, float]) -> tuple[int, float]:
+    """What `best` makes least: how many are not proven, and the uncertainty, rounded to what all machines agree on."""
+    doubtful = sum(not is_trusted(each.status) for each in row.measurands)
+    size = worst(row, halves)
+    if size is None:
+        logs = [math.log(each.predicted) for each in row.measurands if 0 < each.predicted < math.inf]
+        size = sum(logs) / len(logs) if logs else math.inf
+    return doubtful, float(f"{size:.5g}")
+
+
+def worst(row: Row, halves: dict[str, float]) -> float | None:
+    """The largest sigma of a setting over half its tolerance zone; None without tolerances."""
+    known = [math.sqrt(each.predicted) / halves[each.name] for each in row.measurands if each.name in halves]
+    return max(known, default=None)

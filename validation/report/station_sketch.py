@@ -1,0 +1,104 @@
+"""Where camera and lamp stand, to scale beside the part: from the side, and from above."""
+
+from __future__ import annotations
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from markupsafe import Markup
+from scipy.spatial import ConvexHull, QhullError
+
+from imaging.geometry.projection import sensor_position
+from imaging.pictures import Pictures
+from scenes import Picture
+from validation.report.canvas import TEXT, WIDTH, inline
+
+_HEIGHT = 2.7  # inches
+_LAMP, _CAMERA = "#b35900", "#0b3c5d"
+_VIEWS = ("from the side", "from above")
+
+
+def axes_of(picture: Picture) -> np.ndarray:
+    """Two pairs of unit vectors, (2, 2, 3): right and up of the view from the side, in which the camera's axis lies,
+    and of the view from above, its right the same."""
+    azimuth = np.radians(picture.sensor.azimuth_deg)
+    right = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    return np.array([[right, [0.0, 0.0, 1.0]], [right, [-right[1], right[0], 0.0]]])
+
+
+def told(picture: Picture) -> str:
+    """The same in words."""
+    scene, parts = picture.scene, [_where("camera", picture.scene.camera.distance, picture.sensor, picture.scene.units)]
+    names = ["lamp"] if len(scene.lights) == 1 else [f"lamp {i + 1}" for i in range(len(scene.lights))]
+    for name, light, pose in zip(names, scene.lights, picture.lights, strict=True):
+        parts.append(_where(f"{name} ({type(light).__name__.lower()})".replace(" (light)", ""),
+                            light.distance, pose, scene.units))  # fmt: skip
+    return "; ".join(parts)
+
+
+def _where(what: str, distance: float, pose, units: str) -> str:
+    azimuth = f", azimuth {pose.azimuth_deg:.1f}°" if pose.polar_deg % 180 else ""
+    return f"{what} {distance:g} {units} away, {pose.polar_deg:.1f}° from the vertical{azimuth}"
+
+
+def draw(picture: Picture) -> Markup:
+    """The sketch as SVG."""
+    figure, panels = plt.subplots(1, 2, figsize=(WIDTH, _HEIGHT), layout="constrained")
+    pictures, scene = Pictures.of(picture), picture.scene
+    eye = sensor_position(scene.camera, np.array(list(picture.sensor)))
+    lamps = [np.array([e.at for e in pictures.emitters if e.which == i]) for i in range(len(scene.lights))]
+    for panel, (right, up), title in zip(panels, axes_of(picture), _VIEWS, strict=True):
+        flat = np.stack([right, up], -1)
+        _panel(panel, flat, picture, eye, [lamp for lamp in lamps if len(lamp)])
+        panel.set_title(title, fontsize=TEXT)
+    return inline(figure, "sketch", f"Sketch to scale: {told(picture)}.")
+
+
+def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: list[np.ndarray]) -> None:
+    scene, middle = picture.scene, np.array(picture.scene.camera.look_at) @ flat
+    _part(axis, scene.solid.vertices @ flat)
+    camera = eye @ flat
+    _ray(axis, middle, camera, _CAMERA)
+    for lamp in lamps:
+        points = lamp @ flat
+        _ray(axis, middle, points.mean(0), _LAMP)
+        single = len(points) == 1
+        axis.plot(*points.T, "*" if single else ".", color=_LAMP, ms=12 if single else 3, ls="")
+    axis.plot(*camera, "s", color=_CAMERA, ms=9)
+    places = [("camera", camera, _CAMERA), *(("lamp", lamp.mean(0) @ flat, _LAMP) for lamp in lamps[:1])]
+    _labels(axis, places, np.array([scene.solid.vertices @ flat]).reshape(-1, 2), middle)
+
+
+def _part(axis, points: np.ndarray) -> None:
+    """The part's outline, filled."""
+    try:
+        hull = points[ConvexHull(np.round(points, 9)).vertices]
+    except QhullError:  # of no area
+        hull = points
+    axis.fill(*hull.T, facecolor="#b8b8b8", edgecolor="#333333", lw=0.8)
+
+
+def _ray(axis, start: np.ndarray, stop: np.ndarray, colour: str) -> None:
+    axis.plot(*np.stack([start, stop]).T, color=colour, lw=1, ls=(0, (4, 3)))
+
+
+def _labels(axis, places: list, part: np.ndarray, middle: np.ndarray) -> None:
+    """Names above what they name, side by side where they are near each other; room for them on all sides."""
+    every = np.concatenate([part, *(place[None] for _, place, _ in places)])
+    low, high = every.min(0), every.max(0)
+    reach = max(high - low) / 2
+    centre = (low + high) / 2
+    near = len(places) == 2 and np.abs(places[0][1] - places[1][1]).max() < 0.7 * reach
+    left_first = len(places) == 2 and round(float(places[0][1][0] - places[1][1][0]), 9) <= 0
+    for k, (name, place, colour) in enumerate(places):
+        aside = 0 if not near else (-1 if (k == 0) == left_first else 1)
+        align = {0: "center", -1: "right", 1: "left"}[aside]
+        above = 1 if place[1] >= middle[1] - 0.05 * reach else -1
+        axis.annotate(name, place, xytext=(2 * aside, 9 * above), textcoords="offset points", fontsize=TEXT,
+                      color=colour, ha=align, va="bottom" if above > 0 else "top")  # fmt: skip
+    axis.set(xlim=centre[0] + np.array([-1.6, 1.6]) * reach, ylim=centre[1] + np.array([-1.35, 1.45]) * reach)
+    axis.set(aspect="equal", xticks=[], yticks=[])
+    for side in axis.spines.values():
+        side.set_color("#cccccc")

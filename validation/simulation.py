@@ -1,0 +1,217 @@
+"""The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
+
+Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
+rays, and subtracted from the same render of the scene as it is, whose paths are the same ones. Lights that stand
+elsewhere change the direct light, which is rendered anew alone; of plain scenes the closed form of the bias tells what
+lights do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+import measure
+import render
+from imaging.light.appearance import is_plain
+from imaging.models.bias import bias
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
+from measure import Correction, Images
+from measure.correction import RENDERING, TEXTURE
+from measure.propagation import PropagatedValues
+from render import Quality, Tolerance
+from scenes import Picture, Pose, Scene
+from scenes.materials import Brdf
+from validation.remeasured import Method
+
+REFLECTANCE, LIGHT = "reflectance", "light_place"
+_BETWEEN = "interreflection"
+_LEAST, _MOST = 2, 6  # renders of other rays
+_QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
+_FEW, _RANDOM = 16, 4  # rays of a fine pixel that an edge crosses, and of others, in renders that are subtracted
+
+
+@dataclass(frozen=True)
+class How:
+    """How noise-free images are made: as `render.image` takes it."""
+
+    quality: Quality = Quality()
+    variant: str | None = None
+    effects: str = "auto"
+    tolerance: Tolerance = Tolerance()
+
+    def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
+        """With rays of another seed, counted from the quality's."""
+        return self._rendered(picture, self.effects, seed)
+
+    def active(self, picture: Picture) -> frozenset[str]:
+        """The effects that are simulated."""
+        return render.choose(picture.scene, self.effects, self.tolerance, picture).active
+
+    def roughly(self, picture: Picture) -> np.ndarray:
+        """With few rays, for differences of renders whose paths are the same."""
+        few = {"samples": 1, "edge_samples": _FEW, "random_samples": _RANDOM}
+        return replace(self, quality=replace(self.quality, **few)).image(picture)
+
+    def direct(self, picture: Picture, active: frozenset[str]) -> np.ndarray:
+        """Without light between faces."""
+        return self._rendered(picture, active - {_BETWEEN}, 0)
+
+    def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
+        quality = replace(self.quality, seed=self.quality.seed + seed)
+        return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
+
+
+def independent(
+    picture: Picture,
+    methods: tuple[Method, ...],
+    beside: np.ndarray,
+    propagated: tuple[PropagatedValues, ...],
+    how: How = How(),
+) -> tuple[Correction, ...]:
+    """Corrections by each method from a render of other rays than a given one, whose noisy copies are corrected.
+
+    Parameters
+    ----------
+    beside : ndarray, shape (height, width)
+        The noise-free image that is measured.
+    propagated : tuple of PropagatedValues
+        What `measure.propagate` says of it, by method.
+    """
+    other = how.image(picture, 1)
+    images = _completed(picture, (other,), (beside,), how)
+    return tuple(
+        measure.correction(images, picture, each.locator, each.threshold, told)
+        for each, told in zip(methods, propagated, strict=True)
+    )
+
+
+@lru_cache(maxsize=64)
+def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
+    """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
+
+    Renders of other rays are added until their noise is below a tenth of sigma or a hundredth of the tolerance, six at
+    most.
+    """
+    alike = picture.with_scene(_without_textures(picture.scene))
+    renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
+    images = _completed(alike, renders, (), how)
+    found = measure.correction(images, alike, method.locator, method.threshold)
+    while len(renders) < _MOST and not _is_quiet(found):
+        renders = (*renders, how.image(alike, len(renders)))
+        images = replace(images, renders=renders)
+        found = measure.correction(images, alike, method.locator, method.threshold)
+    if alike is picture or alike.scene == picture.scene:
+        return found
+    spread = texture_errors(Pictures.of(picture)).variances
+    image, plane = (np.where(np.isfinite(each), np.sqrt(each), np.inf) for each in spread)
+    return replace(
+        found,
+        sources={**found.sources, TEXTURE: plane},
+        sources_image={**found.sources_image, TEXTURE: image},
+    )
+
+
+def _is_quiet(found: Correction) -> bool:
+    tolerances = np.array([0.0 if q.tolerance is None else q.tolerance.half for q in found.quantities])
+    limit = np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
+    noise = found.sources[RENDERING]
+    return bool((noise <= limit)[np.isfinite(noise) & np.isfinite(found.sigma)].all())
+
+
+def _without_textures(scene: Scene) -> Scene:
+    kept = tuple(each for each in scene.textures if each.kind != "statistical")
+    return scene if kept == scene.textures else scene.tried(textures=kept)
+
+
+def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[np.ndarray, ...], how: How) -> Images:
+    """With the images, or numbers, of what the scene is not sure of."""
+    first, known = renders[0], _of_unknown_kinds(picture)
+    changed = {REFLECTANCE: _steps(first, how.roughly(picture), map(how.roughly, _of_other_surfaces(picture)))}
+    if is_plain(picture.scene):
+        known |= {LIGHT: _light_in_closed_form(picture)}
+    else:
+        direct = partial(how.direct, active=how.active(picture))
+        changed[LIGHT] = _steps(first, direct(picture), map(direct, _with_lights_moved(picture)))
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
+
+
+def _steps(first: np.ndarray, here: np.ndarray, others: Iterable[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """The first render with what other pictures differ by from this one, both of the same random numbers."""
+    return tuple(first + (other - here) for other in others)
+
+
+def _of_other_surfaces(picture: Picture) -> Iterator[Picture]:
+    """The picture with each material, and the floor, reflecting less by its standard uncertainty.
+
+    One material of one convex body is not among them: it changes nothing but the scale of brightness.
+    """
+    scene, part = picture.scene, _u(picture.scene.uncertainty.reflectance)
+    if part == 0 or (is_plain(scene) and not scene.materials):
+        return
+    dimmed = scene.material.dimmed(part)
+    if dimmed is not None:
+        yield picture.with_scene(scene.tried(material=dimmed))
+    if scene.floor is not None and scene.floor.reflectance > 0:
+        floor = scene.floor.tried(reflectance=(1 - part) * scene.floor.reflectance)
+        yield picture.with_scene(scene.tried(floor=floor))
+    for i, each in enumerate(scene.materials):
+        dimmed = each.dimmed(part) if isinstance(each, Brdf) else None
+        if dimmed is not None:
+            yield picture.with_scene(scene.tried(materials=(*scene.materials[:i], dimmed, *scene.materials[i + 1 :])))
+
+
+def _of_unknown_kinds(picture: Picture) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Infinite where a material that matters is of a kind that does not say how it reflects less."""
+    scene = picture.scene
+    used = (*scene.materials, *((scene.material,) if scene.materials or not is_plain(scene) else ()))
+    if all(isinstance(each, Brdf) and each.dimmed(0.5) is not None for each in used):
+        return {}
+    unknown = np.full(len(picture.scene.quantities), np.inf)
+    return {REFLECTANCE: (unknown, unknown)}
+
+
+def _with_lights_moved(picture: Picture) -> Iterator[Picture]:
+    """The picture with each light moved by its standard uncertainty: away, along the meridian, and across it."""
+    u = _u(picture.scene.uncertainty.light_place)
+    for i, light in enumerate(picture.scene.lights):
+        if light.faces_sensor or u == 0:
+            continue
+        yield picture.with_scene(_with_light(picture.scene, i, light.tried(distance=(1 + u) * light.distance)))
+        for pose in _beside(picture.lights[i], math.degrees(u)):
+            yield replace(picture, lights=(*picture.lights[:i], pose, *picture.lights[i + 1 :]))
+
+
+def _with_light(scene: Scene, which: int, light) -> Scene:
+    if scene.light is not None:
+        return scene.tried(light=light)
+    several = scene.several_lights
+    return scene.tried(several_lights=(*several[:which], light, *several[which + 1 :]))
+
+
+def _beside(pose: Pose, step: float) -> Iterator[Pose]:
+    """Poses a step away, degrees, along the meridian and across it."""
+    yield Pose(pose.polar_deg + step if pose.polar_deg + step <= 180 else pose.polar_deg - step, pose.azimuth_deg)
+    (p, a), s = np.radians(list(pose)), math.radians(step)
+    here = np.array([math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)])
+    x, y, z = math.cos(s) * here + math.sin(s) * np.array([-math.sin(a), math.cos(a), 0.0])
+    yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
+
+
+def _light_in_closed_form(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
+    """Standard uncertainties (M,) of the classic locators' bias by lights' places, in the object and in the image."""
+    here, found = bias(Pictures.of(picture)), []
+    for other in _with_lights_moved(picture):
+        moved = bias(Pictures.of(other))
+        found.append((moved.values_object - here.values_object, moved.values - here.values))
+    squares = np.square(found).sum(0) if found else np.zeros((2, len(picture.scene.quantities)))
+    return tuple(np.sqrt(squares.reshape(2, -1)))
+
+
+def _u(told) -> float:
+    return 0.0 if told is None else told.u
