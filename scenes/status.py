@@ -48,14 +48,14 @@ REMEDIES = {
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
-    CLUTTER: "move lamp or sensor (`ice plan`), or measure by `arrangement`, which knows what lies around an edge",
+    CLUTTER: "move lamp or sensor (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
     OK: "",
 }
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
 MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
-OF_SIGMA, OF_TOLERANCE = 1.0, 0.1  # what u(bias) may be of noise, and of the tolerance to one side
+OF_SIGMA, OF_TOLERANCE = 1.0, 0.2  # what u(bias) may be of noise, and of half the tolerance zone
 
 
 def worst(*statuses: str) -> str:
@@ -99,7 +99,7 @@ def corrected(
     u_bias, sigma : float
         Standard uncertainties (not variances) of the correction and by noise, of one unit; infinite: not known.
     tolerance : float
-        To one side, of the same unit; 0 where there is none.
+        Half of its zone, of the same unit; 0 where there is none.
     modelled : bool
         Whether ``misfit`` of the picture may be what the simulated one has, too.
 
@@ -118,17 +118,23 @@ def corrected(
     return OK if small else CLUTTER
 
 
-def doubt(status: str) -> str:
+def doubt(status: str, bias: str = "") -> str:
     """Why a value is not relied on, in a few words: what is wrong, and what is not known of it; empty where it is.
+
+    ``bias`` is how large it may be, with its unit, where that is known.
 
     >>> doubt("clutter"), doubt("short")
     ('clutter, bias unknown', 'short, no value')
+    >>> doubt("clutter", "0.03 mm")
+    'clutter, bias up to 0.03 mm'
     """
     if is_trusted(status):
         return ""
     if status in (CORRELATED, COMPRESSED):
         return f"{status}, uncertainty unknown"
-    return f"{status}, {'bias unknown' if status in MEASURED else 'no value'}"
+    if status not in MEASURED:
+        return f"{status}, no value"
+    return f"{status}, bias up to {bias}" if bias and status == CLUTTER else f"{status}, bias unknown"
 
 
 def legend(statuses: Iterable[str]) -> list[str]:

@@ -13,6 +13,7 @@ import planner
 import render
 from render import Quality
 from scenes import InvalidInput, Picture, Pose, Scene, Setting, several, status
+from validation import simulation
 from validation.remeasured import GRADIENT, propagated
 
 ESTIMATOR = GRADIENT.locator
@@ -33,13 +34,16 @@ class CheckedSetting:
         What the plan minimises, without and with the picture: the variance (not sigma) in the scene's unit squared or
         px^2, or what several make together; infinite where it cannot be measured.
     status : str
-        The worst of the measurands in the noise-free picture.
+        The worst of the measurands in the noise-free picture, once their biases are taken off.
     without_formula : tuple of str
         Effects that were simulated there and that no formula of the planner knows.
     rank_before : int
         Place in the plan, from 1.
     rank_after : int or None
-        Place by the picture: what is ``ok`` comes first; None where nothing can be measured.
+        Place by the picture: what is ``ok`` comes first, then by `minimised`; None where nothing can be measured.
+    with_bias : float or None
+        ``propagated`` with what the correction of each value's bias is not sure of, so that both are what a user gets;
+        None where that was not looked at.
     """
 
     sensor: Pose
@@ -51,6 +55,12 @@ class CheckedSetting:
     without_formula: tuple[str, ...]
     rank_before: int
     rank_after: int | None = None
+    with_bias: float | None = None
+
+    @property
+    def minimised(self) -> float:
+        """What settings are compared by."""
+        return self.propagated if self.with_bias is None else self.with_bias
 
     @property
     def ratio(self) -> float | None:
@@ -152,18 +162,22 @@ def _checked(
     found: planner.Plan, sensor: Pose, light: Pose, edges: tuple[str, ...], rank: int, quality: Quality
 ) -> CheckedSetting:
     scene = _with_edges(found.scene, edges)
-    _, measured = propagated(Picture.of(scene, sensor, light), quality)
+    picture = Picture.of(scene, sensor, light)
+    image, measured = propagated(picture, quality)
+    off = simulation.of_render(picture, GRADIENT, image, measured, simulation.How(quality))
     calibrated = planner.predict(scene, sensor, light, "calibrated").measurands
     aim = planner.Aim.of(scene.quantities, found.objective, found.over)
     in_object = found.objective == "object"
-    joint = measured.covariance if in_object else measured.covariance_image
+    joint = np.diag(measured.covariance if in_object else measured.covariance_image)
+    doubt = off.u_bias if in_object else off.u_bias_image
     return CheckedSetting(
         sensor=sensor,
         light=light,
         edges=edges,
         calibrated=float(aim(np.array([e.variance_object if in_object else e.variance_image for e in calibrated]))),
-        propagated=float(aim(np.diag(joint))),
-        status=status.worst(*measured.status),
+        propagated=float(aim(joint)),
+        with_bias=float(aim(joint + doubt**2)),
+        status=status.worst(*off.status),
         without_formula=without_formula(scene, sensor, light),
         rank_before=rank,
     )
@@ -193,7 +207,7 @@ def _with_edges(scene: Scene, edges: tuple[str, ...]) -> Scene:
 def _judged(rows: list[CheckedSetting], reason: str, seconds: float) -> PlanCheck:
     """Places by the pictures: ``ok`` first, then what is doubtful, by variance; what cannot be measured has none."""
     order = sorted(range(len(rows)), key=lambda i: (np.isinf(rows[i].propagated), not status.is_trusted(rows[i].status),
-                                                    rows[i].propagated))  # fmt: skip
+                                                    rows[i].minimised))  # fmt: skip
     ranked = [
         replace(row, rank_after=None if np.isinf(row.propagated) else order.index(i) + 1) for i, row in enumerate(rows)
     ]

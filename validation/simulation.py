@@ -9,7 +9,7 @@ lights do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -91,13 +91,26 @@ def independent(
     )
 
 
-@lru_cache(maxsize=64)
+def of_render(
+    picture: Picture, method: Method, image: np.ndarray, propagated: PropagatedValues, how: How = How()
+) -> Correction:
+    """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
+    images, none = _completed(picture, (image,), (), how), np.zeros(len(picture.scene.quantities))
+    images = replace(images, known={**images.known, RENDERING: (none, none)})
+    return measure.correction(images, picture, method.locator, method.threshold, propagated)
+
+
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
     Renders of other rays are added until their noise is below a tenth of sigma or a hundredth of the tolerance, six at
     most.
     """
+    return _simulated(picture, method, how)
+
+
+@lru_cache(maxsize=64)
+def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
     renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
     images = _completed(alike, renders, (), how)
@@ -132,18 +145,22 @@ def _without_textures(scene: Scene) -> Scene:
 def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[np.ndarray, ...], how: How) -> Images:
     """With the images, or numbers, of what the scene is not sure of."""
     first, known = renders[0], _of_unknown_kinds(picture)
-    changed = {REFLECTANCE: _steps(first, how.roughly(picture), map(how.roughly, _of_other_surfaces(picture)))}
+    changed = {REFLECTANCE: _steps(first, how.roughly, picture, _of_other_surfaces(picture))}
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
         direct = partial(how.direct, active=how.active(picture))
-        changed[LIGHT] = _steps(first, direct(picture), map(direct, _with_lights_moved(picture)))
+        changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
 
 
-def _steps(first: np.ndarray, here: np.ndarray, others: Iterable[np.ndarray]) -> tuple[np.ndarray, ...]:
+def _steps(
+    first: np.ndarray, made: Callable[[Picture], np.ndarray], picture: Picture, others: Iterable[Picture]
+) -> tuple[np.ndarray, ...]:
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
-    return tuple(first + (other - here) for other in others)
+    changed = [made(other) for other in others]
+    here = made(picture) if changed else first
+    return tuple(first + (other - here) for other in changed)
 
 
 def _of_other_surfaces(picture: Picture) -> Iterator[Picture]:

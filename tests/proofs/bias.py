@@ -2,9 +2,9 @@
 
 The part that is measured reflects otherwise than its scene says, each surface by up to 10 %, and each light stands up
 to 1 % of its distance elsewhere; it is rendered with rays of its own. Who measures it knows nothing of that: the bias
-of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures has to scatter
-by 1 at most where a value depends on it, and over the combined uncertainty single noisy values have to scatter by 1
-within 10 %, beyond chance.
+of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures scatters by 1
+where that tells it, and over the combined uncertainty single noisy values have to scatter by 1 within
+10 %, beyond chance.
 """
 
 from __future__ import annotations

@@ -135,3 +135,26 @@ def test_calibrate_agrees_with_the_closed_form(tmp_path):
     # margin: the order is said: no other comes as near to the bound
     assert curves["canny"]["efficiency"] < curves["arrangement"]["efficiency"]
     assert cv2.imread(str(tmp_path / "c.png")).std() > 10  # drawn, not blank  # margin: drawn, a blank picture has 0
+
+
+def test_strict_fails_where_a_row_could_not_be_measured(tmp_path):
+    """One setting sees nothing of its edges: the other agrees, which is enough unless --strict asks for all."""
+    text = (BUNDLED / "task1.toml").read_text().split("[[settings]]")[0]
+    settings = "".join(f"[[settings]]\nsensor = {sensor}\nlight = [15, 270]\n" for sensor in ([30, 90], [150, 90]))
+    (tmp_path / "two.toml").write_text(text + settings)
+    command = (
+        "validate",
+        tmp_path / "two.toml",
+        "--renders",
+        "40",
+        "--workers",
+        "1",
+        "--out",
+        tmp_path / "run",
+        "--json",
+    )
+    lenient, strict = ice(*command), ice(*command, "--strict")
+    document = json.loads(strict.stdout)
+    assert document["verdict"].startswith("agree"), document["verdict"]
+    assert document["judgement"]["not_measured"] == 1
+    assert (lenient.returncode, strict.returncode) == (0, 1)

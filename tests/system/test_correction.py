@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 import render
 from measure import Images
 from scenes import InvalidInput, Picture, Pose
@@ -13,6 +14,7 @@ from scenes.status import corrected
 from tests.oracle import block_image
 from validation import kept, simulation
 from validation.remeasured import Method
+from validation.report import budget_table
 
 ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 
@@ -107,8 +109,8 @@ def test_one_rule_for_statuses():
     """Small beside the noise or the tolerance; what is not measured in the simulation is not measured."""
     assert corrected("ok", "ok", 0.9, 1.0) == "ok"
     assert corrected("ok", "ok", 1.1, 1.0) == "clutter"
-    assert corrected("clutter", "ok", 1.1, 1.0, 10.0) == "clutter"
-    assert corrected("clutter", "ok", 1.1, 1.0, 12.0) == "ok"
+    assert corrected("clutter", "ok", 1.1, 1.0, 5.0) == "clutter"
+    assert corrected("clutter", "ok", 1.1, 1.0, 6.0) == "ok"
     assert corrected("ok", "ok", float("inf"), 1.0, 1e9) == "clutter"
     assert corrected("ok", "ok", float("nan"), 1.0, 1e9) == "clutter"
     assert corrected("clutter", "ambiguous", 0.0, 1.0) == "ambiguous"
@@ -155,6 +157,25 @@ def test_the_simulation_is_kept(small, tmp_path, monkeypatch):
     kept.correction(brighter, method)
     assert len(made) == 6
     assert len(list(tmp_path.rglob("*.json"))) == 2
+
+
+def test_what_is_not_signed_says_how_large_the_bias_may_be(small):
+    """Two of 0.03 and 0.04 cm make 0.05, of which twice is 0.1; without them it is unknown."""
+    picture = Picture.of(small, (30, 90), (15, 270))
+    doubts = {"reflectance": np.array([0.03]), "light_place": np.array([0.04]), "texture": np.array([np.inf])}
+    found = planner.budget(picture, variances=np.array([1e-8]), doubts=doubts, statuses=("clutter",))
+    assert found.u_bias == (pytest.approx(0.05),)
+    assert found.measurands[0].u == pytest.approx(np.hypot(0.05, 1e-4))
+    said = budget_table.sentence(found.measurands[0], "distance", "clutter")
+    assert said == "The distance is not signed: clutter, bias up to 0.1 cm"
+    plain = planner.budget(picture, statuses=("clutter",))
+    said = budget_table.sentence(plain.measurands[0], "distance", "clutter")
+    assert said == "The distance is not signed: clutter, bias unknown"
+    assert plain.u_bias[0] == next(
+        r.contribution for r in plain.measurands[0].contributions if r.source == "model error"
+    )
+    with pytest.raises(InvalidInput, match=r"doubts.'light_place'. must be one at least 0 for each measurand, got"):
+        planner.budget(picture, doubts={"light_place": np.array([-1.0])})
 
 
 def test_lights_stand_a_step_beside():

@@ -19,6 +19,7 @@ from scenes import InvalidInput
 from tests.chromium import PROGRAM, chromium
 from tests.exploring import drag_lamp, first_answer, served, settled, told
 from validation.cli.application import app
+from validation.explore import sphere
 from validation.explore.gate import COOKIE
 
 in_a_browser = pytest.mark.skipif(PROGRAM is None, reason="needs Chromium, which is not installed here")
@@ -87,6 +88,39 @@ def test_a_visit(task1, tmp_path):
     assert saved.settings[:-1] == task1.settings
     assert list(saved.settings[-1].sensor) == moved["sensor"]
     assert list(saved.settings[-1].light) == moved["lights"][0]
+
+
+LABELS = """[explore.view, explore.picture].map(({ labels: { taken } }) => taken.flatMap((a, i) => taken.slice(i + 1)
+  .filter(b => (a.name || b.name) && Math.min(a.x + a.width, b.x + b.width) - Math.max(a.x, b.x) > 0.01
+    && Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 0.01).map(b => [a.name, b.name])))"""
+NAMED = "[explore.view, explore.picture].map(({ labels }) => labels.taken.map(each => each.name).filter(Boolean))"
+
+
+@in_a_browser
+def test_no_label_lies_on_another(tmp_path):
+    """With camera and lamp in one place, too; what limits is always named; the sphere tells how far it is coloured."""
+
+    async def visit():
+        async with served("plate", tmp_path) as url, chromium() as page:
+            await page.open(url)
+            await page.until("window.explore?.view.map", 60)
+            assert await page.value("document.getElementById('coloured').value") == len(sphere.cells().poses)
+            assert await page.value("document.getElementById('colouring').hidden")
+            for keys in ("", "+", "c", "m", "m"):
+                if "+" in keys:  # the lamp to where the camera is
+                    for angle, value in enumerate(await page.value("window.explore.state.sensor")):
+                        box = f"document.getElementById('pose0-{angle}')"
+                        await page.value(f"({box}.value = {value}, {box}.onchange())")
+                elif keys:
+                    await page.press(keys)
+                await settled(page)
+                assert await page.value(LABELS) == [[], []]
+                stage, picture = await page.value(NAMED)
+                assert {"camera", "lamp", "0°"} <= set(stage)
+                assert await page.value("explore.picture.limiting") in picture
+            assert not page.errors
+
+    asyncio.run(visit())
 
 
 def test_from_the_command_line(tmp_path):

@@ -258,6 +258,7 @@ def test_every_column_of_the_csv_is_the_row_s_number(mixed, tmp_path):
                 "propagated": judged.propagated, "empirical": judged.empirical, "n": judged.n, "failed": judged.failed,
                 "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
                 "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
+                "correction_px": judged.correction, "u_bias_px": judged.u_bias,
             }  # fmt: skip
             whole |= {f"{judged.method}_{key}": value for key, value in facts.items()}
             assert judged.rmse**2 == pytest.approx(judged.empirical + judged.bias**2)

@@ -18,7 +18,7 @@ import scenes
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose
-from scenes.status import MEANINGS
+from scenes.status import MEANINGS, REMEDIES
 from validation.batch.work import Chunk, Clean, Found, Packed
 from validation.explore import answers, best, effects, preview, prove, save, session, sphere
 from validation.explore.gate import COOKIE, gate
@@ -49,7 +49,7 @@ def test_states_of_messages(plate):
         ("lights", [], "lights must be 1 pose"),
         ("measurand", 5, "measurand must be a whole number from 0 to 4, got 5"),
         ("measurand", True, "measurand must be a whole number"),
-        ("shown", "colour", "shown must be one of sigma, ratio, got 'colour'"),
+        ("shown", "colour", "shown must be one of sigma, ratio, worst, got 'colour'"),
         ("moving", 1, "moving must be a whole number from -1 to 0, got 1"),
     ],
 )
@@ -121,6 +121,7 @@ def test_refused_and_not_measurable(task1):
     row = answers.to_message(dark)["measurands"][0]
     assert row["sigma"] is None
     assert row["why"] == MEANINGS[row["status"]]
+    assert row["remedy"] == REMEDIES[row["status"]] != ""
 
 
 def test_a_glance_at_a_block_is_a_close_look(task1):

@@ -75,6 +75,21 @@ def test_what_is_said_of_a_place_is_the_planner_s(scene, measurand):
     assert plain["values"][0] == pytest.approx(sigma * (1 + measurand), rel=1e-3)
 
 
+def test_the_worst_of_all_colours_the_sphere_unless_another_is_asked_for(scene):
+    """The largest 2 sigma over its own half zone: of the first here, of the second where that is not to be had."""
+    first = State.first(scene)
+    assert first.shown == "worst"
+    assert first.tolerable(scene) == first
+    shown = sphere.to_message(scene, first, np.array([[0.010, 0.011], [0.002, 0.013], [np.inf, 0.013], [0.01, np.nan]]))
+    assert shown["values"][:2] == [pytest.approx(2 * 0.010 / 0.02), pytest.approx(2 * 0.013 / 0.026)]
+    assert shown["values"][2:] == [None, None]
+    assert (shown["what"], shown["unit"], shown["shown"]) == ("2 sigma / tolerance", "", "worst")
+    bare = scene.model_copy(
+        update={"measurands": tuple(m.model_copy(update={"tolerance": None}) for m in scene.measurands)}
+    )
+    assert State.first(bare).shown == first.tolerable(bare).shown == "sigma"
+
+
 def test_shares_of_a_variance_are_those_of_its_edges(scene):
     """They add to 1; each is what is left out when only that edge is without error."""
     state = State.first(scene)

@@ -47,6 +47,11 @@ def made_up(index, rng):
         "paper": 0.011 * (index + 1), "calibrated": 0.013 * (index + 1), "bound": 0.007 * (index + 1),
         "value_px": 90.0 + index, "predicted_bias": 0.004 * (index - 1), "measurands": measurands,
     }  # fmt: skip
+    off = {name: {"bias": 0.05 * s * (1 + j), "u": 0.2 * s * (1 + j)} for j, (name, s) in enumerate(sigma.items())}
+    if index % 2:  # in every other setting a simulation told biases
+        predicted["corrections"] = {name: off[name] for name in METHODS}
+        for k, each in enumerate(measurands):
+            each["correction"] = off[f"gradient:{k}"]
     propagated = {name: (s**2, true[name], "ok") for name, s in sigma.items()}
     return SimpleNamespace(sigma=sigma, true=true, values=values, lost=lost, predicted=predicted, propagated=propagated)
 
@@ -85,17 +90,18 @@ def run(tmp_path_factory):
     return found, told
 
 
-def expected(values, propagated, true, lost, predicted_bias):
-    """Everything that is said of one method, from its values."""
+def expected(values, propagated, true, lost, predicted_bias, off):
+    """Everything that is said of one method, from its values and the bias that is taken off."""
     good = [float(v) for v in values if math.isfinite(v)]
-    variance, bias = statistics.variance(good), statistics.fmean(good) - true
+    variance, bias = statistics.variance(good), statistics.fmean(good) - true - (off["bias"] if off else 0)
     freedom = len(good) - 1
     low, high = (variance / propagated * freedom / stats.chi2.ppf(q, freedom) for q in (0.975, 0.025))
     states = sorted(lost.values())
     return {
         "propagated": propagated, "empirical": variance, "n": len(values), "failed": len(values) - len(good),
         "failures": {state: states.count(state) for state in states}, "ratio": variance / propagated,
-        "ratio_interval": [low, high], "bias": bias, "predicted_bias": predicted_bias,
+        "ratio_interval": [low, high], "bias": bias, "predicted_bias": 0.0 if off else predicted_bias,
+        "correction": off["bias"] if off else 0.0, "u_bias": off["u"] if off else None,
         "rmse": math.sqrt(variance + bias**2),
         "status": "ok" if len(lost) <= 0.01 * len(values) else max(states, key=states.count),
     }  # fmt: skip
@@ -103,13 +109,14 @@ def expected(values, propagated, true, lost, predicted_bias):
 
 def methods_of(here):
     names = [(name, here.predicted["value_px"], here.predicted["predicted_bias"]) for name in METHODS]
-    return [expected(here.values[n], here.sigma[n] ** 2, t, here.lost[n], b) for n, t, b in names]
+    off = here.predicted.get("corrections", {})
+    return [expected(here.values[n], here.sigma[n] ** 2, t, here.lost[n], b, off.get(n)) for n, t, b in names]
 
 
 def measurands_of(here):
     return [
         expected(here.values[f"gradient:{k}"], here.sigma[f"gradient:{k}"] ** 2, each["value"],
-                 here.lost[f"gradient:{k}"], each["predicted_bias"])
+                 here.lost[f"gradient:{k}"], each["predicted_bias"], each.get("correction"))
         for k, each in enumerate(here.predicted["measurands"])
     ]  # fmt: skip
 
@@ -146,7 +153,10 @@ def test_the_document_says_what_was_measured(run):
             numbers = {("predicted" if key == "propagated" else key): v for key, v in numbers.items()}
             for left_out in ("failures", "rmse"):
                 numbers.pop(left_out)
+            about = {key: value for key, value in about.items() if key not in ("predicted_bias", "correction")}
             assert same(each, numbers | about)
+            u = None if numbers["u_bias"] is None else math.hypot(numbers["predicted"] ** 0.5, numbers["u_bias"])
+            assert same(each, {"u": u})
     assert document["seconds"]["measure"] == pytest.approx(0.5 * SETTINGS)
     assert document["seconds"]["render"] == pytest.approx(0.25 * SETTINGS)
 
@@ -224,7 +234,8 @@ def poses(index):
 
 
 def shifts(main):
-    return [f"{main['predicted_bias']:+.4f}", f"{main['bias']:+.4f}", f"{main['rmse']:.4f}"]
+    off = main["predicted_bias"] if main["u_bias"] is None else main["correction"]
+    return [f"{off:+.4f}", f"{main['bias']:+.4f}", f"{main['rmse']:.4f}"]
 
 
 def variances_of(here):
@@ -237,7 +248,8 @@ def units_of(here):
     for about, each in zip(here.predicted["measurands"], measurands_of(here), strict=True):
         sigmas = (about["calibrated"], each["propagated"], each["empirical"])
         yield [about["name"], f"{about['value']:.6g}", "mm", *(f"{v**0.5:.3g}" for v in sigmas), interval(each),
-               f"{each['bias']:+.2g}", each["status"]]  # fmt: skip
+               f"{each['bias']:+.2g}", "-" if each["u_bias"] is None else f"{each['u_bias']:.2g}",
+               each["status"]]  # fmt: skip
 
 
 def test_the_terminal_s_tables_are_the_document_s_numbers(run):
@@ -255,7 +267,7 @@ def test_the_terminal_s_tables_are_the_document_s_numbers(run):
         printed = [real[index][0], f"{ours:.3f}", against, *real[index][1:]]
         assert list(row) == [*poses(index), *printed, *variances_of(here)]
     headings, rows = of_terminal(made, "Measured / propagated")
-    assert headings == ["sensor", "light", *METHODS, "n", "failed", "pred.", "meas.", "rmse px", "status"]
+    assert headings == ["sensor", "light", *METHODS, "n", "failed", "off", "left", "rmse px", "status"]
     for index, (row, here) in enumerate(zip(rows, told, strict=True)):
         main, *others = all_ = methods_of(here)
         lost = " ".join(str(each["failed"]) for each in all_)
@@ -264,7 +276,7 @@ def test_the_terminal_s_tables_are_the_document_s_numbers(run):
         assert len(others) == 2
     headings, rows = of_terminal(made, "All measurands")
     assert headings == ["sensor", "light", "measurand", "value", "unit", "calibrated", "propagated", "measured",
-                        "ratio", "bias", "status"]  # fmt: skip
+                        "ratio", "left", "u(bias)", "status"]  # fmt: skip
     wanted = [[*poses(i), *cells] for i, here in enumerate(told) for cells in units_of(here)]
     assert list(map(list, rows)) == wanted
 
@@ -272,8 +284,8 @@ def test_the_terminal_s_tables_are_the_document_s_numbers(run):
 def test_the_report_s_tables_are_the_document_s_numbers(run):
     found, told = run
     ratios, variances, units = page_tables.ratios(found), page_tables.variances(found), page_tables.units(found)
-    assert ratios.columns[3:] == ["gradient: measured / predicted [95 %]", "images", "failed", "bias, px: predicted",
-                                  "measured", "rmse, px", "status"]  # fmt: skip
+    assert ratios.columns[3:] == ["gradient: measured / predicted [95 %]", "images", "failed", "bias, px: taken off",
+                                  "left", "rmse, px", "status"]  # fmt: skip
     for index, here in enumerate(told):
         main = methods_of(here)[0]
         lost = " ".join(str(each["failed"]) for each in methods_of(here))
@@ -303,7 +315,9 @@ def test_the_csv_of_measurands_is_the_document_s(run, tmp_path):
               for about, each in zip(here.predicted["measurands"], measurands_of(here), strict=True)]  # fmt: skip
     for line, (index, about, each) in zip(lines, wanted, strict=True):
         setting = _scene().settings[index]
+        about = {key: value for key, value in about.items() if key != "correction"}
         numbers = about | {
+            "correction": each["correction"], "predicted_bias": each["predicted_bias"],
             "index": index, "sensor_polar": setting.sensor.polar_deg, "sensor_azimuth": setting.sensor.azimuth_deg,
             "light_polar": setting.light.polar_deg, "light_azimuth": setting.light.azimuth_deg, "n": each["n"],
             "predicted": each["propagated"], "empirical": each["empirical"], "failed": each["failed"],

@@ -8,10 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import planner
+import scenes
 from scenes import Pose
 from validation import budgets, effects_check
 from validation.cli import measure as measure_cli
 from validation.cli import photograph, plan, verbosity
+from validation.cli import predict as predict_cli
 from validation.report import camera_table, figures, guide, table, views_figure
 from validation.statistics import LEVEL
 
@@ -269,3 +272,16 @@ def test_what_an_effect_changes_is_known_to_the_scatter_over_seeds():
     wide = [8.610302 / math.sqrt(5) * statistics.stdev(each) for each in (off, grown)]
     assert (row.resolution_px, row.resolution_variance) == pytest.approx((wide[0] + 2e-4, wide[1] + 1e-3), rel=1e-6)
     assert (row.seconds, row.seconds_auto) == (0.75, 0.5)
+
+
+def test_edges_that_cannot_be_relied_on_are_told_of():
+    """Of each picture those alone whose status says so, with their lengths and contrasts; of many pictures some."""
+    plate = scenes.load("plate")
+    found = planner.predict(plate, (15, 85), (40, 265))
+    (edge,) = (each for each in found.edges if each.status != "ok")
+    (line,) = predict_cli.doubtful_edges([found, planner.predict(plate, (30, 80), (35, 335))])
+    assert line == (
+        f"sensor (15.0, 85.0), light (40.0, 265.0): {edge.name} clutter, {edge.length_px:.3g} px long, "
+        f"contrast {edge.contrast:.3g} grey levels."
+    )
+    assert predict_cli.doubtful_edges([found] * 10)[-1] == "and 2 more places"

@@ -106,6 +106,19 @@ def test_one_that_cannot_be_measured_takes_nothing_from_the_others(plate):
     assert pytest.approx(whole["length"]) == made[2].U
 
 
+def test_what_a_correction_is_not_sure_of_is_in_u(plate):
+    """U = 1.96 sqrt(sigma^2 + u(bias)^2) where the bias is taken off; what is not known at all adds nothing but its
+    status."""
+    sigmas, doubts = [0.001, 0.002, 0.001, 0.02, 0.001], [0.0005, 0.002, 0.0, 0.01, math.inf]
+    found = requirements.measurable_budget(plate, [s * s for s in sigmas], doubts=doubts)
+    wanted = [1.959964 * math.hypot(s, u if math.isfinite(u) else 0.0) for s, u in zip(sigmas, doubts, strict=True)]
+    assert [each.U for each in found] == pytest.approx(wanted)
+    made = requirements.requirements(plate, sigmas, [0.0] * 5, found, ["ok"] * 4 + ["clutter"], doubts)
+    assert [each.u_bias for each in made] == doubts
+    assert made[4].grade == Grade.DOUBT
+    assert station_table.lines(made)[4].cells[4] == "0 ± not known"
+
+
 def crossing(one, other):
     """Whether two segments cross: each has the other's ends on both sides."""
 

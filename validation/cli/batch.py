@@ -67,6 +67,7 @@ Estimators = Annotated[
         "--estimators", metavar="LIST", help="By which is measured, with commas between; the first is judged."
     ),
 ]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit status 1 also where a row is not proven or not measured.")]
 Explain = Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")]
 LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
 
@@ -88,6 +89,7 @@ def validate_command(
     photos: Photos = None,
     exact_poses: ExactPoses = False,
     estimators: Estimators = None,
+    strict: Strict = False,
     explain: Explain = False,
     log_json: LogJson = False,
     as_json: Json = False,
@@ -98,8 +100,8 @@ def validate_command(
     sensor_30_90_light_15_270, or DIR holds photos.toml: [[settings]] with sensor, light and files.
 
     Writes run.sqlite, report.html (one page that shows all), report.md, table.csv, measurands.csv, result.json and
-    pictures to DIR. Exit status 1 if the measurements
-    contradict the predictions.
+    pictures to DIR. Exit status 1 if the measurements contradict the predictions; with --strict also if a row is not
+    proven or not measured.
     """
     started = time.perf_counter()
     check_number("renders", renders, 2, _MOST_RENDERS)
@@ -132,7 +134,8 @@ def validate_command(
     else:
         one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
         _print_tables(found, reached, station, out, one, explain)
-    raise typer.Exit(0 if found.verdict.agrees else 1)
+    shown = found.verdict.agrees and not (strict and (found.verdict.not_proven or found.verdict.not_measured))
+    raise typer.Exit(0 if shown else 1)
 
 
 def _measured_by(loaded: campaign.Campaign, estimators: str) -> campaign.Campaign:

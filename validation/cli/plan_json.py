@@ -122,6 +122,7 @@ def _setting(row: CheckedSetting) -> dict:
         "edges": row.edges,
         "calibrated": row.calibrated,
         "propagated": row.propagated,
+        "with_bias": row.with_bias,
         "ratio": row.ratio,
         "status": row.status,
         "without_formula": list(row.without_formula),

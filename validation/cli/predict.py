@@ -8,7 +8,7 @@ import typer
 
 import scenes
 from scenes import InvalidInput, Pose, several
-from scenes.status import legend
+from scenes.status import is_trusted, legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from planner import Prediction
 
 commands = commands()
+_MOST_TOLD = 8  # pictures whose doubtful edges are told of
 
 
 @commands.command("predict")
@@ -35,15 +36,33 @@ def predict_command(
     pictures = _pictures(loaded, *poses)
     import planner
 
-    rows = [_facts(picture, planner.predict(picture, model=model)) for picture in pictures]
+    found = [planner.predict(picture, model=model) for picture in pictures]
+    rows = [_facts(picture, each) for picture, each in zip(pictures, found, strict=True)]
     if as_json:
         say({"scene": loaded.name, "model": model, "settings": rows}, True, "")
     else:
         console().print(_table(loaded, model, rows))
         for line in legend(each["status"] for row in rows for each in row["measurands"]):
             console().print(f" {line}", highlight=False)
+        for line in doubtful_edges(found):
+            console().print(f" {line}", highlight=False)
     good = all(each["variance"] is not None for row in rows for each in row["measurands"])
     raise typer.Exit(0 if good else 1)
+
+
+def doubtful_edges(found: list[Prediction]) -> list[str]:
+    """Which edges cannot be relied on, and how long and bright they are: a line a picture, at most `_MOST_TOLD`."""
+    from validation.report.cells import pose
+
+    lines = []
+    for each in found:
+        bad = [edge for edge in each.edges if not is_trusted(edge.status)]
+        if bad:
+            told = (f"{e.name} {e.status}, {e.length_px:.3g} px long, contrast {e.contrast:.3g}" for e in bad)
+            place = f"sensor {pose(each.picture.sensor)}, light {pose(each.picture.lights)}"
+            lines.append(f"{place}: {'; '.join(told)} grey levels.")
+    more = [f"and {len(lines) - _MOST_TOLD} more places"] if len(lines) > _MOST_TOLD else []
+    return lines[:_MOST_TOLD] + more
 
 
 def _pictures(scene: scenes.Scene, sensor: Pose | None, light: Any) -> list[scenes.Picture]:

@@ -14,7 +14,7 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import feature_covariances, glanced
 from scenes import InvalidInput, Scene
-from scenes.status import MEANINGS
+from scenes.status import MEANINGS, REMEDIES
 from validation.explore.state import State
 
 
@@ -117,6 +117,7 @@ def _forecast(each: planner.Forecast) -> dict[str, Any]:
         "bias": finite(each.bias_object),
         "status": each.status,
         "why": MEANINGS[each.status],
+        "remedy": REMEDIES[each.status],
     }
 
 

@@ -132,9 +132,11 @@ class Session:
     async def _colour(self, state: State) -> None:
         key = sphere.key(state)
         if self._sphere is None or self._sphere[0] != key:
-            parts, pieces = [], sphere.values(self._scene, state, sphere.cells().poses)
+            parts, places = [], sphere.cells().poses
+            pieces = sphere.values(self._scene, state, places)
             while (part := await self._tools.quickly(next, pieces, None)) is not None:
                 parts.append(part)
+                await self._send({"type": "colouring", "done": sum(map(len, parts)), "total": len(places)})
             self._sphere = key, np.concatenate(parts)
         await self._send({"type": "sphere", **sphere.to_message(self._scene, state, self._sphere[1])})
 

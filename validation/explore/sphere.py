@@ -93,13 +93,17 @@ def _stands(scene: Scene, role: str, pose: np.ndarray, which: int) -> bool:
 
 def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]:
     """Patches and values (N, M) as the page takes them: what `State.shown` says of the chosen measurand."""
-    quantity, chosen = scene.quantities[state.measurand], sigmas[:, state.measurand]
+    quantity, chosen, ratio = scene.quantities[state.measurand], sigmas[:, state.measurand], state.shown != "sigma"
     if state.shown == "ratio":
         chosen = 2 * chosen / quantity.tolerance.half
+    if state.shown == "worst":
+        known = [(m, each.tolerance.half) for m, each in enumerate(scene.quantities) if each.tolerance]
+        chosen = np.max([2 * sigmas[:, m] / half for m, half in known], axis=0)
     return {
         "borders": cells().borders.tolist(),
         "values": [float(f"{value:.4g}") if np.isfinite(value) else None for value in chosen],
-        "what": "2 sigma / tolerance" if state.shown == "ratio" else "sigma",
-        "unit": "" if state.shown == "ratio" else "degrees" if quantity.is_angle else scene.units,
+        "what": "2 sigma / tolerance" if ratio else "sigma",
+        "unit": "" if ratio else "degrees" if quantity.is_angle else scene.units,
+        "shown": state.shown,
         "moving": state.moving,
     }

@@ -8,7 +8,7 @@ from typing import Any
 from scenes import InvalidInput, Picture, Pose, Scene, Setting
 
 SENSOR = -1  # number of the thing that is moved; free lights count from 0
-SHOWN = ("sigma", "ratio")
+SHOWN = ("sigma", "ratio", "worst")
 _FIRST = Pose(35.0, 300.0), Pose(30.0, 225.0)  # where a scene has no settings
 
 
@@ -23,8 +23,9 @@ class State:
         Of the lights that are free.
     measurand : int
         Number of the quantity that is looked at.
-    shown : {"sigma", "ratio"}
-        What colours the sphere: sigma in the object, or 2 sigma over half of the tolerance zone.
+    shown : {"sigma", "ratio", "worst"}
+        What colours the sphere: sigma in the object, 2 sigma over half of the tolerance zone, or the largest such ratio
+        of all measurands that have a tolerance.
     moving : int
         What is moved, and for which the sphere is coloured: `SENSOR`, or the number of a free light.
     """
@@ -39,10 +40,11 @@ class State:
     def first(cls, scene: Scene) -> State:
         """That of the scene's first setting."""
         moving = 0 if scene.free else SENSOR
+        shown = "worst" if any(quantity.tolerance for quantity in scene.quantities) else "sigma"
         if scene.settings:
-            return cls(scene.settings[0].sensor, scene.settings[0].lights, moving=moving)
+            return cls(scene.settings[0].sensor, scene.settings[0].lights, shown=shown, moving=moving)
         lights = tuple(replace(_FIRST[1], azimuth_deg=_FIRST[1].azimuth_deg + 40.0 * i) for i in range(len(scene.free)))
-        return cls(_FIRST[0], lights, moving=moving)
+        return cls(_FIRST[0], lights, shown=shown, moving=moving)
 
     @classmethod
     def of_message(cls, scene: Scene, told: Any) -> State:
@@ -86,9 +88,10 @@ class State:
         return Picture.of(scene, self.sensor, self.lights)
 
     def tolerable(self, scene: Scene) -> State:
-        """Without a ratio where the measurand has no tolerance."""
-        known = scene.quantities[self.measurand].tolerance is not None
-        return self if known else replace(self, shown="sigma")
+        """Without a ratio where the measurand has no tolerance, without the worst where none has one."""
+        zones = [quantity.tolerance for quantity in scene.quantities]
+        known = {"sigma": True, "ratio": zones[self.measurand] is not None, "worst": any(zones)}
+        return self if known[self.shown] else replace(self, shown="sigma")
 
 
 def _number(name: str, value: Any, least: int, most: int) -> int:

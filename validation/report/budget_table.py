@@ -6,7 +6,9 @@ import math
 
 from rich.table import Table
 
+from planner.budgeting.terms import BIAS
 from planner.uncertainty.budget import Budget
+from planner.uncertainty.conformity import COVERAGE
 from scenes.status import doubt, is_trusted
 from validation.report import cells
 
@@ -59,7 +61,9 @@ def sentence(budget: Budget, kind: str, status: str) -> str:
     what = kind if budget.name == kind else f"{kind} {budget.name!r}"
     unit = budget.unit
     if not is_trusted(status):
-        return f"The {what} is not signed: {doubt(status)}"
+        told = math.hypot(*(row.contribution for row in budget.contributions if row.source.startswith(BIAS)))
+        reach = f"{COVERAGE * told:.1g} {unit}" if told > 0 else ""
+        return f"The {what} is not signed: {doubt(status, reach)}"
     return f"The {what} is {budget.value:.{places}f} {unit} +- {budget.U:.{places}f} {unit}, k = {budget.k:.1f}"
 
 

@@ -111,6 +111,7 @@ def _judged(judged: Judged) -> dict[str, object]:
         "propagated": judged.propagated, "empirical": judged.empirical, "n": judged.n, "failed": judged.failed,
         "ratio": judged.ratio, "ratio_low": low, "ratio_high": high, "bias_px": judged.bias,
         "predicted_bias_px": judged.predicted_bias, "rmse_px": judged.rmse, "status": judged.status,
+        "correction_px": judged.correction, "u_bias_px": judged.u_bias,
     }  # fmt: skip
 
 

@@ -59,7 +59,8 @@ def ratio_terms(main: str, methods: int) -> list[str]:
         "* : 1 lies outside the interval, as it does by chance in one row of 20.",
         f'n: noisy pictures. failed: those without a value, one number a method ("{none}": none).' if methods > 1 else
         "n: noisy pictures. failed: those without a value.",
-        "bias: mean error, as predicted and as measured. rmse: root mean square error, sqrt(variance + bias^2).",
+        "bias: what a simulation told and was taken off, and the mean error that is left; of photographs, what is",
+        "predicted, and measured. rmse: root mean square error of what is left, sqrt(variance + bias^2).",
         f"The verdict is about {main}, as are bias and rmse.",
     ]  # fmt: skip
 
@@ -69,7 +70,8 @@ def unit_terms(statuses: Iterable[str], judged: bool) -> list[str]:
     which = "all are judged" if judged else "that of the image is judged"
     return [
         "value: of the object itself. sigma: standard deviation of one picture's; compare it with your tolerance.",
-        f"ratio: of variances, measured / propagated, with its 95 % interval; {which}. bias: mean less value.",
+        f"ratio: of variances, measured / propagated, with its 95 % interval; {which}. bias: mean less value,",
+        "once what a simulation told is taken off; u(bias): standard uncertainty of that.",
         *legend(statuses),
     ]
 
@@ -107,7 +109,7 @@ How to read this
                intensity is not printed, so one scale is free for all rows of ours.
   paper real   What the paper measured on photographs, five a setting, with thresholds of 12.0 and 10.0; N/A is "-".
   failed       Pictures without a value, one number a method: "0 0 0" is none by any of three.
-  bias, rmse   Mean error, and sqrt(variance + bias^2). The predicted bias is that of the edge finder, without noise.
+  bias, rmse   Mean error, and sqrt(variance + bias^2), once the bias that a render of other rays tells is taken off.
   status       ok: value and sigma can be relied on. Others say why not; each that occurs is explained below its table.
   *            1 lies outside the 95 % interval. One row of 20 has it by chance: count them, do not judge one.
   Sidak        With many rows a small p-value occurs by chance. The limit for the smallest of m rows is

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
+from typing import Any
 
 from scenes.status import legend
 from validation.batch.result import Validation
@@ -50,8 +52,8 @@ def ratios(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found, rows)
     columns = [
-        *key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px: predicted",
-        "measured", "rmse, px", "status",
+        *key, f"{rows[0].main.method}: measured / predicted [95 %]", "images", "failed", "bias, px: taken off",
+        "left", "rmse, px", "status",
     ]  # fmt: skip
     lines = [[*cells[row.index], ratio(row.main), str(row.main.n), failed(row), *of_errors(row)] for row in rows]
     terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
@@ -77,7 +79,7 @@ def units(found: Validation) -> Table:
     key, cells = _key(found, rows)
     columns = [
         *key, "measurand", "value", "unit", "sigma: calibrated", "propagated", "measured", "ratio of variances [95 %]",
-        "bias", "status",
+        "bias left", "u(bias)", "status",
     ]  # fmt: skip
     lines = [[*cells[row.index], *of_measurand(each)] for row in rows for each in row.measurands]
     statuses = (each.status for row in rows for each in row.measurands)
@@ -141,6 +143,12 @@ def refused(found: Validation) -> Table:
     return Table("Settings without a result", ["setting", "why"], rows, note, True, _advice(found, "refused"))
 
 
+def _command(found: Validation, identity: dict[str, Any]) -> str:
+    """What does the same again, the scene's file being where it was."""
+    photos = " --photos DIR" if identity.get("photos") else ""
+    return f"`ice validate {shlex.quote(found.scene)} --renders {identity['renders']} --seed {found.seed}{photos}`"
+
+
 def facts(found: Validation, store: RunFile) -> Table:
     identity, machines = store.identity(), store.fact("machines", [])
     facts = {
@@ -154,6 +162,10 @@ def facts(found: Validation, store: RunFile) -> Table:
             ", ".join(f"{key} {value}" for key, value in one.items()) for one in machines
         ),
         "time": f"{found.seconds['wall']:.1f} s with {found.seconds['workers']} workers",
+        "working seconds": ", ".join(
+            f"{name} {value:.1f}" for name, value in found.seconds.items() if name not in ("wall", "workers")
+        ),
+        "command": _command(found, identity),
     }
     lines = [[name, str(value)] for name, value in facts.items()]
     return Table("Facts of the run", ["fact", "value"], lines, words=True, advice=_advice(found, "facts"))

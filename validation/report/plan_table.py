@@ -51,7 +51,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}\n"
         f"  One picture's sigma is {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]};"
         f" in the image {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]}.\n"
-        f"  Least variance {_WHERE[found.objective]}, by {_MODELS[found.model]}; measured from the edges {edges}.\n"
+        f"  Least variance {_WHERE[found.objective]}, by {_MODELS[found.model]}; measured from {edges}.\n"
         + "".join(f"{line}\n" for line in _textures(p))
         + _searched(found, seconds)
     )
@@ -64,7 +64,7 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
         found.scene.title or found.scene.name,
         "The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:",
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}",
-        f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from the edges {edges}.",
+        f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from {edges}.",
         f"  Limited by {found.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance.",
     ]
     for each in p.measurands:
@@ -104,7 +104,7 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         lines.insert(
             0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
         )
-    if found.set_aside:
+    if found.set_aside and found.set_aside[0].variance < found.variance:
         many = len(found.set_aside)
         lines.append(
             f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {_part(found)} of this one's"
@@ -154,11 +154,11 @@ def _trace(found: planner.Plan, units: tuple[str, str]) -> Table:
 
 def _alternating(found: planner.Plan) -> str:
     """What the paper's search comes to."""
-    name = "The paper's search, sensor and light by turns (alternating search)"
+    name = "The paper's alternating search"
     if found.gap is None:
         return name
     if not math.isfinite(found.gap):
-        return f"{name}: it finds no place from which all can be measured"
+        return f"{name} finds no place that can measure all"
     return f"{name}: its variance ends {100 * found.gap:.1f} % above the best"
 
 
@@ -207,7 +207,9 @@ def _as_candidate(found: planner.Plan) -> Candidate:
 def _reading(found: planner.Plan) -> str:
     """What the columns of the candidates are, and what to do with them."""
     several = len(found.prediction.measurands) > 1
-    what = "what is minimised" if several else "its variance in the object and in the image"
+    what = "its variance in the object and in the image"
+    if several:
+        what = "the square of the largest sigma / tolerance" if found.over == "minimax" else "what is minimised"
     return (
         f"  best: the place above, found between the grid's; the others are places of the grid. Beside them {what};\n"
         "  over best: over that of the first row.\n"
@@ -240,13 +242,17 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
         "light",
         f"calibrated, {unit}",
         "propagated",
+        "with u(bias)",
         "ratio",
         "status",
         "not in formulas",
     )
     table = _table(f"\nThe best settings rendered, and measured by {ESTIMATOR}", *columns)
     for row in checked.settings:
-        values = (f"{1e6 * value:.4g}" if math.isfinite(value) else "-" for value in (row.calibrated, row.propagated))
+        values = (
+            f"{1e6 * value:.4g}" if math.isfinite(value) else "-"
+            for value in (row.calibrated, row.propagated, row.minimised)
+        )
         now = "-" if row.rank_after is None else str(row.rank_after)
         ratio = "-" if row.ratio is None else f"{row.ratio:.3f}"
         names = ", ".join(row.without_formula)
@@ -272,7 +278,7 @@ def _gain(best: CheckedSetting, plan: CheckedSetting) -> str:
     """What the proposal gains over the plan, in words."""
     if plan.rank_after is None:
         return f"the plan's picture cannot be measured ({plan.status})"
-    change = best.propagated / plan.propagated - 1
+    change = best.minimised / plan.minimised - 1
     if plan.status != best.status:
         return f"{100 * change:+.1f} % variance, but the plan's picture is {plan.status}"
     small = f", less than effects that are left out may matter ({100 * Tolerance().variance:g} %)"

@@ -17,6 +17,7 @@ from scenes.results import finite
 from scenes.status import MEANINGS, OK, REMEDIES, WORST_FIRST, is_trusted
 
 _WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
+_UNSURE = "what is not exactly known"  # of a bias that is taken off
 _NAMED = 4  # requirements that a sentence names
 
 
@@ -116,7 +117,7 @@ def requirements(
     return tuple(
         Requirement(
             number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
-            sigma=sigmas[m], bias=biases[m], u_bias=u_biases[m] if u_biases else getattr(each, "u_bias", None),
+            sigma=sigmas[m], bias=biases[m], u_bias=u_biases[m] if u_biases else None,
             U=known[each.name].U if each.name in known and math.isfinite(sigmas[m]) else None,
             status=each.status if statuses is None else statuses[m],
             limits=_limits(known[each.name]) if each.name in known else "",
@@ -130,14 +131,16 @@ def measurable_budget(
     variances: Sequence[float] | None = None,
     biases: Sequence[float] | None = None,
     statuses: Sequence[str] | None = None,
+    doubts: Sequence[float] | None = None,
     p: float = 0.95,
 ) -> SceneBudget | None:
     """The budget of those measurands that can be measured in a picture; None where there are none.
 
-    ``variances``, ``biases`` and ``statuses`` of all M as of `planner.budgeting.budgets.budget`.
+    ``variances``, ``biases`` and ``statuses`` of all M as of `planner.budgeting.budgets.budget`; ``doubts`` standard
+    uncertainties of the biases where they are taken off.
     """
-    told, scene = planner.predict(picture).measurands, picture.scene
-    good = [math.isfinite(each.variance_object) for each in told]
+    forecasts, scene = planner.predict(picture).measurands, picture.scene
+    good = [math.isfinite(each.variance_object) for each in forecasts]
     for given in (variances, biases):
         good = [fine and (given is None or math.isfinite(given[m])) for m, fine in enumerate(good)]
     if not all(good):
@@ -152,10 +155,12 @@ def measurable_budget(
         picture = picture.with_scene(scene.model_copy(update={"measurands": tuple(kept)}))
     else:
         places = list(range(len(good)))
-    some = [None if each is None else [each[m] for m in places] for each in (variances, biases, statuses)]
-    arrays = [None if each is None else np.array(each, float) for each in some[:2]]
+    told = {"variances": variances, "biases": biases, "doubts": doubts}
+    known = {name: np.array([each[m] for m in places], float) for name, each in told.items() if each is not None}
+    if doubts is not None:
+        known["doubts"] = {_UNSURE: known["doubts"]}
     try:
-        return budget(picture, variances=arrays[0], biases=arrays[1], statuses=some[2] and tuple(some[2]), p=p)
+        return budget(picture, **known, statuses=statuses and tuple(statuses[m] for m in places), p=p)
     except InvalidInput:
         return None
 

@@ -100,12 +100,14 @@ def of_variances(row: Row, others: list[str]) -> list[str]:
 
 
 def of_errors(row: Row) -> list[str]:
-    """Predicted and measured bias, root mean square error, and status."""
-    return [shift(row.main.predicted_bias), *errors(row.main), row.main.status]
+    """Bias that was taken off, or where none was is predicted, and that is left, rms error, and status."""
+    off = row.main.predicted_bias if row.main.u_bias is None else row.main.correction
+    return [shift(off), *errors(row.main), row.main.status]
 
 
 def of_measurand(each: JudgedMeasurand) -> list[str]:
-    """A measurand in the scene's unit: value, standard deviations, ratio of variances, bias, and status."""
+    """A measurand in the scene's unit: value, standard deviations, ratio of variances, bias, its u, and status."""
     sigmas = (small_sigma(v) for v in (each.calibrated, each.predicted, each.empirical))
     bias = "-" if each.bias is None else f"{each.bias:+.2g}"
-    return [each.name, f"{each.value:.6g}", each.unit, *sigmas, ratio(each), bias, each.status]
+    u = "-" if each.u_bias is None else f"{each.u_bias:.2g}"
+    return [each.name, f"{each.value:.6g}", each.unit, *sigmas, ratio(each), bias, u, each.status]

@@ -47,6 +47,7 @@ def of_budget(found: SceneBudget) -> Station:
         biases=[each.bias_object if math.isfinite(each.bias_object) else None for each in told],
         found=found,
         statuses=found.statuses,
+        u_biases=found.u_bias,
     )
     return Station(found.picture, made, found)
 
@@ -55,16 +56,19 @@ def of_run(campaign: Campaign, found: Validation, store: RunFile) -> Station:
     """The best setting of a run, with what was measured there."""
     row = best(found, halves_of(campaign))
     picture, rows = campaign.case(row.index).picture, row.measurands
-    clean = None if store.identity().get("photos") else _biases(row, store)
-    statuses = [each.status for each in rows]
-    known = measurable_budget(picture, [each.predicted for each in rows], clean, statuses)
+    statuses, about = [each.status for each in rows], {}
+    if any(each.u_bias is not None for each in rows):
+        about = {"doubts": [math.inf if each.u_bias is None else each.u_bias for each in rows]}
+    elif not store.identity().get("photos"):
+        about = {"biases": _biases(row, store)}
+    known = measurable_budget(picture, [each.predicted for each in rows], statuses=statuses, **about)
     made = requirements(
         picture,
         sigmas=[math.sqrt(each.predicted) for each in rows],
         biases=[each.bias for each in rows],
         found=known,
         statuses=statuses,
-        u_biases=[getattr(each, "u_bias", None) for each in rows],
+        u_biases=[each.u_bias for each in rows],
     )
     image = store.image(row.index) if store.has_image(row.index) else None
     return Station(picture, made, known, image, row.index + 1)

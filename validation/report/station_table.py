@@ -15,8 +15,9 @@ from validation.report.requirements import Grade, Requirement
 
 COLUMNS = ("", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "result", "limited by")
 NOTE = (
-    "sigma: standard deviation of one picture's value, by noise. bias: mean error. U: expanded uncertainty, 95 %. "
-    "tolerance: how far the value may lie from the nominal one; U is compared with half of the whole zone."
+    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± what its correction "
+    "is not sure of. U: expanded uncertainty, 95 %. tolerance: how far the value may lie from the nominal one; U is "
+    "compared with half of the whole zone."
 )
 
 
@@ -65,6 +66,7 @@ def _nominal(each: Requirement) -> str:
 def _bias(each: Requirement, places: int) -> str:
     if each.bias is None:
         return "not known"
-    beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}"
+    known = each.u_bias is not None and math.isfinite(each.u_bias)
+    beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}" if known else " ± not known"
     told = f"{each.bias:+.{places}f}"
     return ("0" if float(told) == 0 else told) + beside

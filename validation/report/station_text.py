@@ -18,7 +18,7 @@ def report(found: Sequence[Requirement], title: str) -> Group:
     columns = ("no.", *station_table.COLUMNS[1:])
     rows = ((str(line.number), *map(_plain, line.cells)) for line in station_table.lines(found))
     table = cells.table(title, *columns, rows=rows, words=_WORDS)
-    lines = [Text(f" {station_table.NOTE}"), Text(f"\n{sentence(found)}", style="bold")]
+    lines = [Text(f" {_plain(station_table.NOTE)}"), Text(f"\n{sentence(found)}", style="bold")]
     if step := next_step(found):
         lines.append(Text(f"What to do next. {step}"))
     return Group(table, *lines)

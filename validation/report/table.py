@@ -100,7 +100,7 @@ def _ratios(found: Validation) -> list[Table | Text]:
     uneven = any(row.texture is not None for row in rows)
     table = _table(
         "\nMeasured / propagated variance, with the 95 % chi-square interval",
-        *headings, main, *others, "n", "failed", *["parts px\nsigma"] * uneven, "bias px\npred.", "\nmeas.", "rmse px",
+        *headings, main, *others, "n", "failed", *["parts px\nsigma"] * uneven, "bias px\noff", "\nleft", "rmse px",
         "status",
     )  # fmt: skip
     for row in rows:
@@ -119,7 +119,7 @@ def _measurands(found: Validation) -> list[Table | Text]:
     table = _table(
         "\nAll measurands, in the scene's unit" if _several(found) else "\nThe same in the scene's unit of length",
         *headings, "measurand", "value", "unit", "sigma\ncalibrated", "\npropagated", "\nmeasured", "variances'\nratio",
-        "bias", "status",
+        "bias\nleft", "\nu(bias)", "status",
     )  # fmt: skip
     for row in rows:
         for each in row.measurands:

@@ -8,7 +8,7 @@ const $ = (id) => document.getElementById(id);
 const REST_MS = 250; // without a movement before the long work begins
 let scene = null, state = null, latest = null, number = 0, frame = 0, timer = 0, socket = null;
 const view = new View($("sphere"), moved, choose), picture = new Picture($("picture"), $("caption"));
-window.explore = { view, get state() { return state; }, get number() { return number; }, answered: 0 };
+window.explore = { view, picture, get state() { return state; }, get number() { return number; }, answered: 0 };
 
 connect();
 
@@ -63,10 +63,11 @@ function choose(which) {
 
 function measurand(index) {
   state.measurand = index;
-  if (!scene.measurands[index].tolerance) state.shown = "sigma";
+  if (state.shown === "ratio" && !scene.measurands[index].tolerance) state.shown = "sigma";
   $("measurand").value = index;
   $("shown").value = state.shown;
   $("shown").options[1].disabled = !scene.measurands[index].tolerance;
+  $("shown").options[2].disabled = !scene.measurands.some((each) => each.tolerance);
   ask(true);
 }
 
@@ -92,6 +93,10 @@ const take = {
     view.draw();
   },
   picture(message) { picture.show(message.picture); },
+  colouring({ done, total }) {
+    $("colouring").hidden = done >= total;
+    Object.assign($("coloured"), { max: total, value: done });
+  },
   sphere(message) {
     view.map = message;
     view.draw();
@@ -164,8 +169,8 @@ function poses() {
 
 function legend(map) {
   const limits = range(map.values), bar = $("legend-bar"), who = map.moving < 0 ? "camera" : state.lights.length > 1 ? `lamp ${map.moving + 1}` : "lamp";
-  const name = scene.measurands[state.measurand].name;
-  $("legend-title").textContent = `${map.what} of "${name}"${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is`;
+  const name = map.shown === "worst" ? "the worst of all requirements" : `"${scene.measurands[state.measurand].name}"`;
+  $("legend-title").textContent = `${map.what} of ${name}${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is`;
   $("legend-numbers").replaceChildren();
   const pen = bar.getContext("2d");
   pen.clearRect(0, 0, bar.width, bar.height);

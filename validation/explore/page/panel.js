@@ -34,6 +34,7 @@ export function answer(message, state, choose) {
     status.textContent = "refused";
     status.className = "bad";
     $("why").textContent = message.refused;
+    $("remedy").hidden = true;
     $("connection").textContent = "refused";
     $("shares").replaceChildren();
     return;
@@ -47,12 +48,14 @@ export function answer(message, state, choose) {
   const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
   const glance = message.closely ? "" : " Rims of holes are glanced at while it moves; the close look follows.";
   $("why").textContent = `${chosen.why}${chosen.status !== "ok" && blamed ? ` (${blamed})` : ""}.${glance}`;
+  $("remedy").hidden = !chosen.remedy;
+  $("remedy").lastElementChild.textContent = chosen.remedy.replaceAll("`", "");
   $("connection").textContent = `${$("sigma").textContent}, ${chosen.status}`;
   shares(message);
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
     const made = row([each.name, `${number(each.sigma)} ${each.unit}`, number(each.ratio), number(each.bias, 2),
       element("span", each.status, `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
-    made.title = each.why;
+    made.title = each.remedy ? `${each.why}: ${each.remedy}` : each.why;
     made.onclick = () => choose(i);
     return made;
   }));

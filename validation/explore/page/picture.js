@@ -1,5 +1,7 @@
 // The picture, with what it is measured from drawn over it. Image positions are px, (0, 0) the middle of the first pixel.
 
+import { Labels } from "./labels.js";
+
 const STATUS = { ok: "#27c26c", clutter: "#f2b01e" }, RARE = "#ff5a4f";
 const CHI2 = Math.sqrt(5.991); // of 95 % with two degrees of freedom
 const NICE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000];
@@ -28,23 +30,27 @@ export class Picture {
     pen.imageSmoothingEnabled = scale * width / this.image.width < 2;
     pen.drawImage(this.image, dx, 0, scale * width, scale * height);
     const at = ([x, y]) => [dx + (x + 0.5 - left) * scale, (y + 0.5 - top) * scale];
-    if (this.overlay) this.over(pen, at, scale);
+    this.labels = new Labels(pen, wide, high);
+    if (this.overlay) this.over(pen, at, scale, this.labels);
   }
 
-  over(pen, at, scale) {
-    for (const { name, status, points } of this.overlay.lines) {
+  over(pen, at, scale, labels) {
+    // the one that limits is named first, so that it is sure to have its name
+    const lines = [...this.overlay.lines].sort((a, b) => (b.name === this.limiting) - (a.name === this.limiting));
+    for (const { name, status, points } of lines) {
       pen.strokeStyle = STATUS[status] || RARE;
       pen.lineWidth = name === this.limiting ? 3 : 1.3;
       pen.beginPath();
       points.forEach((point) => pen.lineTo(...at(point)));
       pen.stroke();
-      const [x, y] = at(points[Math.floor((points.length - 1) / 2)]), [u, v] = at(points[Math.ceil(points.length / 2)]);
-      pen.font = "11px system-ui";
-      pen.fillStyle = "#fff";
-      pen.strokeStyle = "#000";
-      pen.lineWidth = 3;
-      pen.strokeText(name, (x + u) / 2 + 4, (y + v) / 2 - 4);
-      pen.fillText(name, (x + u) / 2 + 4, (y + v) / 2 - 4);
+    }
+    for (const { name, points } of lines) {
+      const along = (part) => {
+        const k = part * (points.length - 1), low = Math.floor(k), high = Math.ceil(k), [x, y] = at(points[low]), [u, v] = at(points[high]);
+        return [x + (k - low) * (u - x), y + (k - low) * (v - y)];
+      };
+      const middles = [0.5, 0.35, 0.65, 0.2, 0.8].flatMap((part) => labels.beside(name, ...along(part), 4, 11));
+      labels.write(name, middles, 11, { ink: "#fff", halo: "#000" });
     }
     const half = this.overlay.corners.map(({ covariance: c }) => axes(c)), most = Math.max(0, ...half.map(([a]) => a * CHI2 * scale));
     const factor = most ? NICE.filter((n) => n * most <= 26).pop() || 1 : 0;

@@ -1,5 +1,7 @@
 // The sphere of places around the object, by parallel projection; angles in degrees, polar from +z, azimuth from +x.
 
+import { Labels } from "./labels.js";
+
 const OBJECT = 0.5, GRAB = 26;
 // matplotlib's cividis at twelve even places
 const MAP = ["00224e", "013271", "2f426d", "48526c", "5e636f", "727374", "878478", "9d9576", "b6a96f", "cebc63", "e7d150", "fee838"]
@@ -117,6 +119,7 @@ export class View {
     Object.assign(this, { cx: wide / 2, cy: 0.6 * high, scale: Math.min(0.43 * wide, 0.54 * high) });
     const pen = this.canvas.getContext("2d"), axes = this.axes();
     pen.scale(ratio, ratio);
+    this.labels = new Labels(pen, wide, high);
     this.patches(pen, axes, false);
     this.rings(pen, axes);
     this.object(pen, axes);
@@ -159,11 +162,9 @@ export class View {
     pen.beginPath();
     for (let a = 0; a <= 360; a += 5) pen.lineTo(...this.place(direction([90, a]), axes).slice(0, 2));
     pen.stroke();
-    pen.fillStyle = "#8a93a0";
-    pen.font = "11px system-ui";
     for (let a = 0; a < 360; a += 90) {
       const [x, y] = this.place(direction([90, a]).map((v) => 1.07 * v), axes);
-      pen.fillText(`${a}°`, x - 8, y + 4);
+      this.labels.write(`${a}°`, [[x, y], [x, y - 6], [x, y + 6]], 11, { ink: "#5b6575" });
     }
   }
 
@@ -213,13 +214,12 @@ export class View {
       pen.fill();
       pen.stroke();
       pen.globalAlpha = 1;
-      const text = `${name}${z < 0 ? " (behind)" : ""}`;
-      pen.font = `${chosen ? 600 : 400} 13px system-ui`;
-      pen.lineWidth = 4;
-      pen.strokeStyle = "#fff";
-      pen.strokeText(text, x + 15, y + 5);
-      pen.fillStyle = "#111";
-      pen.fillText(text, x + 15, y + 5);
     }
+    const spots = this.things().map((each) => ({ ...each, at: this.place(direction(each.pose), axes) }));
+    spots.forEach(({ at: [x, y] }) => this.labels.keep(x - 11, y - 11, 22, 22));
+    spots.forEach(({ which, name, at: [x, y, z] }) => {
+      const text = `${name}${z < 0 ? " (behind)" : ""}`;
+      this.labels.write(text, this.labels.beside(text, x, y, 11, 13), 13, { weight: which === this.state.moving ? 600 : 400 });
+    });
   }
 }
