@@ -7,7 +7,6 @@ ray through the place meets the face's plane.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from imaging.pictures import Pictures
 from scenes import Edge, Solid
 
 _MAGNIFIED = 2.0  # by a lens that bends, at most, where boundaries are looked for
-_SLIGHT = np.cos(np.radians(6.0))  # facets of a round wall are told from its shading by the third digit
 _STEP = 0.01  # px; levels are differentiated forwards
 _SUPPORT = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2  # fractions of an edge's image at which levels are computed
 
@@ -128,21 +126,13 @@ def _pairs(pictures: Pictures, places: Places, far: float) -> tuple[np.ndarray, 
     along = [end[..., 0] * t[..., 0] + end[..., 1] * t[..., 1] for end in ends]
     across = [end[..., 1] * t[..., 0] - end[..., 0] * t[..., 1] for end in ends]
     sides = facing(bodies, pictures.sensor_at)[:, [edge.faces for edge in bodies.edges]]
-    seen = np.where(slight(bodies), sides.sum(-1) == 1, sides.any(-1))[:, None]
+    slight = np.array([edge.name in bodies.slight for edge in bodies.edges], bool)
+    seen = np.where(slight, sides.sum(-1) == 1, sides.any(-1))[:, None]
     beside = (np.minimum(*across) < far) & (np.maximum(*across) > -far)
     reached = (np.maximum(*along) > places.fractions.min(-1)[..., None] * lengths - far) & (
         np.minimum(*along) < places.fractions.max(-1)[..., None] * lengths + far
     )
     return np.nonzero(seen & beside & reached)
-
-
-@lru_cache(maxsize=64)
-def slight(solid: Solid) -> np.ndarray:
-    """Edges inside of a curved surface at which it bends little: no boundary where both sides are seen; bool, (J,)."""
-    faces = np.array([edge.faces for edge in solid.edges], int).reshape(-1, 2)
-    one, two = solid.normals[faces[:, 0]], solid.normals[faces[:, 1]]
-    inside = np.array([edge.kind == "smooth" for edge in solid.edges], bool)
-    return inside & ((one * two).sum(1) >= _SLIGHT)
 
 
 def _seen_from(pictures: Pictures, places: Places, pairs) -> tuple[np.ndarray, np.ndarray]:

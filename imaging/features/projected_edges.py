@@ -193,5 +193,7 @@ def _trim(solid: Solid, edge: Edge, end: int, corners: dict, seen: np.ndarray, c
         sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
-        trim = np.where(seen[..., list(other.faces)].any(-1), np.fmax(trim, needed), trim)
+        sides = seen[..., list(other.faces)]
+        there = sides.sum(-1) == 1 if other.name in solid.slight else sides.any(-1)
+        trim = np.where(there, np.fmax(trim, needed), trim)
     return trim

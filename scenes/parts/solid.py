@@ -15,6 +15,7 @@ from scenes.parts.curved import Curved
 if TYPE_CHECKING:
     import trimesh
 
+_SLIGHT = np.cos(np.radians(6.0))  # facets of a round wall are told from its shading by the third digit
 _MANY = 2000  # vertices, of which those on the convex hull are looked for; faces at a time
 _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
 
@@ -191,6 +192,18 @@ class Solid:
     def sharp(self) -> tuple[Edge, ...]:
         """The sharp edges: those of the part itself, by which it can be measured."""
         return tuple(edge for edge in self.edges if edge.kind == "sharp")
+
+    @cached_property
+    def slight(self) -> frozenset[str]:
+        """Names of the edges inside of curved surfaces at which it bends by less than 6 degrees.
+
+        They are of the facets, not of the part: no boundary where both sides are seen.
+        """
+        smooth = [edge for edge in self.edges if edge.kind == "smooth"]
+        one, two = self.normals[np.array([edge.faces for edge in smooth], int).reshape(-1, 2)].swapaxes(0, 1)
+        return frozenset(
+            edge.name for edge, cosine in zip(smooth, (one * two).sum(1), strict=True) if cosine >= _SLIGHT
+        )
 
     def length(self, edge: Edge) -> float:
         """Of an edge, scene units."""

@@ -186,8 +186,8 @@ def test_bends_of_a_round_wall_are_boundaries_where_one_side_is_hidden():
     scene = scenes.load("bracket_mm")
     solid = scene.solid
     smooth = np.array([edge.kind == "smooth" for edge in solid.edges])
-    assert boundaries.slight(solid).tolist() == smooth.tolist()
-    assert not boundaries.slight(mesh.solid(trimesh.creation.cylinder(3, 10, sections=48))).any()  # 7.5 degrees
+    assert [edge.name in solid.slight for edge in solid.edges] == smooth.tolist()
+    assert not mesh.solid(trimesh.creation.cylinder(3, 10, sections=48)).slight  # 7.5 degrees
     pictures = Pictures.of(scene, np.array([[40.0, 30.0]]), np.array([[30.0, 100.0]]))
     names = (solid.sharp[0].name,)
     places = boundaries.Places(names, np.array([[[0.1, 0.9]]]), np.zeros((1, 1, 2, 2, 2)), np.zeros((1, 1, 2, 2, 2)))
