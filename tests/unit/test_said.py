@@ -177,7 +177,7 @@ def test_the_level_of_a_verdict_is_said_in_percent():
 @pytest.mark.parametrize(("methods", "said"), [(1, "without a value."), (3, 'one number a method ("0 0 0": none).')])
 def test_failures_are_told_by_method(methods, said):
     assert guide.ratio_terms("gradient", methods)[1].endswith(said)
-    assert guide.ratio_terms("gradient", methods)[3] == "The verdict is about gradient, as are bias and rmse."
+    assert guide.ratio_terms("gradient", methods)[4] == "The verdict is about gradient, as are bias and rmse."
 
 
 def test_a_plan_is_checked_by_ten_renders_where_they_are_small():
