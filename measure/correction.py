@@ -18,7 +18,7 @@ from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
-from measure.quantities import find
+from measure.quantities import Found, find
 from scenes import InvalidInput, Picture, Quantity
 from scenes.status import MEASURED
 from scenes.status import corrected as status_corrected
@@ -144,13 +144,14 @@ def correction(
     told = propagated or propagate(images.renders[0], picture, estimator=estimator, threshold=threshold).measurands
     steps = [(name, image) for name, some in images.changed.items() for image in some]
     stack = [*images.renders, *images.beside, *(image for _, image in steps)]
-    value, value_image = _measured(stack, picture, estimator, threshold)
+    value, value_image, found = _measured(stack, picture, estimator, threshold)
     renders, alike = len(images.renders), len(images.renders) + len(images.beside)
     known = measurands(Pictures.of(picture))
     bias, bias_image = value[:renders].mean(0) - known.value_object, value_image[:renders].mean(0) - known.value
+    noise = _noise_of_renders(found, alike)
     object_, image = (
         {
-            **_by_rays(each[:alike], renders, np.sqrt(np.diag(spread))),
+            **_by_rays(each[:alike], renders, _scaled(noise, spread)),
             **_by_steps([name for name, _ in steps], each[alike:] - each[0]),
             **{name: pair[k] for name, pair in images.known.items()},
         }
@@ -162,29 +163,58 @@ def correction(
     )  # fmt: skip
 
 
-def _measured(stack: list[np.ndarray], picture: Picture, estimator: str, threshold: float | None) -> Pair:
-    """Values (n, M) in n noise-free images, in the object and in the image; NaN where there is none."""
+def _measured(
+    stack: list[np.ndarray], picture: Picture, estimator: str, threshold: float | None
+) -> tuple[np.ndarray, np.ndarray, Found]:
+    """Values (n, M) in n noise-free images, in the object and in the image, NaN where there is none, and features."""
     camera, noise = picture.scene.camera, picture.scene.noise
     size = camera.height, camera.width
     found = find(
         np.stack([recorded(noise, checked_image(image, size))[0] for image in stack]), picture, estimator, threshold
     )
     measured = np.isin(found.status, MEASURED)
-    return np.where(measured, found.plane.value, np.nan), np.where(measured, found.image.value, np.nan)
+    return np.where(measured, found.plane.value, np.nan), np.where(measured, found.image.value, np.nan), found
 
 
-def _by_rays(values: np.ndarray, renders: int, sigma: np.ndarray) -> dict[str, np.ndarray]:
+def _by_rays(values: np.ndarray, renders: int, pooled: np.ndarray) -> dict[str, np.ndarray]:
     """Standard uncertainty of the mean of the first ``renders`` of values (n, M) by the renderer's noise.
 
-    Few renders tell the scatter of one quantity badly: it counts as no less than the root mean square of all of them,
-    each over its own sigma.
+    Few renders tell the scatter of one quantity badly: it counts as no less than what all lines and circles together
+    tell, ``pooled`` (M,).
     """
     if len(values) < 2:
         return {RENDERING: np.full(values.shape[1], np.inf)}
-    own = values.std(0, ddof=1)
-    parts = own[np.isfinite(own) & np.isfinite(sigma)] / sigma[np.isfinite(own) & np.isfinite(sigma)]
-    pooled = np.sqrt(np.mean(parts**2)) * sigma if parts.size else np.inf
-    return {RENDERING: np.fmax(own, pooled) / np.sqrt(renders)}
+    return {RENDERING: np.fmax(values.std(0, ddof=1), pooled) / np.sqrt(renders)}
+
+
+def _scaled(noise: float, covariance: np.ndarray) -> np.ndarray:
+    """A part of the standard deviations of a covariance (M, M); infinite where there is no value."""
+    variance = np.diag(covariance)
+    known = np.isfinite(variance)
+    return np.where(known, noise * np.sqrt(np.where(known, variance, 1.0)), np.inf)
+
+
+def _noise_of_renders(found: Found, alike: int) -> float:
+    """Scatter of lines and circles over the first images, which differ by rays alone, over that by the camera's noise.
+
+    Root mean square of all their parameters, each feature's made independent by its own covariance; 0 of one image,
+    infinite where no feature is found in all of them.
+    """
+    shape, features = found.shape, []
+    across = np.stack([-shape.normals[..., 1], shape.normals[..., 0]], -1)
+    offset = np.einsum("nej,ej->ne", shape.points - shape.points[0], shape.normals[0])
+    turn = np.einsum("nej,ej->ne", shape.normals, across[0])
+    for e in range(shape.normals.shape[1]):
+        some = slice(2 * e, 2 * e + 2)
+        features.append((np.stack([offset[:, e], turn[:, e]], -1), shape.lines[0, some, some]))
+    features += [(circle.errors, circle.covariance[0]) for circle in found.circles]
+    squares, count = 0.0, 0
+    for moved, covariance in features:
+        if alike > 1 and np.isfinite(moved[:alike]).all() and np.isfinite(covariance).all():
+            away = moved[:alike] - moved[:alike].mean(0)
+            squares += float(np.einsum("ni,ij,nj", away, np.linalg.pinv(covariance, hermitian=True), away))
+            count += away.shape[1] * (alike - 1)
+    return float(np.sqrt(squares / count)) if count else (0.0 if alike == 1 else np.inf)
 
 
 def _by_steps(names: list[str], moved: np.ndarray) -> dict[str, np.ndarray]:

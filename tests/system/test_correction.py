@@ -191,3 +191,22 @@ def test_lights_stand_a_step_beside():
 def _unit(pose):
     polar, azimuth = np.radians([pose.polar_deg, pose.azimuth_deg])
     return np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+
+
+def test_the_renders_noise_is_told_by_all_lines(small):
+    """Images that are noisier copies of one: r times the camera's noise on each pixel is r sigma of each value."""
+    picture = Picture.of(small, (30, 90), (15, 270))
+    exact, rng, share = (
+        block_image(small, *map(list, (picture.sensor, picture.lights[0]))),
+        np.random.default_rng(3),
+        0.25,
+    )
+    sigma = share * small.noise.sigma
+    told = []
+    for _ in range(20):
+        renders = tuple(exact + sigma * rng.normal(size=exact.shape) for _ in range(3))
+        off = measure.correction(Images(renders), picture)
+        told.append(off.sources["rendering"][0] * np.sqrt(3) / off.sigma[0])
+    # margin: 20 x 16 independent numbers tell it to 4 %, and no less than the value's own scatter counts
+    assert np.median(told) == pytest.approx(share, rel=0.25)
+    assert min(told) > share / 2
