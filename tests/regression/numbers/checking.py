@@ -181,7 +181,7 @@ _PRINTED = {
     "predict": ["predict", _UNEVEN], "predict bound": ["predict", _UNEVEN, "--model", "bound", *_POSES],
     "predict blocks": ["predict", "task1", "--model", "paper"], "budget": ["budget", _UNEVEN, "--reach", "0.04"],
     "effects": ["effects", _UNEVEN], "show": ["show", _UNEVEN], "show plate": ["show", "plate"], "scenes": ["scenes"],
-    "measure": ["measure", "shot.npy", _UNEVEN, *_POSES], "compare": ["compare", "run", _REFERENCE],
+    "measure": ["measure", "shot.npy", _UNEVEN, *_POSES, "--as-measured"], "compare": ["compare", "run", _REFERENCE],
     "measure a photograph": ["measure", "shot.npy", "--kind", "quadrilateral", "--json"],
     "plan": ["plan", "wedge", "--step", "45", "--no-check", "--sensor", "31,133"],
     "plan views": ["plan", "calibrated_rig", "--step", "60", "--no-check", "--views", "2"],
