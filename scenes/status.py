@@ -140,8 +140,8 @@ def doubt(status: str, bias: str = "") -> str:
 def legend(statuses: Iterable[str]) -> list[str]:
     """What each status that is not trusted means, and what to do about it, one line each.
 
-    >>> legend(["ok", "compressed"])[0][-51:]
-    'small; save pictures without compression (PNG, TIFF).'
+    >>> legend(["ok", "compressed"])[0].split("; ")[1]
+    'save pictures without compression (PNG, TIFF).'
     """
     return [f"{name}: {MEANINGS[name]}; {REMEDIES[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
 
