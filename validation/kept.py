@@ -26,7 +26,7 @@ import render
 import scenes
 from measure import Correction
 from render import variant as variants
-from scenes import Picture
+from scenes import ImageTexture, Picture
 from scenes.status import ALL
 from validation import simulation
 from validation.remeasured import Method
@@ -79,6 +79,9 @@ def _digest(picture: Picture, method: Method, how: How) -> str:
     for part in (bodies.vertices, bodies.triangles):
         made.update(np.ascontiguousarray(part).tobytes())
     made.update(repr(picture.scene.solid.curved).encode())
+    for texture in picture.scene.textures:
+        if isinstance(texture, ImageTexture):  # whose file may have changed
+            made.update(np.ascontiguousarray(texture.levels).tobytes())
     made.update(_code())
     return made.hexdigest()[:32]
 

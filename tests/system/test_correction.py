@@ -9,10 +9,10 @@ import measure
 import planner
 import render
 from measure import Images
-from scenes import InvalidInput, Picture, Pose
+from scenes import ImageTexture, InvalidInput, Picture, Pose
 from scenes.status import corrected
 from tests.oracle import block_image
-from validation import kept, simulation
+from validation import kept, picture_file, simulation
 from validation.remeasured import Method
 from validation.report import budget_table
 
@@ -157,6 +157,18 @@ def test_the_simulation_is_kept(small, tmp_path, monkeypatch):
     kept.correction(brighter, method)
     assert len(made) == 6
     assert len(list(tmp_path.rglob("*.json"))) == 2
+
+
+def test_a_picture_on_the_part_that_has_changed_is_another_scene(task1, tmp_path):
+    """At the same path; the same picture written once more is not."""
+    place = {"origin": (3.0, 5.5, 2.5), "direction": (1, 0, 0), "width": 6.0, "height": 3.0}
+    named = []
+    for level in (10.0, 10.0, 12.0):
+        picture_file.write(tmp_path / "a.png", np.full((8, 16), level))
+        label = ImageTexture(kind="image", face="top", file=tmp_path / "a.png", **place)
+        scene = task1.model_copy(update={"textures": (label,)})
+        named.append(kept._digest(Picture.of(scene, (30, 90), (15, 270)), Method("gradient"), simulation.How()))
+    assert named[0] == named[1] != named[2]
 
 
 def test_what_is_not_signed_says_how_large_the_bias_may_be(small):
