@@ -28,7 +28,7 @@ from planner.search.objective import (
     SearchProblem,
     check_choice,
 )
-from planner.search.setting_up import SettingUp, printed
+from planner.search.setting_up import SettingUp
 from planner.search.varying import Variation
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
@@ -130,8 +130,8 @@ class Plan(Shown):
         ]
 
     def _line(self) -> str:
-        lights = " ".join(map(printed, several(self.light)))
-        return f"{self.scene.name}: sensor {printed(self.sensor)}, light {lights}; {self.prediction.told}"
+        lights = " ".join(pose.printed for pose in several(self.light))
+        return f"{self.scene.name}: sensor {self.sensor.printed}, light {lights}; {self.prediction.told}"
 
 
 def plan(

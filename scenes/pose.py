@@ -11,6 +11,8 @@ from pydantic import BeforeValidator, PlainSerializer
 
 from scenes.errors import InvalidInput, given
 
+DIGITS = 1  # decimal places of a pose's angles, degrees, wherever it is planned, printed or stored
+
 
 @dataclass(frozen=True, order=True)
 class Pose:
@@ -45,6 +47,17 @@ class Pose:
             object.__setattr__(self, name, float(value))
         if not 0 <= self.polar_deg <= 180:
             raise InvalidInput(f"polar_deg must be between 0 and 180, got {self.polar_deg:g}")
+
+    @property
+    def printed(self) -> str:
+        """As tables and lines print it.
+
+        Examples
+        --------
+        >>> Pose(41.6, 222.13).printed
+        '(41.6, 222.1)'
+        """
+        return f"({self.polar_deg:.{DIGITS}f}, {self.azimuth_deg:.{DIGITS}f})"
 
     @classmethod
     def of(cls, value: Any) -> Pose:

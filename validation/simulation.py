@@ -113,12 +113,13 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
 def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
     renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
-    images = _completed(alike, renders, (), how)
-    found = measure.correction(images, alike, method.locator, method.threshold)
+    images, asked = _completed(alike, renders, (), how), (method.locator, method.threshold)
+    told = measure.propagate(renders[0], alike, estimator=method.locator, threshold=method.threshold).measurands
+    found = measure.correction(images, alike, *asked, told)
     while len(renders) < _MOST and not _is_quiet(found):
         renders = (*renders, how.image(alike, len(renders)))
         images = replace(images, renders=renders)
-        found = measure.correction(images, alike, method.locator, method.threshold)
+        found = measure.correction(images, alike, *asked, told)
     if alike is picture or alike.scene == picture.scene:
         return found
     spread = texture_errors(Pictures.of(picture)).variances

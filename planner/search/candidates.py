@@ -22,8 +22,9 @@ from planner.search.grid import APART, Feasible, Grid, as_array, as_poses, disti
 from planner.search.lights import Mixture, best_lights
 from planner.search.local import Partial, alternating
 from planner.search.objective import Report, SearchProblem, minimised
-from planner.search.setting_up import DIGITS, rounded
+from planner.search.setting_up import rounded
 from scenes import Picture, Pose
+from scenes.pose import DIGITS
 from scenes.status import is_trusted
 
 DEAREST = 4.0  # times the least variance that is paid for trust: standard deviations are twice as large

@@ -15,11 +15,11 @@ import numpy as np
 from planner.ranks import quantity_ranks
 from planner.search.local import shifted
 from planner.search.objective import SearchProblem
-from scenes import Pose, Scene, status
+from scenes import Scene, status
+from scenes.pose import DIGITS
 from scenes.status import WORST_FIRST
 from scenes.uncertain import Uncertain
 
-DIGITS = 1  # of a pose's angles, degrees
 AROUND = 0.2  # degrees: how far off everything has to be measurable, at least
 _STEEPEST = 4.0  # times the variance that is lost by standing so far off: standard deviations are twice as large
 _SHELLS = (0.4, 0.8, 1.6, 3.2)  # degrees from an optimum that cannot be set up
@@ -127,17 +127,6 @@ def rounded(poses: np.ndarray) -> np.ndarray:
     found = np.round(poses, DIGITS)
     found[..., 1::2] %= 360
     return found
-
-
-def printed(pose: Pose) -> str:
-    """A pose as everything prints it.
-
-    Examples
-    --------
-    >>> printed(Pose(41.6, 222.1))
-    '(41.6, 222.1)'
-    """
-    return f"({pose.polar_deg:.{DIGITS}f}, {pose.azimuth_deg:.{DIGITS}f})"
 
 
 def _moved(sensor: np.ndarray, lights: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
