@@ -45,6 +45,8 @@ class Correction:
         Of the values by noise, propagated in the noise-free image.
     simulated : tuple of str
         Statuses of the values there.
+    renders : int
+        How many independent renders the biases are the mean of.
     """
 
     quantities: tuple[Quantity, ...]
@@ -57,6 +59,7 @@ class Correction:
     covariance: np.ndarray
     covariance_image: np.ndarray
     simulated: tuple[str, ...]
+    renders: int = 1
 
     @property
     def u_bias(self) -> np.ndarray:
@@ -67,6 +70,16 @@ class Correction:
     def u_bias_image(self) -> np.ndarray:
         """The same in the image."""
         return _together(self.sources_image, self.bias_image)
+
+    @property
+    def beside(self) -> np.ndarray:
+        """Standard deviations (M,) by the renderer's noise of what one more render's biases differ from `bias` by."""
+        return self.sources[RENDERING] * np.sqrt(1 + self.renders)
+
+    @property
+    def beside_image(self) -> np.ndarray:
+        """The same in the image."""
+        return self.sources_image[RENDERING] * np.sqrt(1 + self.renders)
 
     @property
     def sigma(self) -> np.ndarray:
@@ -159,7 +172,7 @@ def correction(
     )
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
-        told.covariance, told.covariance_image, told.status,
+        told.covariance, told.covariance_image, told.status, renders,
     )  # fmt: skip
 
 

@@ -48,6 +48,7 @@ class _Kept(BaseModel):
     covariance: list[_Numbers]
     covariance_image: list[_Numbers]
     simulated: list[Annotated[str, Field(max_length=40)]]
+    renders: Annotated[int, Field(ge=1, le=1000)]
 
 
 def correction(picture: Picture, method: Method, how: How = How()) -> Correction:
@@ -107,7 +108,7 @@ def _read(file: Path, picture: Picture, method: Method) -> Correction | None:
         quantities, method.locator, method.threshold, _array(kept.bias), _array(kept.bias_image),
         {name: _array(some, np.inf) for name, some in kept.sources.items()},
         {name: _array(some, np.inf) for name, some in kept.sources_image.items()},
-        *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated),
+        *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated), kept.renders,
     )  # fmt: skip
     vectors = (found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values())
     whole = all(each.shape == (count,) for each in vectors)
@@ -132,7 +133,7 @@ def _write(file: Path, found: Correction) -> None:
     facts = {
         "bias": found.bias, "bias_image": found.bias_image, "sources": found.sources,
         "sources_image": found.sources_image, "covariance": found.covariance,
-        "covariance_image": found.covariance_image, "simulated": list(found.simulated),
+        "covariance_image": found.covariance_image, "simulated": list(found.simulated), "renders": found.renders,
     }  # fmt: skip
     part = file.with_suffix(f".{os.getpid()}")
     with suppress(OSError):

@@ -14,7 +14,7 @@ from scenes.status import OK, counted, is_trusted
 
 LEVEL = 0.01  # of false alarm, of a whole verdict
 SHARES = {"rows": 0.45, "pooled": 0.45, "bias": 0.10}  # of that level, by test
-ALLOWANCE = 0.3  # sigma of one image: adds 4 % to its root mean square error
+ALLOWANCE = 0.3  # standard uncertainties of one value: adds 4 % to its root mean square error
 STRAY = 0.01  # of a row's images may be lost; with more the rest is a selection, whose scatter says nothing
 
 
@@ -90,7 +90,8 @@ class Bias:
     rows : int
         Rows judged.
     allowance : float
-        What a mean error may differ from the predicted one, in predicted sigmas of one image.
+        What a mean error may differ from the predicted one, in standard uncertainties of one value: its predicted sigma
+        and what its bias is not sure of together.
     largest : float
         The largest difference, in the same unit.
     significant : int
@@ -159,6 +160,8 @@ def verdict(
     bias_px: ArrayLike | None = None,
     predicted_bias_px: ArrayLike = 0.0,
     sigma_px: ArrayLike | None = None,
+    u_bias_px: ArrayLike = 0.0,
+    render_noise_px: ArrayLike = 0.0,
     status: ArrayLike = OK,
     independent: ArrayLike = 1.0,
 ) -> Verdict:
@@ -166,10 +169,10 @@ def verdict(
 
     Three tests share the level (Bonferroni, so whatever they have to do with each other; `SHARES`): the variance of
     each row, the variance of all rows pooled, and the mean error of each row that is ``ok``. The last asks what is
-    relevant as well as significant. Its hypothesis is that the mean error lies within `ALLOWANCE` sigma of the
-    predicted one, and a p-value is taken at the end of that interval (a minimum-effect test, as in Murphy and Myors
-    1999): a bias that no single image would show is forgiven however many images prove it, and a small run, which could
-    not show that a bias is small, is not blamed for it. With 1000 images the allowance is 9.5 standard errors wide, so
+    relevant as well as significant. Its hypothesis is that the mean error lies within `ALLOWANCE` standard
+    uncertainties of the predicted one, sqrt(sigma^2 + u_bias^2) of one value, and a p-value is taken at the end of that
+    interval (a minimum-effect test, as in Murphy and Myors 1999): a bias that no single image would show is forgiven
+    however many images prove it, and a small run, which could not show that a bias is small, is not blamed for it. With 1000 images the allowance is 9.5 standard errors wide, so
     a small share of the level costs this test hardly any power.
 
     Parameters
@@ -183,6 +186,11 @@ def verdict(
     bias_px, predicted_bias_px, sigma_px : array_like
         Measured and predicted mean error and predicted standard deviation (not variance) of one image, px. Without the
         first nothing is said of biases.
+    u_bias_px : array_like
+        Standard uncertainty (not variance) of the predicted mean error, px; NaN counts as 0.
+    render_noise_px : array_like
+        Standard deviation (not variance) of measured less predicted mean error by the renderer's own noise, which no
+        number of noisy copies of one render averages out, px; NaN counts as 0.
     status : array_like of str
         Of each row; what is not trusted (`scenes.status`) promises nothing: neither agreement nor contradiction.
     independent : array_like
@@ -209,16 +217,15 @@ def verdict(
     rows, missing, doubts = int(judged.sum()), int((~measured).sum()), Counter(status[measured & ~judged].tolist())
     if not rows:
         return _nothing(ratios.size, missing, dict(doubts), level)
-    away = np.full(ratios.shape, np.nan)
+    away, known = np.full(ratios.shape, np.nan), np.array(counts, float)
     if bias_px is not None:
-        with np.errstate(all="ignore"):  # what is not finite then is not judged
-            away[:] = np.subtract(bias_px, predicted_bias_px, dtype=float) / np.asarray(sigma_px, float)
+        away[:], known = _mean_errors(bias_px, predicted_bias_px, sigma_px, counts, u_bias_px, render_noise_px)
     promised = judged & np.isfinite(away)
     levels = _levels(level, promised.any())
     p_values, limit = _p_values(ratios[judged], counts[judged]), sidak(levels["rows"], rows)
     smallest = float(p_values.min())
     pooled = _pooled(ratios[judged], shares[judged] * (counts[judged] - 1), levels["pooled"])
-    bias = bias_test(away[promised], counts[promised], levels["bias"]) if "bias" in levels else None
+    bias = bias_test(away[promised], known[promised], levels["bias"]) if "bias" in levels else None
     broken = {
         "rows": smallest < limit,
         "pooled": pooled.p_value < pooled.limit,
@@ -229,6 +236,20 @@ def verdict(
     inside = int((p_values >= 0.05).sum())  # as much as 1 lying in the 95 % interval
     found = Verdict(not reasons, rows, inside, smallest, limit, "", missing, dict(doubts), pooled, bias, reasons)
     return replace(found, text=_text(found, level))
+
+
+def _mean_errors(
+    bias: ArrayLike, predicted: ArrayLike, sigma: ArrayLike, counts: np.ndarray, u_bias: ArrayLike, noise: ArrayLike
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean errors less predicted ones in standard uncertainties of one value, and how many images would tell as much.
+
+    What is not finite then is not judged.
+    """
+    variance = np.square(np.asarray(sigma, float))
+    with np.errstate(all="ignore"):
+        whole = variance + np.nan_to_num(np.square(np.asarray(u_bias, float)), nan=0.0, posinf=np.inf)
+        scatter = variance / counts + np.nan_to_num(np.square(np.asarray(noise, float)), nan=0.0, posinf=np.inf)
+        return np.subtract(bias, predicted, dtype=float) / np.sqrt(whole), whole / scatter
 
 
 def _nothing(rows: int, missing: int, doubts: dict[str, int], level: float) -> Verdict:
@@ -264,9 +285,9 @@ def bias_p_value(difference: ArrayLike, n: ArrayLike, allowance: float = ALLOWAN
     Parameters
     ----------
     difference : array_like
-        Mean of n errors less its prediction, in sigmas of one image (predicted, which is what a user is told).
+        Mean of n errors less its prediction, in standard uncertainties of one value (as a user is told).
     n : array_like
-        Number of images.
+        Number of images whose values scatter by as much and average out.
     allowance : float
         In the same unit; 0 for the plain two-sided test.
 
@@ -316,7 +337,7 @@ def _text(found: Verdict, level: float) -> str:
     ]
     if found.bias:
         parts.append(
-            f"mean errors up to {found.bias.largest:.2f} sigma from predicted, {found.bias.allowance:g} allowed, "
+            f"mean errors up to {found.bias.largest:.2f} u from predicted, {found.bias.allowance:g} allowed, "
             f"p-value {found.bias.smallest_p:.2g} against {found.bias.limit:.2g}"
         )
     if found.not_measured:

@@ -47,7 +47,10 @@ def made_up(index, rng):
         "paper": 0.011 * (index + 1), "calibrated": 0.013 * (index + 1), "bound": 0.007 * (index + 1),
         "value_px": 90.0 + index, "predicted_bias": 0.004 * (index - 1), "measurands": measurands,
     }  # fmt: skip
-    off = {name: {"bias": 0.05 * s * (1 + j), "u": 0.2 * s * (1 + j)} for j, (name, s) in enumerate(sigma.items())}
+    off = {
+        name: {"bias": 0.05 * s * (1 + j), "u": 0.2 * s * (1 + j), "noise": 0.07 * s * (2 + j)}
+        for j, (name, s) in enumerate(sigma.items())
+    }
     if index % 2:  # in every other setting a simulation told biases
         predicted["corrections"] = {name: off[name] for name in METHODS}
         for k, each in enumerate(measurands):
@@ -102,6 +105,7 @@ def expected(values, propagated, true, lost, predicted_bias, off):
         "failures": {state: states.count(state) for state in states}, "ratio": variance / propagated,
         "ratio_interval": [low, high], "bias": bias, "predicted_bias": 0.0 if off else predicted_bias,
         "correction": off["bias"] if off else 0.0, "u_bias": off["u"] if off else None,
+        "render_noise": off["noise"] if off else 0.0,
         "rmse": math.sqrt(variance + bias**2),
         "status": "ok" if len(lost) <= 0.01 * len(values) else max(states, key=states.count),
     }  # fmt: skip
@@ -178,8 +182,10 @@ def test_the_verdict_is_about_the_measurands_that_were_measured(run):
             rows.append(2 * min(law.cdf(x), law.sf(x)))
             ratios.append(each["ratio"])
             weights.append(share * (n - 1))
-            away = abs(each["bias"] - each["predicted_bias"]) / math.sqrt(each["propagated"])
-            tails = stats.norm.sf([(away - ALLOWANCE) * n**0.5, (away + ALLOWANCE) * n**0.5])
+            u = math.hypot(math.sqrt(each["propagated"]), each["u_bias"] or 0.0)
+            away = abs(each["bias"] - each["predicted_bias"]) / u
+            error = math.hypot(math.sqrt(each["propagated"] / n), each["render_noise"]) / u
+            tails = stats.norm.sf([(away - ALLOWANCE) / error, (away + ALLOWANCE) / error])
             biases.append((away, min(1.0, tails.sum())))
     v = found.verdict
     assert (v.rows, v.not_measured) == (len(rows), SETTINGS * MEASURANDS - len(rows)) == (9, 3)
@@ -384,7 +390,7 @@ def test_lines_of_the_forest_are_the_documents_rows(run):
         good = wanted["n"] - wanted["failed"]
         assert [line.low, line.high] == pytest.approx(wanted["ratio_interval"])
         assert (line.ratio, line.bias) == (pytest.approx(wanted["ratio"]), pytest.approx(wanted["bias"]))
-        assert line.error == pytest.approx(math.sqrt(wanted["empirical"] / good))
+        assert line.error == pytest.approx(math.hypot(math.sqrt(wanted["empirical"] / good), wanted["render_noise"]))
         assert line.half == (0.25 if line.name == "m1" else None)
         inside = wanted["ratio_interval"][0] <= 1 <= wanted["ratio_interval"][1]
         assert line.grade == ("open" if wanted["status"] != "ok" else "inside" if inside else "outside")

@@ -29,12 +29,13 @@ _Length = Annotated[float, AfterValidator(_length)]
 
 
 class _Correction(BaseModel):
-    """A bias that is taken off, and its standard uncertainty, which may be infinite."""
+    """A bias that is taken off, its standard uncertainty and that by the renderer's noise, which may be infinite."""
 
     model_config = _Strict
 
     bias: _Length
     u: _Variance
+    noise: _Variance
 
 
 class _Photos(BaseModel):

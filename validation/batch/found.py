@@ -31,6 +31,8 @@ class Found:
     correction, u_bias : float
         Bias that a simulation tells and that is taken off, and its standard uncertainty (not variance); 0 and NaN where
         there was none.
+    render_noise : float
+        Standard deviation (not variance) of the mean error that is left by the renderer's own noise.
     """
 
     propagated: float
@@ -39,6 +41,7 @@ class Found:
     clean: str
     correction: float = 0.0
     u_bias: float = math.nan
+    render_noise: float = 0.0
 
     def scatter(self, true: float) -> dict[str, float]:
         """Variance and mean error of the corrected values (NaN of too little), number of images, of failed ones."""

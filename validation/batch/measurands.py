@@ -52,9 +52,12 @@ def propagated(
     }
 
 
-def correction(bias: float, u: float) -> dict[str, float]:
-    """A bias that is taken off, and its standard uncertainty, as a run file has it; 0 and infinite: not known."""
-    return {"bias": float(np.nan_to_num(bias)), "u": float(u)}
+def correction(bias: float, u: float, noise: float) -> dict[str, float]:
+    """A bias that is taken off, its standard uncertainty and `render_noise` as a run file has them.
+
+    0 and infinite: not known.
+    """
+    return {"bias": float(np.nan_to_num(bias)), "u": float(u), "noise": float(noise)}
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,8 @@ class JudgedMeasurand:
 
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
     ``ratio`` and its interval, ``bias`` (mean of the corrected values less the object's), ``correction``, ``u_bias``,
-    ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a value is told with.
-    ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
+    ``render_noise``, ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a
+    value is told with. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
     ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
     """
 
@@ -88,6 +91,7 @@ class JudgedMeasurand:
     texture: float | None = None
     correction: float = 0.0
     u_bias: float | None = None
+    render_noise: float = 0.0
     u: float | None = None
 
     @property
@@ -112,13 +116,14 @@ _NUMBERS = (
     "high",
     "correction",
     "u_bias",
+    "render_noise",
 )
 _RECORD = np.dtype(
     [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
 )
 
 
-_PLAIN = ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction")
+_PLAIN = ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction", "render_noise")
 
 
 class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
@@ -147,6 +152,7 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
             record["texture"] = about.get("texture", np.nan)
             record["predicted"], record["independent"] = each.propagated, share
             record["correction"], record["u_bias"] = each.correction, each.u_bias
+            record["render_noise"] = each.render_noise
             if not np.isnan(each.u_bias):
                 record["predicted_bias"] = 0.0  # it has been taken off
             for name, number in each.scatter(about["value"]).items():

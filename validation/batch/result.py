@@ -18,7 +18,7 @@ from validation.batch.campaign import Campaign
 from validation.batch.document import document
 from validation.batch.found import Found
 from validation.batch.measurands import column
-from validation.batch.rows import Row, Rows
+from validation.batch.rows import MEAN_ERROR, Row, Rows
 from validation.batch.store import RunFile
 from validation.batch.work import methods
 from validation.statistics import Verdict
@@ -111,7 +111,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
 
 def _found(setting: int, method: str, store: RunFile, off: dict[str, float] | None) -> Found:
     propagated, _, status = store.propagated(setting, method)
-    correction = {} if off is None else {"correction": off["bias"], "u_bias": off["u"]}
+    correction = {} if off is None else {"correction": off["bias"], "u_bias": off["u"], "render_noise": off["noise"]}
     return Found(propagated, store.distances(setting, method), store.failures(setting, method), status, **correction)
 
 
@@ -133,7 +133,7 @@ def _verdict(rows: Rows, refused: int, truth: bool) -> Verdict:
     measured = rows.measured
     if measured.are_single:
         return _judge(rows.judged(), refused, truth)
-    names = ("ratio", "n", "failed", "bias", "predicted_bias", "status", "independent")
+    names = ("ratio", "n", "failed", "status", "independent", *MEAN_ERROR)
     found = {name: measured.column(name) for name in names}
     return _judge({**found, "propagated": measured.column("predicted")}, refused, truth)
 
@@ -154,6 +154,8 @@ def _judge(found: dict[str, np.ndarray], refused: int = 0, truth: bool = True) -
         bias_px=column("bias", np.nan) if truth else None,
         predicted_bias_px=column("predicted_bias", 0.0),
         sigma_px=np.sqrt(column("propagated", np.inf)),
+        u_bias_px=column("u_bias", np.nan),
+        render_noise_px=column("render_noise", 0.0),
         status=np.concatenate([found["status"], np.full(refused, status.NOT_VISIBLE, object)]),
         independent=column("independent", 1.0),
     )

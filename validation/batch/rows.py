@@ -24,8 +24,9 @@ class Judged:
     Variances in px^2. ``empirical`` is the sample variance of the ``n - failed`` distances, ``ratio`` empirical /
     propagated with its two-sided 95 % chi-square interval, ``bias`` the mean of the corrected distances minus the
     model's, px, ``correction`` what was taken off each of them, the bias in a render of other rays, ``u_bias`` that
-    one's standard uncertainty (None where nothing was), ``predicted_bias`` the mean error that is expected (0 where it
-    was taken off, else what the classic locators add without noise), and ``rmse`` the root mean square error
+    one's standard uncertainty (None where nothing was), ``render_noise`` the standard deviation of ``bias`` by the
+    renderer's own noise, which no number of images averages out, px, ``predicted_bias`` the mean error that is expected
+    (0 where it was taken off, else what the classic locators add without noise), and ``rmse`` the root mean square error
     sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
     lost than may be (`row_status`).
     """
@@ -44,6 +45,7 @@ class Judged:
     status: str
     correction: float = 0.0
     u_bias: float | None = None
+    render_noise: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,13 +76,14 @@ class Row:
     texture: float | None = None
 
 
+MEAN_ERROR = ("bias", "predicted_bias", "u_bias", "render_noise")  # and what is expected of it
 MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture")
 
 
 def _record(methods: int) -> np.dtype:
     judged = [
         ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
-        ("correction", "f8"), ("u_bias", "f8"), ("predicted_bias", "f8"),
+        ("correction", "f8"), ("u_bias", "f8"), ("render_noise", "f8"), ("predicted_bias", "f8"),
         ("failed", "i4"), ("stray", "i4"), ("failures", "i4"), ("clean", "u1"),
     ]  # fmt: skip
     return np.dtype([
@@ -126,6 +129,7 @@ class Rows(Sequence[Row]):
         for place, one in zip(record["judged"], found.values(), strict=False):
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
             place["correction"], place["u_bias"] = one.correction, one.u_bias
+            place["render_noise"] = one.render_noise
             place["predicted_bias"] = record["predicted_bias"] if math.isnan(one.u_bias) else 0.0
             for name, number in one.scatter(model["value_px"]).items():
                 place[name] = number
@@ -195,7 +199,7 @@ class Rows(Sequence[Row]):
         def numbers(name: str) -> np.ndarray:
             return self._records["judged"][name][chosen, place]
 
-        found = {name: numbers(name) for name in ("propagated", "empirical", "bias", "n", "failed", "predicted_bias")}
+        found = {name: numbers(name) for name in ("propagated", "empirical", "n", "failed", *MEAN_ERROR)}
         return {
             **found, "ratio": ratios(found["empirical"], found["propagated"]),
             "status": self._statuses(numbers), "independent": np.ones(chosen.size),
@@ -251,6 +255,7 @@ def _judged(method: str, place: np.void, failures: dict[str, int]) -> Judged:
         status=row_status(STATUSES[place["clean"]], failures, n),
         correction=float(place["correction"]),
         u_bias=_known(place["u_bias"]),
+        render_noise=float(place["render_noise"]),
     )
 
 

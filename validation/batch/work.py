@@ -247,11 +247,11 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
 def _note_corrections(numbers: dict[str, Any], used: tuple[Method, ...], off: tuple[Correction, ...]) -> None:
     """Beside what is predicted: the biases that are taken off, of the first measurand by method, px, and of all."""
     numbers["corrections"] = {
-        method.name: measurands.correction(each.bias_image[0], each.u_bias_image[0])
+        method.name: measurands.correction(each.bias_image[0], each.u_bias_image[0], each.beside_image[0])
         for method, each in zip(used, off, strict=True)
     }
     for m, told in enumerate(numbers["measurands"]):
-        told["correction"] = measurands.correction(off[0].bias[m], off[0].u_bias[m])
+        told["correction"] = measurands.correction(off[0].bias[m], off[0].u_bias[m], off[0].beside[m])
 
 
 def _propagated(

@@ -96,12 +96,12 @@ def estimators(found: Validation) -> Table:
     verdicts = {f"{main} (the verdict's)": found.verdict, **found.classic_verdicts}
     columns = [
         "estimator", "rows inside 95 %", "smallest p-value", "limit", "pooled ratio [95 %]", "p-value", "limit",
-        "largest bias, sigma", "p-value", "limit", "not measured", "as predicted",
+        "largest bias, u", "p-value", "limit", "not measured", "as predicted",
     ]  # fmt: skip
     note = (
         f"A row's variance (chi-square, Sidak over the rows), that of all rows pooled, and the mean error of rows that "
-        f"are ok, of which {ALLOWANCE:g} sigma of one image is allowed; a method whose rows mostly could not be "
-        f"measured is not as predicted. The three tests share a level of {LEVEL:g} (Bonferroni)."
+        f"are ok, of which {ALLOWANCE:g} standard uncertainties u of one value are allowed; a method whose rows mostly "
+        f"could not be measured is not as predicted. The three tests share a level of {LEVEL:g} (Bonferroni)."
     )
     lines = [[name, *_tests(v)] for name, v in verdicts.items()]
     return Table("Verdict on each estimator", columns, lines, note, advice=_advice(found, "estimators"))

@@ -36,8 +36,8 @@ _GOOD, _BAD, _OPEN = "#0b5a8f", "#8c1a11", "#6b6b6b"
 class Line:
     """One requirement of one setting; ``number`` of the requirement, ``setting`` from 1.
 
-    ``ratio`` of variances with its 95 % interval, ``bias`` and its standard error in the measurand's unit, ``sigma`` of
-    one picture, ``half`` of the tolerance zone; None, or infinite, where there is no number.
+    ``ratio`` of variances with its 95 % interval, ``bias`` and its standard error, the renderer's noise included, in
+    the measurand's unit, ``sigma`` of one picture, ``half`` of the tolerance zone; None, or infinite, where there is no number.
     """
 
     name: str
@@ -70,7 +70,8 @@ def lines_of(found: Validation, halves: dict[str, float]) -> list[Line]:
             number = numbers.setdefault(each.name, len(numbers) + 1)
             low, high = each.ratio_interval or (math.nan, math.nan)
             good = each.n - each.failed
-            spread = math.inf if each.empirical is None or good < 2 else math.sqrt(each.empirical / good)
+            empirical = math.inf if each.empirical is None or good < 2 else each.empirical / good
+            spread = math.hypot(math.sqrt(empirical), each.render_noise)
             lines.append(Line(
                 each.name, number, row.index + 1, each.status, each.ratio, low, high, good, each.bias, spread,
                 math.sqrt(each.predicted), halves.get(each.name),
@@ -182,7 +183,7 @@ def bias_told(lines: Sequence[Line]) -> str:
     """The largest bias in words."""
     some = [line for line in lines if line.bias is not None and line.half]
     if not some:
-        return "Mean errors; the band is what the verdict allows, 0.3 sigma of one picture."
+        return "Mean errors; the band is 0.3 sigma of one picture, which the verdict allows."
     worst = max(some, key=lambda line: (round(abs(line.bias) / line.half, 9), -line.setting))
     part = 100 * abs(worst.bias) / worst.half
     return f"Mean errors against the tolerance (band): the largest, of {worst.name}, is {part:.2g} % of it."
