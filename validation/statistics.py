@@ -172,8 +172,9 @@ def verdict(
     relevant as well as significant. Its hypothesis is that the mean error lies within `ALLOWANCE` standard
     uncertainties of the predicted one, sqrt(sigma^2 + u_bias^2) of one value, and a p-value is taken at the end of that
     interval (a minimum-effect test, as in Murphy and Myors 1999): a bias that no single image would show is forgiven
-    however many images prove it, and a small run, which could not show that a bias is small, is not blamed for it. With 1000 images the allowance is 9.5 standard errors wide, so
-    a small share of the level costs this test hardly any power.
+    however many images prove it, and a small run, which could not show that a bias is small, is not blamed for it. With
+    1000 images the allowance is 9.5 standard errors wide, so a small share of the level costs this test hardly any
+    power.
 
     Parameters
     ----------

@@ -67,8 +67,9 @@ class JudgedMeasurand:
     ``predicted`` is the variance propagated on the noise-free image, ``empirical`` that of the ``n - failed`` values;
     ``ratio`` and its interval, ``bias`` (mean of the corrected values less the object's), ``correction``, ``u_bias``,
     ``render_noise``, ``predicted_bias`` and ``status`` as of `Judged`; ``u`` is sqrt(predicted + u_bias^2), what a
-    value is told with. ``independent`` is how many independent measurands of the setting it counts for, from their correlations.
-    ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not known.
+    value is told with. ``independent`` is how many independent measurands of the setting it counts for, from their
+    correlations. ``texture`` is the predicted variance over parts by textures, None where there are none, or it is not
+    known.
     """
 
     name: str

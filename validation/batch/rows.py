@@ -26,9 +26,9 @@ class Judged:
     model's, px, ``correction`` what was taken off each of them, the bias in a render of other rays, ``u_bias`` that
     one's standard uncertainty (None where nothing was), ``render_noise`` the standard deviation of ``bias`` by the
     renderer's own noise, which no number of images averages out, px, ``predicted_bias`` the mean error that is expected
-    (0 where it was taken off, else what the classic locators add without noise), and ``rmse`` the root mean square error
-    sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images are
-    lost than may be (`row_status`).
+    (0 where it was taken off, else what the classic locators add without noise), and ``rmse`` the root mean square
+    error sqrt(empirical + bias^2), px. The status is that of the noise-free image unless it is ``ok`` and more images
+    are lost than may be (`row_status`).
     """
 
     method: str

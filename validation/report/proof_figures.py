@@ -37,7 +37,8 @@ class Line:
     """One requirement of one setting; ``number`` of the requirement, ``setting`` from 1.
 
     ``ratio`` of variances with its 95 % interval, ``bias`` and its standard error, the renderer's noise included, in
-    the measurand's unit, ``sigma`` of one picture, ``half`` of the tolerance zone; None, or infinite, where there is no number.
+    the measurand's unit, ``sigma`` of one picture, ``half`` of the tolerance zone; None, or infinite, where there is no
+    number.
     """
 
     name: str
