@@ -37,12 +37,15 @@ class Renders:
     supersample : int
     random : bool
         Whether there are such effects.
+    everywhere : bool
+        Whether pixels that nothing is measured by are rendered with them, and divided.
     """
 
     whole: Callable[[bool, int], np.ndarray]
     again: Callable[[bool, np.ndarray, np.ndarray, int], np.ndarray]
     supersample: int
     random: bool
+    everywhere: bool = True
 
 
 def is_large(crop: tuple[slice, slice], supersample: int, random: bool = False) -> bool:
@@ -74,13 +77,14 @@ def fine_pixels(
     k, (ordinary, few, many) = renders.supersample, rays
     near = near_required(picture, crop, k)
     first = renders.whole(False, ordinary)
-    divided = _fine(crossed(first, math.ceil(reach / k)) | near, k)
+    divided = _fine(crossed(first, math.ceil(reach / k)) | near if renders.everywhere else near, k)
     fine = renders.again(False, _fine(first, k), divided, ordinary)
     marked, near = crossed(fine, reach) & divided, _fine(near, k)
     if renders.random:
-        fine = _fine(renders.whole(True, few), k)
+        fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
         fine = renders.again(True, fine, near & ~marked, few)
-    fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
+    if renders.everywhere:
+        fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
     fine = renders.again(renders.random, fine, marked & near, many)
     missed = crossed(fine, step=MISSED) & near & ~marked
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
@@ -109,5 +113,5 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
     found = np.zeros(shape, bool)
     found[row[inside], column[inside]] = True
-    reach = scene.locator.window_px + 4 * scene.locator.scale_px + 6 * scene.camera.blur_px + 1
+    reach = scene.locator.window_px + 4 * math.hypot(scene.locator.scale_px, scene.camera.blur_px) + 1
     return maximum_filter(found, 2 * math.ceil(reach) + 1)

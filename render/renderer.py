@@ -47,6 +47,9 @@ class Quality:
         Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
         light of finite size), a square number; 16 when not given, 4 in scalar variants where that light is faint.
     seed : int
+    everywhere : bool
+        Whether pixels that nothing is measured by are seen as well as the others. If not, they are dark or, where light
+        takes random ways, have the direct light alone: for images that are measured and not looked at.
 
     On Task1's 16 settings, eight seeds, a scalar variant's lines lie within 0.00024 px (rms; 0.0007 at most) of the
     exact image's and its distances within 0.0008 px (0.0025), for 0.15 s of one core a setting; with 256 rays its
@@ -58,6 +61,7 @@ class Quality:
     edge_samples: int | None = None
     random_samples: int | None = None
     seed: int = 0
+    everywhere: bool = True
 
     def __post_init__(self) -> None:
         if self.supersample < 1:
@@ -183,7 +187,7 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
 
     few = quality.random_samples or (4 if quiet else 16)
     bounces = SURFACES - 1 if "interreflection" in active else 0
-    large = is_large(crop, k, sharp != active)
+    large = is_large(crop, k, sharp != active) or (sharp != active and not quality.everywhere)
     at_once = LARGE_AT_ONCE if large else AT_ONCE
     rays = Rays(mitsuba, k, max(few, many), bounces, quality.seed, at_once, part.silhouette)
 
@@ -213,7 +217,7 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
         renders = Renders(
             lambda random, count: whole(scenes_[random][1], count, None if random else textures),
             lambda random, *what: again(*scenes_[random], *what, mosaic, (quality.seed, 0)),
-            k, sharp != active,
+            k, sharp != active, quality.everywhere,
         )  # fmt: skip
         return fine_pixels(picture, crop, renders, math.ceil(k * _defocus(picture)), (samples, few, many))
     loaded = load(sharp, samples, textures)

@@ -3,7 +3,8 @@
 Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
 rays, and subtracted from the same render of the scene as it is, whose paths are the same ones. Lights that stand
 elsewhere change the direct light, which is rendered anew alone; of plain scenes the closed form of the bias tells what
-lights do.
+lights do. All of them are made where something is measured, and with few rays first: where the noise of these is far
+below sigma or the tolerance, more rays would tell nothing.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from measure import Correction, Images
 from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from render import Quality, Tolerance
+from render.build import MANY_WAYS
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
 from validation.remeasured import Method
@@ -33,7 +35,7 @@ REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
 _LEAST, _MOST = 2, 6  # renders of other rays
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
-_FEW, _RANDOM = 16, 4  # rays of a fine pixel that an edge crosses, and of others, in renders that are subtracted
+_FEW = {"samples": 1, "edge_samples": 16, "random_samples": 4}  # rays
 
 
 @dataclass(frozen=True)
@@ -45,25 +47,25 @@ class How:
     effects: str = "auto"
     tolerance: Tolerance = Tolerance()
 
+    @property
+    def rough(self) -> How:
+        """With few rays."""
+        return replace(self, quality=replace(self.quality, **_FEW))
+
     def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
-        """With rays of another seed, counted from the quality's."""
+        """Where something is measured, with rays of another seed, counted from the quality's."""
         return self._rendered(picture, self.effects, seed)
 
     def active(self, picture: Picture) -> frozenset[str]:
         """The effects that are simulated."""
         return render.choose(picture.scene, self.effects, self.tolerance, picture).active
 
-    def roughly(self, picture: Picture) -> np.ndarray:
-        """With few rays, for differences of renders whose paths are the same."""
-        few = {"samples": 1, "edge_samples": _FEW, "random_samples": _RANDOM}
-        return replace(self, quality=replace(self.quality, **few)).image(picture)
-
     def direct(self, picture: Picture, active: frozenset[str]) -> np.ndarray:
         """Without light between faces."""
         return self._rendered(picture, active - {_BETWEEN}, 0)
 
     def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
-        quality = replace(self.quality, seed=self.quality.seed + seed)
+        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=False)
         return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
 
 
@@ -103,8 +105,8 @@ def of_render(
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
-    Renders of other rays are added until their noise is below a tenth of sigma or a hundredth of the tolerance, six at
-    most.
+    Where light takes random ways, two renders of few rays do if their noise is below a tenth of sigma or a hundredth of
+    the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
     """
     return _simulated(picture, method, how)
 
@@ -112,14 +114,7 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
 @lru_cache(maxsize=64)
 def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
-    renders = tuple(how.image(alike, seed) for seed in range(_LEAST))
-    images, asked = _completed(alike, renders, (), how), (method.locator, method.threshold)
-    told = measure.propagate(renders[0], alike, estimator=method.locator, threshold=method.threshold).measurands
-    found = measure.correction(images, alike, *asked, told)
-    while len(renders) < _MOST and not _is_quiet(found):
-        renders = (*renders, how.image(alike, len(renders)))
-        images = replace(images, renders=renders)
-        found = measure.correction(images, alike, *asked, told)
+    found = _until_quiet(alike, method, how)
     if alike is picture or alike.scene == picture.scene:
         return found
     spread = texture_errors(Pictures.of(picture)).variances
@@ -129,6 +124,38 @@ def _simulated(picture: Picture, method: Method, how: How) -> Correction:
         sources={**found.sources, TEXTURE: plane},
         sources_image={**found.sources_image, TEXTURE: image},
     )
+
+
+def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
+    """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most."""
+    asked = method.locator, method.threshold
+
+    def of(images: Images, told: PropagatedValues | None = None) -> Correction:
+        return measure.correction(images, picture, *asked, told)
+
+    few: tuple[np.ndarray, ...] = ()
+    if how.active(picture) & MANY_WAYS:
+        few = tuple(how.rough.image(picture, seed) for seed in range(_LEAST))
+        roughly = _completed(picture, few, (), how, few[0])
+        found = of(roughly)
+        if _is_quiet(found):
+            return found
+    renders = tuple(how.image(picture, seed) for seed in range(_LEAST))
+    images = _rebased(roughly, renders) if few else _completed(picture, renders, (), how)
+    told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
+    found = of(images, told)
+    while len(images.renders) < _MOST and not _is_quiet(found):
+        images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
+        found = of(images, told)
+    return found
+
+
+def _rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
+    """With other renders; what is changed differs from the first of them by as much as before."""
+    moved = {
+        name: tuple(renders[0] + (each - images.renders[0]) for each in some) for name, some in images.changed.items()
+    }
+    return replace(images, renders=renders, changed=moved)
 
 
 def _is_quiet(found: Correction) -> bool:
@@ -143,24 +170,35 @@ def _without_textures(scene: Scene) -> Scene:
     return scene if kept == scene.textures else scene.tried(textures=kept)
 
 
-def _completed(picture: Picture, renders: tuple[np.ndarray, ...], beside: tuple[np.ndarray, ...], how: How) -> Images:
-    """With the images, or numbers, of what the scene is not sure of."""
-    first, known = renders[0], _of_unknown_kinds(picture)
-    changed = {REFLECTANCE: _steps(first, how.roughly, picture, _of_other_surfaces(picture))}
+def _completed(
+    picture: Picture,
+    renders: tuple[np.ndarray, ...],
+    beside: tuple[np.ndarray, ...],
+    how: How,
+    rough: np.ndarray | None = None,
+) -> Images:
+    """With the images, or numbers, of what the scene is not sure of; ``rough`` is the picture's own of few rays."""
+    first, known, few = renders[0], _of_unknown_kinds(picture), how.rough
+    changed = {REFLECTANCE: _steps(first, few.image, picture, _of_other_surfaces(picture), rough)}
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
-        direct = partial(how.direct, active=how.active(picture))
+        direct = partial(few.direct, active=how.active(picture))
         changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
 
 
 def _steps(
-    first: np.ndarray, made: Callable[[Picture], np.ndarray], picture: Picture, others: Iterable[Picture]
+    first: np.ndarray,
+    made: Callable[[Picture], np.ndarray],
+    picture: Picture,
+    others: Iterable[Picture],
+    here: np.ndarray | None = None,
 ) -> tuple[np.ndarray, ...]:
-    """The first render with what other pictures differ by from this one, both of the same random numbers."""
+    """The first render with what other pictures differ by from this one, ``here``, both of the same random numbers."""
     changed = [made(other) for other in others]
-    here = made(picture) if changed else first
+    if here is None:
+        here = made(picture) if changed else first
     return tuple(first + (other - here) for other in changed)
 
 

@@ -1,7 +1,11 @@
 """Large images: many rays only where something is measured from, and there the image is the same."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, binary_erosion
 
 import measure
 import render
@@ -33,3 +37,23 @@ def test_only_what_nothing_is_measured_by_gets_fewer_rays(name, monkeypatch):
         found = [measure.distance(image, scene, *poses, "gradient") for image in (whole, sparse)]
         # margin: half a standard deviation, chance of few rays
         assert abs(found[0].value_px - found[1].value_px) < 0.5 * np.sqrt(found[0].variance_px2)
+
+
+def test_measured_only_is_the_same_where_something_is_measured(monkeypatch):
+    """Well inside the surroundings of required edges as everywhere else, elsewhere the direct light alone."""
+    scene, poses = scenes.load("bracket"), SETTINGS["bracket"]
+    picture = scenes.Picture.of(scene, *poses)
+    monkeypatch.setattr(large, "LARGE_RANDOM", 0)
+    few = render.Quality(edge_samples=16, random_samples=4)
+    whole, only = (render.image(picture, quality=replace(few, everywhere=e)) for e in (True, False))
+    near = large.near_required(picture, (slice(0, 240), slice(0, 256)), 1)
+    inside = binary_erosion(near, iterations=math.ceil(4 * scene.camera.blur_px) + 1, border_value=1)
+    assert inside.mean() > 0.01  # margin: some pixels
+    far = ~binary_dilation(near, iterations=math.ceil(4 * scene.camera.blur_px) + 1)
+    # margin: chance of few rays: half a percent of the contrast, rms
+    assert np.sqrt(((whole - only)[inside] ** 2).mean()) < 0.005 * np.ptp(whole)
+    direct = render.image(picture, effects=render.choose(scene, picture=picture).active - {"interreflection"})
+    lit = far & (direct > scene.noise.dark_level + 20)
+    bounced = (whole - direct)[lit].mean()
+    assert bounced > 0.5  # margin: there is light between faces, in grey levels, and
+    assert abs((only - direct)[lit].mean()) < bounced / 5  # it is left out there

@@ -77,11 +77,11 @@ def test_crossed_with_surroundings():
 
 @pytest.mark.parametrize(("top", "left", "height", "width", "k"), [(0, 0, 240, 256, 1), (30, 90, 110, 70, 3)])
 def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k, task1):
-    """With the blur's six standard deviations more, a square each way, around what of the edges the crop shows."""
+    """With four standard deviations of scale and blur together, a square each way, around what of the edges is shown."""
     sensor, camera, locator = (30.0, 135.0), task1.camera, task1.locator
     crop = slice(k * top, k * (top + height)), slice(k * left, k * (left + width))
     found = near_required(Picture.of(task1, Pose(*sensor), Pose(15, 315)), crop, k)
-    reach = int(np.ceil(locator.window_px + 4 * locator.scale_px + 6 * camera.blur_px + 1))
+    reach = int(np.ceil(locator.window_px + 4 * (locator.scale_px**2 + camera.blur_px**2) ** 0.5 + 1))
     expected = np.zeros((height, width), bool)
     for start, stop in segments(task1, sensor):
         for x, y in np.rint(start - [left, top] + np.linspace(0, 1, 4000)[:, None] * (stop - start)).astype(int):

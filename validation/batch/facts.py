@@ -57,7 +57,7 @@ class _Identity(BaseModel):
     renders: Annotated[int, Field(ge=2, le=10_000_000)]
     chunk: int
     variant: str
-    quality: dict[str, float | int | None]
+    quality: dict[str, float | int | bool | None]
     effects: str
     tolerance: dict[str, float]
     versions: dict[str, str]
