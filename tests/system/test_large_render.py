@@ -52,8 +52,9 @@ def test_measured_only_is_the_same_where_something_is_measured(monkeypatch):
     far = ~binary_dilation(near, iterations=math.ceil(4 * scene.camera.blur_px) + 1)
     # margin: chance of few rays: half a percent of the contrast, rms
     assert np.sqrt(((whole - only)[inside] ** 2).mean()) < 0.005 * np.ptp(whole)
-    direct = render.image(picture, effects=render.choose(scene, picture=picture).active - {"interreflection"})
+    active = render.choose(scene, "auto", render.Tolerance(), picture).active
+    direct = render.image(picture, effects=active - {"interreflection"})
     lit = far & (direct > scene.noise.dark_level + 20)
-    bounced = (whole - direct)[lit].mean()
-    assert bounced > 0.5  # margin: there is light between faces, in grey levels, and
-    assert abs((only - direct)[lit].mean()) < bounced / 5  # it is left out there
+    bounced = whole - direct > 0.5  # some levels of light between faces,
+    assert (lit & bounced).sum() > 20  # margin: some pixels, 91 here
+    assert abs(np.median((only - direct)[lit & bounced])) < 0.1  # it is left out there

@@ -77,7 +77,7 @@ def test_crossed_with_surroundings():
 
 @pytest.mark.parametrize(("top", "left", "height", "width", "k"), [(0, 0, 240, 256, 1), (30, 90, 110, 70, 3)])
 def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k, task1):
-    """With four standard deviations of scale and blur together, a square each way, around what of the edges is shown."""
+    """With four standard deviations of scale and blur together, a square each way, around edges that are shown."""
     sensor, camera, locator = (30.0, 135.0), task1.camera, task1.locator
     crop = slice(k * top, k * (top + height)), slice(k * left, k * (left + width))
     found = near_required(Picture.of(task1, Pose(*sensor), Pose(15, 315)), crop, k)
