@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,8 +71,8 @@ class Sample:
 
 
 def propagated(picture: Picture, quality: Quality = Quality()) -> tuple[np.ndarray, PropagatedValues]:
-    """The noise-free image of a picture, and the covariance that noise gives to what `GRADIENT` measures in it."""
-    image = render.image(picture, quality=quality)
+    """The noise-free image of a picture, rendered where it is measured, and the covariance of what `GRADIENT` finds."""
+    image = render.image(picture, quality=replace(quality, everywhere=False))
     return image, measure.propagate(image, picture, estimator=GRADIENT.locator).measurands
 
 

@@ -1,4 +1,4 @@
-"""Light that surfaces of the object send to each other, in pictures that are looked at closely."""
+"""Light that surfaces send to each other, in pictures that are looked at closely."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters
-from imaging.light.exchange import Exchanged, exchanged
+from imaging.light.exchange import Exchanged, exchanged, floor_of
 from imaging.pictures import Pictures
 from scenes import Scene
 from scenes.lights import GLANCE
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
-    """Signal that points (..., 3) on faces (...) of the object have from its other faces.
+    """Signal that points (..., 3) on faces (...) of the bodies have from other faces, and from the floor.
 
-    Diffuse light alone; 0 on faces of obstacles, of turned parts, and in pictures that are not looked at closely.
+    Diffuse light alone; 0 where there are turned parts, and in pictures that are not looked at closely.
     """
     scene = pictures.scene
-    if not pictures.closely or scene.solid.is_convex or scene.solid.curved or not points.size:
+    if not pictures.closely or not is_exchanged(scene) or scene.solid.curved or not points.size:
         return 0.0
     shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
@@ -38,6 +38,11 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
     return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
+
+
+def is_exchanged(scene: Scene) -> bool:
+    """Whether any two surfaces see each other."""
+    return not scene.bodies.is_convex or floor_of(scene) is not None
 
 
 def _plain(emitter: Emitter) -> Emitter:

@@ -1,10 +1,11 @@
-"""Light that faces of a body send to each other, by radiosity: of an inner edge, a step, a pocket, a blind hole.
+"""Light that faces send to each other, by radiosity: of an inner edge, a step, a pocket, an obstacle, the floor.
 
-Faces on the convex hull see no other, and walls of round through holes have a closed form (`imaging.light.bore`). The
-others, however many, have places spread evenly over them, and patches, which are places near to each other that look
-the same way, so that facets of a fillet share one. Rays tell once for a solid which share of what a patch sees is each
-other one; the patches exchange light by it. What arrives on a face is gathered when it is asked for, by rays from nodes
-of it: what they meet sends its share of the light that falls there, and of what its patch has from the others.
+Faces on the convex hull of all bodies see no other, but the floor where they do not look up, and walls of round through
+holes have a closed form (`imaging.light.bore`). The others, however many, have places spread evenly over them, and
+patches, which are places near to each other that look the same way, so that facets of a fillet share one. Rays tell
+once for a solid which share of what a patch sees is each other one; the patches exchange light by it. What arrives on a
+face is gathered when it is asked for, by rays from nodes of it: what they meet sends its share of the light that falls
+there, and of what its patch has from the others.
 
 Rays follow Lambert's cosine and a low-discrepancy sequence: a share is off by about their number to the power -0.75,
 and all shares of a place add to 1.
@@ -21,7 +22,8 @@ import numpy as np
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
-from scenes import Scene, Solid
+from scenes import Floor, Scene, Solid
+from scenes.parts.solid import assembled
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
@@ -34,6 +36,9 @@ _CELLS = 160  # of the whole body; nodes on a face that is asked for stand so de
 _LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
+_FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
+_FLOOR_PATCHES = 400  # of it, besides those of the bodies
+_UP = 1 - 1e-9  # cosine of a normal that sees no floor
 _AT_ONCE = 200_000  # rays
 _LIFT = 1e-6  # of the object's size: between a place and its own face
 _MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
@@ -79,6 +84,7 @@ class Exchange:
     Attributes
     ----------
     solid : Solid
+        All bodies, and the floor as its last face (`room`).
     faces : ndarray of int
         Those faces.
     cell : float
@@ -88,6 +94,8 @@ class Exchange:
         The patch of each place.
     tree : KDTree
         Of the patches' middles.
+    floor : Floor or None
+        Which reaches beyond its patches.
     """
 
     solid: Solid
@@ -96,6 +104,7 @@ class Exchange:
     places: Places
     patches: np.ndarray
     tree: KDTree
+    floor: Floor | None = None
 
     @cached_property
     def between(self) -> np.ndarray:
@@ -124,10 +133,23 @@ class Exchange:
         ways = _ways(normals, square)
         starts = np.broadcast_to((points + _LIFT * self.solid.extent * normals)[:, None], ways.shape)
         face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
+        if self.floor is not None:
+            face, t = self._met_or_floor(face, t, starts, ways)
         point, ray = np.nonzero(np.isin(face, self.faces))
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
         return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.cell))[1])
+
+    def _met_or_floor(
+        self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """With the floor where rays (..., 3) that meet nothing go down, as far as it reaches."""
+        down = (face < 0) & (ways[..., 2] < 0)
+        until = np.where(down, (self.floor.height - starts[..., 2]) / np.where(down, ways[..., 2], -1.0), np.inf)
+        reached = down & (until > 0)
+        place = starts[..., :2] + np.where(reached, until, 0.0)[..., None] * ways[..., :2]
+        reached &= (np.abs(place) <= self.floor.half_side).all(-1)
+        return np.where(reached, len(self.solid.faces) - 1, face), np.where(reached, until, t)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +206,7 @@ class Exchanged:
 
         Of several emitters each is asked for every so manieth ray.
         """
-        solid, several = self.scene.solid, len(self.emitters)
+        solid, several = self.exchange.solid, len(self.emitters)
         direct = np.zeros(len(met.points))
         for k, emitter in enumerate(self.emitters):
             asked = met.rays % several == k
@@ -216,19 +238,50 @@ def _told(light: Exchanged, face: int) -> Told:
     return Told(sheet.frame, RectBivariateSpline(sheet.u, sheet.v, values, kx=along, ky=across))
 
 
+def floor_of(scene: Scene) -> Floor | None:
+    """The floor where it sends light back."""
+    return None if scene.floor is None or scene.floor.reflectance == 0 else scene.floor
+
+
 @lru_cache(maxsize=4)
-def exchange_of(solid: Solid, without: tuple[int, ...]) -> Exchange | None:
-    """Of the faces that are not on the convex hull, those ``without`` left out; None where fewer than two are."""
+def room(bodies: Solid, floor: Floor | None) -> Solid:
+    """The bodies, and as one more face the floor about them."""
+    if floor is None:
+        return bodies
+    low, high = (end(bodies.vertices[:, :2], axis=0) for end in (np.min, np.max))
+    away = _FLOOR * bodies.extent
+    (left, near), (right, far) = (np.clip(v, -floor.half_side, floor.half_side) for v in (low - away, high + away))
+    corners = np.array([(left, near), (right, near), (right, far), (left, far)])
+    square = np.column_stack([corners, np.full(4, floor.height)])
+    return assembled(bodies, Solid(("a", "b", "c", "d"), square, ((0, 1, 2, 3),), ()))
+
+
+@lru_cache(maxsize=4)
+def exchange_of(bodies: Solid, without: tuple[int, ...], floor: Floor | None = None) -> Exchange | None:
+    """Of the faces that see others, those ``without`` left out; None where fewer than two do."""
     from scipy.spatial import KDTree  # slow to load, and rarely needed
 
-    faces = np.setdiff1d(np.flatnonzero(~solid.outer), without)
-    if len(faces) < 2:
+    solid, some = room(bodies, floor), np.setdiff1d(_seeing(bodies, floor), without)
+    if len(some) < 2:
         return None
-    area = _areas(solid.triangles[np.isin(solid.triangle_faces, faces)]).sum()
-    places, cell = Places.spread(solid, faces, _PATCHES * _PLACES), float(np.sqrt(area / _PATCHES))
+    area = _areas(solid.triangles[np.isin(solid.triangle_faces, some)]).sum()
+    count = _PATCHES if floor is None else _PATCHES + _FLOOR_PATCHES
+    places, cell = Places.spread(solid, some, count * _PLACES), float(np.sqrt(area / count))
     coordinates = _placed(places.points, places.normals, cell)
     tree = KDTree(coordinates[_PLACES // 2 :: _PLACES])
-    return Exchange(solid, faces, cell, places, tree.query(coordinates)[1], tree)
+    return Exchange(solid, some, cell, places, tree.query(coordinates)[1], tree, floor)
+
+
+def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
+    """Faces of `room` that see another: those that are not on the convex hull, and before a floor those that do not
+    look up, and the floor, but none that stands on it."""
+    inner = ~bodies.outer
+    if floor is None:
+        return np.flatnonzero(inner)
+    highest = np.full(len(bodies.faces), -np.inf)
+    np.maximum.at(highest, bodies.triangle_faces, bodies.triangles[..., 2].max(1))
+    standing = highest <= floor.height + _LIFT * bodies.extent
+    return np.append(np.flatnonzero((inner | (bodies.normals[:, 2] < _UP)) & ~standing), len(bodies.faces))
 
 
 def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
@@ -326,8 +379,8 @@ def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...]) -> Exchanged | None:
-    """What the faces of a scene's object send to each other under some emitters."""
-    exchange = exchange_of(scene.solid, without)
+    """What the faces of a scene's bodies and its floor send to each other under some emitters."""
+    exchange = exchange_of(scene.bodies, without, floor_of(scene))
     if exchange is None:
         return None
     places, white = exchange.places, _white(scene, exchange.places.faces)
@@ -339,12 +392,14 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
 
 def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
     """Diffuse reflectance of faces (n,)."""
-    return np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds[faces]]
+    white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
+    floor = floor_of(scene)
+    return np.append(white, 0.0 if floor is None else floor.reflectance)[faces]
 
 
 def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Irradiance of points (n, 3) of unit normals by one emitter, 0 in shadow."""
-    start, at = points + _LIFT * scene.solid.extent * normals, np.array(emitter.at)
+    start, at = points + _LIFT * scene.bodies.extent * normals, np.array(emitter.at)
     blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
     arriving = beam(emitter, points)
     cosine = np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)

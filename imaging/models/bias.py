@@ -22,6 +22,7 @@ from imaging.geometry.lens import lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
 from imaging.geometry.projection import edge_points
 from imaging.light.appearance import is_plain, side_signals
+from imaging.light.between import is_exchanged
 from imaging.light.sheets import printed
 from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
 from imaging.models.calibrated import calibrated
@@ -133,7 +134,7 @@ def _bias(pictures: Pictures) -> Bias:
     values, values_object = (np.where(needed, each, 0.0).sum(-1) for each in (shares, shares_object))
     disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
     disturbed |= by_prints[2]
-    if pictures.closely and not pictures.scene.solid.is_convex:
+    if pictures.closely and is_exchanged(pictures.scene):
         disturbed |= _by_other_faces(pictures, known.view.names)
     corners = _corners(pictures.scene, known.view, lines)
     return Bias(values, values_object, lines, corners, shares, disturbed)

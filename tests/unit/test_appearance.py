@@ -95,6 +95,11 @@ def crowded(task1, **changes):
     return task1.model_copy(update={"floor": Floor(reflectance=0.3), "obstacles": obstacles, **changes})
 
 
+def glanced(scene, sensor, light):
+    """One picture without light between surfaces."""
+    return Pictures(scene, np.array(sensor), (np.array(light),))
+
+
 def near_a_border(rest, point, normals):
     """Whether a shift by a hundredth of a millimetre changes what is seen or lit by more than shading does."""
     here = rest.sides(point, normals)
@@ -111,7 +116,7 @@ def test_side_signals_of_a_crowded_scene(task1, rng, floor):
     for _ in range(40):
         sensor, light = ((rng.uniform(5, 80), rng.uniform(0, 360)) for _ in range(2))
         points = edge_points(scene.solid, EDGES, FRACTIONS)
-        ours = side_signals(Pictures.of(scene, sensor, light), EDGES, points)
+        ours = side_signals(glanced(scene, sensor, light), EDGES, points)
         rest = Boxes(scene, sensor, light)
         for e, name in enumerate(EDGES):
             pair = normals[list(scene.solid.edge(name).faces)]
@@ -144,7 +149,7 @@ def test_the_plain_formula_notices_floor_shadow_and_obstacle(task1):
 def test_eq_1_has_no_fall_off(task1):
     """The paper's contrast on the crowded scene: the same sides, irradiance as at the reference point."""
     scene, sensor, light = crowded(task1), (40, 20), (35, 160)
-    pictures = Pictures.of(scene, sensor, light)
+    pictures = glanced(scene, sensor, light)
     points, lamp = edge_points(scene.solid, EDGES, FRACTIONS), 100 * axes(light)[0]
     sides = side_signals(pictures, EDGES, points)
     away = pictures.sensor_at - points[:, 0]

@@ -135,3 +135,28 @@ def test_what_rays_gather():
 def test_a_convex_body_has_none():
     pictures = Pictures.of(scenes.load("task1"), (30, 135), (15, 315))
     assert light_between(pictures, np.zeros((3, 3)), np.zeros(3, int)) == 0
+
+
+@pytest.mark.parametrize(("height", "half_side"), [(0.5, 1000.0), (1.9, 1000.0), (1.9, 30.0)])
+def test_a_wall_sees_half_of_the_floor(task1, height, half_side):
+    """From a far light straight above, an upright face on a floor has half of what a floor without end sends back.
+
+    A floor that ends at a distance d before it leaves (1 - h / sqrt(h^2 + d^2)) / 2, and a little less to the sides.
+    """
+    dull = scenes.Material(diffuse_reflectance=0.05, specular_fraction=0.0)
+    scene = task1.model_copy(update={
+        "floor": scenes.Floor(reflectance=0.4, half_side=half_side), "material": dull,
+        "light": task1.light.model_copy(update={"distance": 1e6}),
+    })  # fmt: skip
+    solid = scene.solid
+    face = int(solid.normals[:, 0].argmax())
+    middle = solid.vertices[list(solid.faces[face])].mean(0)
+    point = np.array([[middle[0], middle[1], height]])
+    found = light_between(Pictures.of(scene, (40, 20), (0, 0)), point, np.array([face]))
+    free = half_side - middle[0]
+    slant = np.hypot(height, free)
+    wide = half_side - abs(middle[1])
+    ends = np.arctan(wide / height) - height / slant * np.arctan(wide / slant)
+    expected = scene.camera.exposure * 0.05 * 0.4 * ends / np.pi
+    assert found == pytest.approx(expected, rel=0.02)
+    assert light_between(Pictures.of(scene, (40, 20), (0, 0)), point, np.array([solid.normals[:, 2].argmax()])) == 0
