@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from planner.uncertainty.validation import validate
 from scenes import InvalidInput, Picture, Tolerance
 from scenes.status import is_trusted
 from validation.chain import Chain
+
+if TYPE_CHECKING:
+    from measure import Correction
 
 _SHOWN = 3  # sources that are named as worth an improvement
 _BLOCK, _MOST_DRAWS = 100_000, 10_000_000
@@ -38,17 +41,28 @@ def budget_of(picture: Picture, p: float = 0.95, *, rendered: bool = False) -> S
     """
     if not rendered:
         found = budget(picture, p=p)
-        if all(map(is_trusted, found.statuses)) and is_plain(picture.scene) and not picture.scene.textures:
+        if formulas_do(picture, found.statuses):
             return found
-    import measure
-    from validation import kept
-    from validation.remeasured import Method
-
-    off = kept.correction(picture, Method(measure.best_estimator(picture.scene)))
+    off = simulated(picture)
     for quantity, value, state in zip(picture.scene.quantities, off.bias, off.simulated, strict=True):
         if not np.isfinite(value):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state} in the rendered picture")
     return budget(picture, variances=np.diag(off.covariance), doubts=off.sources, statuses=off.status, p=p)
+
+
+def formulas_do(picture: Picture, statuses: tuple[str, ...]) -> bool:
+    """Whether predicted noise and bias are all that there is: of one convex body, where nothing predicted is
+    doubtful."""
+    return all(map(is_trusted, statuses)) and is_plain(picture.scene) and not picture.scene.textures
+
+
+def simulated(picture: Picture) -> Correction:
+    """The correction of a picture by its best estimator, kept on disk."""
+    import measure
+    from validation import kept
+    from validation.remeasured import Method
+
+    return kept.correction(picture, Method(measure.best_estimator(picture.scene)))
 
 
 def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 5.0) -> list[dict[str, Any]]:

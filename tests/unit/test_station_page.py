@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import measure
 import planner
 import scenes
 from scenes import Picture, Tolerance
@@ -246,3 +247,26 @@ def test_the_page_of_a_picture_needs_no_render(plate, tmp_path):
     assert "Drawn from the model" in written
     assert written.count('<svg role="img"') == 3
     assert all(status in MEASURED for status in (each.status for each in requirements.predicted(plate)))
+
+
+def test_a_page_does_not_sign_what_a_simulation_doubts(plate, tmp_path, monkeypatch):
+    """Of a hollow part biases are those that renders tell: one of them unknown, the others taken off."""
+    told, scene = planner.predict(plate).measurands, plate.scene
+    count = len(scene.quantities)
+    sigma, u = np.array([math.sqrt(each.variance_object) for each in told]), np.full(count, 1e-5)
+    u[0] = 10 * sigma[0] + 10 * (scene.quantities[0].tolerance.half if scene.quantities[0].tolerance else 0)
+    off = measure.Correction(
+        scene.quantities, "gradient", None, 3 * sigma, 3 * sigma, {"reflectance": u}, {"reflectance": u},
+        np.diag(sigma**2), np.diag(sigma**2), ("ok",) * count,
+    )  # fmt: skip
+    monkeypatch.setattr(station.budgets, "simulated", lambda picture: off)
+    made = station.of_picture(plate, simulated=True)
+    assert [each.status for each in made.requirements] == ["clutter", *["ok"] * (count - 1)]
+    assert [each.bias for each in made.requirements] == [0.0] * count
+    assert [each.u_bias for each in made.requirements] == pytest.approx(u)
+    written = page.write_station(made, "Plate", tmp_path / "plan.html").read_text()
+    assert f"{told[0].name}&#39; is not signed: clutter" in written
+    plain = Picture.of(scenes.load("task1"), (30, 135), (15, 315))
+    assert station.of_picture(plain, simulated=True).requirements[0].bias == pytest.approx(
+        planner.predict(plain).measurands[0].bias_object
+    )

@@ -310,11 +310,11 @@ def _pictures(found: planner.Plan, checked: PlanCheck | None, map_file: Path | N
 
 
 def _page(found: planner.Plan, checked: PlanCheck | None, out: Path) -> Path:
-    """The setting that is proposed as one page, as its models predict it."""
+    """The setting that is proposed as one page; where pictures were checked, with biases as they are simulated."""
     from validation.report import page, station
 
     scene, best = found.scene, checked.proposed if checked and checked.proposed else found
-    made = station.of_picture(scenes.Picture.of(scene, best.sensor, best.light))
+    made = station.of_picture(scenes.Picture.of(scene, best.sensor, best.light), simulated=checked is not None)
     return page.write_station(made, scene.title or scene.name, out / "plan.html")
 
 

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import planner
 from planner.budgeting.budgets import SceneBudget
 from scenes import Picture
 from scenes.status import is_trusted
+from validation import budgets
 from validation.batch.campaign import Campaign
 from validation.batch.measurands import column
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
-from validation.report.requirements import Requirement, measurable_budget, predicted, requirements
+from validation.report.requirements import Requirement, finite, measurable_budget, predicted, requirements
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,23 @@ class Station:
     number: int | None = None
 
 
-def of_picture(picture: Picture, p: float = 0.95) -> Station:
-    """As the models predict it."""
-    return Station(picture, predicted(picture, p), measurable_budget(picture, p=p))
+def of_picture(picture: Picture, p: float = 0.95, *, simulated: bool = False) -> Station:
+    """As the models predict it; ``simulated``: where formulas do not tell all, with biases that renders tell, taken
+    off."""
+    told = planner.predict(picture).measurands
+    if not simulated or budgets.formulas_do(picture, tuple(each.status for each in told)):
+        return Station(picture, predicted(picture, p), measurable_budget(picture, p=p))
+    off = budgets.simulated(picture)
+    known = measurable_budget(picture, off.sigma**2, statuses=off.status, doubts=off.u_bias, p=p)
+    made = requirements(
+        picture,
+        sigmas=off.sigma.tolist(),
+        biases=[0.0 if math.isfinite(bias) else None for bias in off.bias],
+        found=known,
+        statuses=off.status,
+        u_biases=[finite(u) for u in off.u_bias],
+    )
+    return Station(picture, made, known)
 
 
 def of_budget(found: SceneBudget) -> Station:
