@@ -83,7 +83,7 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
     true, left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
-        clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial))
+        clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=False))
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
         left.append((found.value[0] - true) / off.u_bias)
@@ -94,7 +94,7 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
 
 def _true(picture: Picture, off: measure.Correction) -> np.ndarray:
     """The object's own values."""
-    clean = render.image(picture, quality=render.Quality(seed=_SEEDS - 1))
+    clean = render.image(picture, quality=render.Quality(seed=_SEEDS - 1, everywhere=False))
     found = measure.propagate(clean, picture, estimator=off.estimator).measurands
     return found.value - found.bias
 
