@@ -158,7 +158,7 @@ def facts(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
 
 def _measurand(found: SceneBudget, m: int, reach: float | None, seed: int) -> dict[str, Any]:
     each, kind, status = found.measurands[m], found.picture.scene.quantities[m].kind, found.statuses[m]
-    from validation.report.budget_table import sentence
+    from validation.report.budget_table import signed
 
     return {
         "name": each.name, "kind": kind, "unit": each.unit, "value": each.value, "u": each.u, "U": each.U, "k": each.k,
@@ -167,7 +167,7 @@ def _measurand(found: SceneBudget, m: int, reach: float | None, seed: int) -> di
         "accuracy": each.accuracy, "contributions": each.as_rows(), "capability": capability(found, m, seed),
         "improve": [asdict(one) for one in improvements(each)[:_SHOWN]],
         "reach": None if reach is None else [asdict(needed(each, reach, row.source)) for row in each.contributions],
-        "sentence": sentence(each, kind, status),
+        "sentence": signed(found, m),
     }  # fmt: skip
 
 

@@ -47,6 +47,8 @@ class SceneBudget(Shown):
         In the scene's unit, or degrees.
     statuses : tuple of str
         Of the values: only what `scenes.status.is_trusted` has a U that may be signed.
+    unsure : tuple of bool, optional
+        Where biases were simulated and are taken off: of which values the bias is not known at all.
     """
 
     picture: Picture
@@ -56,6 +58,7 @@ class SceneBudget(Shown):
     terms: list[list[Term]]
     measurands: tuple[Budget, ...]
     statuses: tuple[str, ...]
+    unsure: tuple[bool, ...] | None = None
 
     def __iter__(self) -> Iterator[Budget]:
         return iter(self.measurands)
@@ -85,12 +88,16 @@ class SceneBudget(Shown):
 
     @property
     def u_bias(self) -> tuple[float, ...]:
-        """Standard uncertainty of each value by its bias: what a correction is not sure of, or the model error."""
+        """Standard uncertainty of each value by its bias: what a correction is not sure of, or the model error.
+
+        Infinite where the bias is not known.
+        """
         told = (
             [row.contribution for row in each.contributions if row.source == MODEL or row.source.startswith(BIAS)]
             for each in self.measurands
         )
-        return tuple(math.hypot(*some) for some in told)
+        unsure = self.unsure or (False,) * len(self.measurands)
+        return tuple(math.inf if unknown else math.hypot(*some) for some, unknown in zip(told, unsure, strict=True))
 
     @cached_property
     def features(self) -> Features:
@@ -177,7 +184,8 @@ def budget(
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(each.name, each.unit, each.value_object, whole, by_name, p))
     statuses = statuses or tuple(each.status for each in told.measurands)
-    return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets), statuses)
+    unsure = None if doubts is None else tuple(np.isinf(list(doubts.values())).any(0).tolist())
+    return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets), statuses, unsure)
 
 
 def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:

@@ -172,17 +172,18 @@ def test_a_picture_on_the_part_that_has_changed_is_another_scene(task1, tmp_path
 
 
 def test_what_is_not_signed_says_how_large_the_bias_may_be(small):
-    """Two of 0.03 and 0.04 cm make 0.05, of which twice is 0.1; without them it is unknown."""
+    """Two of 0.03 and 0.04 cm make 0.05, of which twice is 0.1; without them, or with one of any size, it is unknown."""
     picture = Picture.of(small, (30, 90), (15, 270))
-    doubts = {"reflectance": np.array([0.03]), "light_place": np.array([0.04]), "texture": np.array([np.inf])}
+    doubts = {"reflectance": np.array([0.03]), "light_place": np.array([0.04])}
     found = planner.budget(picture, variances=np.array([1e-8]), doubts=doubts, statuses=("clutter",))
     assert found.u_bias == (pytest.approx(0.05),)
     assert found.measurands[0].u == pytest.approx(np.hypot(0.05, 1e-4))
-    said = budget_table.sentence(found.measurands[0], "distance", "clutter")
-    assert said == "The distance is not signed: clutter, bias up to 0.1 cm"
+    assert budget_table.signed(found, 0) == "The distance is not signed: clutter, bias up to 0.1 cm"
     plain = planner.budget(picture, statuses=("clutter",))
-    said = budget_table.sentence(plain.measurands[0], "distance", "clutter")
-    assert said == "The distance is not signed: clutter, bias unknown"
+    unknown = planner.budget(picture, doubts={**doubts, "texture": np.array([np.inf])}, statuses=("clutter",))
+    for each in (plain, unknown):
+        assert budget_table.signed(each, 0) == "The distance is not signed: clutter, bias unknown"
+    assert unknown.u_bias == (np.inf,)
     assert plain.u_bias[0] == next(
         r.contribution for r in plain.measurands[0].contributions if r.source == "model error"
     )

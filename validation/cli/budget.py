@@ -146,12 +146,12 @@ def _show(found: SceneBudget, drawn: list[dict], shown: dict | None, reach: floa
     from validation.report import budget_table, station, station_text
 
     terminal = console()
-    for each, quantity, status in zip(found, found.picture.scene.quantities, found.statuses, strict=True):
+    for m, each in enumerate(found):
         terminal.print(budget_table.table(each))
         terminal.print(f" {budget_table.summary(each)}", highlight=False)
         for line in _further(found, each, drawn, reach):
             terminal.print(f" {line}", highlight=False)
-        terminal.print(f" {budget_table.sentence(each, quantity.kind, status)}\n", style="bold", highlight=False)
+        terminal.print(f" {budget_table.signed(found, m)}\n", style="bold", highlight=False)
     for line in budget_table.TERMS:
         terminal.print(f" {line}", highlight=False)
     if shown:

@@ -6,7 +6,7 @@ import math
 
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.budget import Budget
-from validation.report.budget_table import sentence, summary
+from validation.report.budget_table import signed, summary
 
 
 def cells(each: Budget) -> list[list[str]]:
@@ -23,5 +23,4 @@ def cells(each: Budget) -> list[list[str]]:
 
 def note(found: SceneBudget, m: int) -> str:
     """Sum and sentence."""
-    each, quantity = found.measurands[m], found.picture.scene.quantities[m]
-    return f"{summary(each)}. {sentence(each, quantity.kind, found.statuses[m])}."
+    return f"{summary(found.measurands[m])}. {signed(found, m)}."

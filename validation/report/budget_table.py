@@ -6,7 +6,7 @@ import math
 
 from rich.table import Table
 
-from planner.budgeting.terms import BIAS
+from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.conformity import COVERAGE
 from scenes.status import doubt, is_trusted
@@ -48,7 +48,13 @@ def summary(budget: Budget) -> str:
     )
 
 
-def sentence(budget: Budget, kind: str, status: str) -> str:
+def signed(found: SceneBudget, m: int) -> str:
+    """`sentence` of the m-th measurand."""
+    u = 0.0 if found.unsure is None else found.u_bias[m]
+    return sentence(found.measurands[m], found.picture.scene.quantities[m].kind, found.statuses[m], u)
+
+
+def sentence(budget: Budget, kind: str, status: str, u_bias: float = 0.0) -> str:
     """What is signed: value and expanded uncertainty, to two digits of it; or that nothing is, and why.
 
     Parameters
@@ -56,13 +62,14 @@ def sentence(budget: Budget, kind: str, status: str) -> str:
     budget : Budget
     kind, status : str
         Of the measurand.
+    u_bias : float
+        Standard uncertainty of its bias; 0 and infinite: not known.
     """
     places = decimals(budget.U)
     what = kind if budget.name == kind else f"{kind} {budget.name!r}"
     unit = budget.unit
     if not is_trusted(status):
-        told = math.hypot(*(row.contribution for row in budget.contributions if row.source.startswith(BIAS)))
-        reach = f"{COVERAGE * told:.1g} {unit}" if told > 0 else ""
+        reach = f"{COVERAGE * u_bias:.1g} {unit}" if 0 < u_bias < math.inf else ""
         return f"The {what} is not signed: {doubt(status, reach)}"
     return f"The {what} is {budget.value:.{places}f} {unit} +- {budget.U:.{places}f} {unit}, k = {budget.k:.1f}"
 

@@ -60,7 +60,7 @@ def of_budget(found: SceneBudget) -> Station:
     made = requirements(
         found.picture,
         sigmas=[each.repeatability for each in found],
-        biases=[each.bias_object if math.isfinite(each.bias_object) else None for each in told],
+        biases=[finite(each.bias_object) if found.unsure is None else 0.0 for each in told],
         found=found,
         statuses=found.statuses,
         u_biases=found.u_bias,
