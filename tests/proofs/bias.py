@@ -3,8 +3,8 @@
 The part that is measured reflects otherwise than its scene says, each surface by up to 10 %, and each light stands up
 to 1 % of its distance elsewhere; it is rendered with rays of its own. Who measures it knows nothing of that: the bias
 of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures scatters by 1
-where that tells it, and over the combined uncertainty single noisy values have to scatter by 1 within
-10 %, beyond chance.
+where that tells it (the true picture's own render has noise, too, which a camera's has not: it is allowed for), and
+over the combined uncertainty single noisy values have to scatter by 1 within 10 %, beyond chance.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from scipy import stats
 import measure
 import render
 import scenes
+from measure.correction import RENDERING
 from scenes import Picture, Pose, Scene
 from scenes.status import is_trusted
 from validation import simulation
@@ -86,7 +87,7 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
         clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=False))
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
-        left.append((found.value[0] - true) / off.u_bias)
+        left.append((found.value[0] - true) / np.sqrt(off.u_bias**2 - off.sources[RENDERING] ** 2 + off.beside**2))
         noisy += list((found.value[1:] - true) / np.hypot(off.sigma, off.u_bias))
     names = tuple(quantity.name for quantity in scene.quantities)
     return Pulls(scene.name, names, off.status, off.bias / off.sigma, np.array(left), np.array(noisy))

@@ -172,7 +172,7 @@ def test_a_picture_on_the_part_that_has_changed_is_another_scene(task1, tmp_path
 
 
 def test_what_is_not_signed_says_how_large_the_bias_may_be(small):
-    """Two of 0.03 and 0.04 cm make 0.05, of which twice is 0.1; without them, or with one of any size, it is unknown."""
+    """Two of 0.03 and 0.04 cm make 0.05, twice that is 0.1; without them, or with one of any size, it is unknown."""
     picture = Picture.of(small, (30, 90), (15, 270))
     doubts = {"reflectance": np.array([0.03]), "light_place": np.array([0.04])}
     found = planner.budget(picture, variances=np.array([1e-8]), doubts=doubts, statuses=("clutter",))
