@@ -270,3 +270,15 @@ def test_a_page_does_not_sign_what_a_simulation_doubts(plate, tmp_path, monkeypa
     assert station.of_picture(plain, simulated=True).requirements[0].bias == pytest.approx(
         planner.predict(plain).measurands[0].bias_object
     )
+
+
+@pytest.mark.parametrize(
+    ("bias", "u", "told"),
+    [
+        (0.0123, 0.0021, "+0.0123 ± 0.0021"), (-0.00001, 0.0021, "0 ± 0.0021"), (0.0, 0.00003, "0, ± less than 0.0001"),
+        (0.0123, None, "+0.0123"), (0.0123, math.inf, "+0.0123 ± not known"), (None, 0.1, "not known"),
+    ],
+)  # fmt: skip
+def test_a_bias_is_said_with_the_digits_of_sigma(bias, u, told):
+    one = Requirement(1, "bore", "mm", 4.0, TOLERANCE, 0.0005, bias, u, 0.001, "ok", "")
+    assert station_table._bias(one, 4) == told

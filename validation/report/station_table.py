@@ -66,7 +66,11 @@ def _nominal(each: Requirement) -> str:
 def _bias(each: Requirement, places: int) -> str:
     if each.bias is None:
         return "not known"
-    known = each.u_bias is not None and math.isfinite(each.u_bias)
-    beside = "" if each.u_bias is None else f" ± {each.u_bias:.{places}f}" if known else " ± not known"
     told = f"{each.bias:+.{places}f}"
-    return ("0" if float(told) == 0 else told) + beside
+    told = "0" if float(told) == 0 else told
+    if each.u_bias is None:
+        return told
+    if not math.isfinite(each.u_bias):
+        return f"{told} ± not known"
+    beside = f"{each.u_bias:.{places}f}"
+    return f"{told}, ± less than {10**-places:.{places}f}" if float(beside) == 0 else f"{told} ± {beside}"
