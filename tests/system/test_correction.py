@@ -9,7 +9,7 @@ import measure
 import planner
 import render
 from measure import Images
-from scenes import ImageTexture, InvalidInput, Picture, Pose, load
+from scenes import Floor, ImageTexture, InvalidInput, Picture, Pose, load
 from scenes.status import corrected
 from tests.oracle import block_image
 from validation import kept, picture_file, simulation
@@ -236,3 +236,32 @@ def test_light_from_the_floor_is_part_of_the_contrast():
         ratios.append(planner.predict(picture).measurands[0].variance_object / told.covariance[0, 0])
     # margin: 0.031 with, 0.089 without: the floor's own light from walls is in no formula
     assert abs(np.sqrt(np.mean(ratios)) - 1) < 0.065
+
+
+@pytest.mark.parametrize(
+    ("rough", "fine", "tolerance", "renders", "few", "all_"),
+    [(0.02, 0.0, None, 2, 2, 0), (3.0, 0.02, None, 2, 2, 2), (3.0, 3.0, None, 6, 2, 6), (3.0, 3.0, 3.0, 2, 2, 0)],
+)
+def test_rays_are_added_until_their_noise_does_not_matter(
+    small, monkeypatch, rough, fine, tolerance, renders, few, all_
+):
+    """Exact images with noise in the place of the renderer's: two of few rays do, or two of all, or six at most.
+
+    A tolerance of which the noise is less than a hundredth needs no more.
+    """
+    floor = small.tried(floor=Floor(reflectance=0.2, height=-3.0))
+    task = {} if tolerance is None else {"task": small.task.tried(tolerance=tolerance)}
+    picture, asked = Picture.of(floor.tried(**task), (30, 90), (15, 270)), []
+    exact = block_image(small, Pose(30, 90), Pose(15, 270))
+
+    def made(how, of, effects, seed):
+        is_rough = how.quality.random_samples is not None
+        if of == picture and effects == "auto":
+            asked.append(is_rough)
+        noise = np.random.default_rng((seed, is_rough)).normal(size=exact.shape)
+        return exact + (rough if is_rough else fine) * noise
+
+    monkeypatch.setattr(simulation.How, "_rendered", made)
+    found = simulation._until_quiet(picture, Method("gradient"), simulation.How())
+    assert found.renders == renders
+    assert (asked.count(True), asked.count(False)) == (few, all_)
