@@ -249,9 +249,10 @@ def test_rays_are_added_until_their_noise_does_not_matter(
 
     A tolerance of which the noise is less than a hundredth needs no more.
     """
-    floor = small.tried(floor=Floor(reflectance=0.2, height=-3.0))
-    task = {} if tolerance is None else {"task": small.task.tried(tolerance=tolerance)}
-    picture, asked = Picture.of(floor.tried(**task), (30, 90), (15, 270)), []
+    ends = [corner.model_dump(mode="json") for corner in (small.task.start, small.task.end)]
+    length = {"name": "length", "kind": "distance", "features": ends, "tolerance": tolerance}
+    scene = small.with_(task=None, measurands=[length], floor=Floor(reflectance=0.2, height=-3.0))
+    picture, asked = Picture.of(scene, (30, 90), (15, 270)), []
     exact = block_image(small, Pose(30, 90), Pose(15, 270))
 
     def made(how, of, effects, seed):
