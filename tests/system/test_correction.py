@@ -226,16 +226,12 @@ def test_the_renders_noise_is_told_by_all_lines(small):
 
 
 def test_light_from_the_floor_is_part_of_the_contrast():
-    """Of three pictures of grey_floor the predicted sigma is that of renders; 9 % too small without that light."""
+    """Of a picture of grey_floor the predicted sigma is that of a render; 8 % too small without that light."""
     scene = load("grey_floor")
-    ratios = []
-    for setting in scene.settings[:3]:
-        picture = Picture.of(scene, setting.sensor, setting.light)
-        image = render.image(picture, quality=render.Quality(edge_samples=16, random_samples=4, everywhere=False))
-        told = measure.propagate(image, picture).measurands
-        ratios.append(planner.predict(picture).measurands[0].variance_object / told.covariance[0, 0])
-    # margin: 0.031 with, 0.089 without: the floor's own light from walls is in no formula
-    assert abs(np.sqrt(np.mean(ratios)) - 1) < 0.065
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    told = measure.propagate(simulation.How().rough.image(picture), picture).measurands
+    ratio = np.sqrt(planner.predict(picture).measurands[0].variance_object / told.covariance[0, 0])
+    assert abs(ratio - 1) < 0.045  # margin: 0.02 with, 0.08 without; what walls send to the floor is in no formula
 
 
 @pytest.mark.parametrize(
