@@ -20,8 +20,8 @@ from typing import Any
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
-_WAYS = (False, 1, False), (True, 1, False), (False, 2, False), (True, 2, False), (False, 1, True)
-"""Whether the shape is healed, what the pieces of a turn are divided by, whether what comes is taken as it is."""
+_WAYS = ("", 1), ("healed", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
+"""What is done to the shape, and what the pieces of a turn are divided by; the first if all of them leave it open."""
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
@@ -44,16 +44,16 @@ def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
         raise Unusable("of a solid body, got none")
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
-    for heals, divisor, last in _WAYS:
-        body, wanted = _healed(shape) if heals else shape, max(_FEWEST, pieces // divisor)
+    for done, divisor in (*_WAYS, _WAYS[0]):
+        body, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
-            found = _divided(reader, body, wanted)
-        except Unusable:
-            if last:
-                raise
-            continue
-        if last or _is_closed(found):
+            found = _divided(reader, body, _splined(shape) if done == "splines" else body, wanted)
+        except Unusable as error:
+            found, broken = [], error
+        if found and _is_closed(found):
             break
+    if not found:
+        raise broken
     return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(body))}
 
 
@@ -62,18 +62,42 @@ def _faces(shape: Any) -> list[Any]:
     return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
 
 
-def _divided(reader: Any, shape: Any, pieces: int) -> list[dict[str, Any]]:
-    """The faces, in triangles of so many pieces a turn."""
+def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
+    """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
+    _cut(cut, pieces, controlled=cut is shape)
+    faces = _faces(shape)
+    found = [
+        {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
+        for face, divided in zip(faces, _faces(cut), strict=True)
+    ]
+    for face in _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")[len(faces) :]:
+        _triangles(face)  # or the file is broken, and this one may be missing in a solid
+    return found
+
+
+def _cut(shape: Any, pieces: int, controlled: bool) -> None:
+    """Cut a shape into triangles; where it is not controlled how near they come within a face the angle decides."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
 
     BRepTools.Clean_s(shape)
-    BRepMesh_IncrementalMesh(shape, _LINEAR, True, 4 * math.pi / pieces, False)
-    faces = _faces(shape)
-    found = [{"name": _name(reader, face), **_surface(face), **_triangles(face)} for face in faces]
-    for face in _parts([*_parts([shape], "TopAbs_SOLID", "Solid"), shape], "TopAbs_FACE", "Face")[len(faces) :]:
-        _triangles(face)  # or the file is broken, and this one may be missing in a solid
-    return found
+    angle = 4 * math.pi / pieces
+    if controlled:
+        BRepMesh_IncrementalMesh(shape, _LINEAR, True, angle, False)
+        return
+    from OCP.IMeshTools import IMeshTools_Parameters
+    from OCP.Message import Message_ProgressRange
+
+    how = IMeshTools_Parameters()
+    how.Deflection, how.Relative, how.Angle, how.ControlSurfaceDeflection = _LINEAR, True, angle, False
+    BRepMesh_IncrementalMesh(shape, how, Message_ProgressRange())
+
+
+def _splined(shape: Any) -> Any:
+    """The shape with all its faces as splines: they are cut another way, where a cone's own parameters leave holes."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+
+    return BRepBuilderAPI_NurbsConvert(shape).Shape()
 
 
 def _healed(shape: Any) -> Any:
