@@ -272,12 +272,20 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
             continue
         away = corners[small] - middles[large]
         near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
-        if (np.abs(away @ normals[large]) <= near).all():
+        if (np.abs(away @ normals[large]) <= near).all() and not _folded(corners[small], normals[[large, small]], near):
             sets.merge(large, small)
             largest[sets[large]] = large
             corners[large] = np.concatenate([corners[large], corners.pop(small)])
             kept.append((one, other))
     return np.array(kept, int).reshape(-1, 2)
+
+
+def _folded(triangles: np.ndarray, normals: np.ndarray, near: np.ndarray) -> bool:
+    """Whether triangles (t, 3, 3) look back from the plane that they lie in; a sliver looks anywhere, and does not."""
+    one, other = (triangles[:, k] - triangles[:, 0] for k in (1, 2))
+    area = (np.cross(one, other) @ normals[1]).sum() / 2
+    thin = near.max() * np.ptp(triangles.reshape(-1, 3), axis=0).max()
+    return bool(normals[0] @ normals[1] < 0 and area > thin)
 
 
 def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
