@@ -15,7 +15,8 @@ from scenes import InvalidInput, Measurand, Mesh, Scene, Solid
 from scenes.load import from_document
 from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
-from scenes.parts import bodies, step
+from scenes.parts import step
+from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
 from validation.first_look import FirstLook, first_look
@@ -119,7 +120,7 @@ def _record(part: Path, units: str, body: str | int | None) -> Step | Mesh:
     """The part as a scene would say it."""
     if part.suffix.lower() in step.FORMATS:
         return Step(kind="step", file=part, body=body)
-    return Mesh(kind="mesh", file=part, units=None if part.suffix.lower() in bodies.FORMATS else units, body=body)
+    return Mesh(kind="mesh", file=part, units=None if part.suffix.lower() in SAY_UNIT else units, body=body)
 
 
 def _box(solid: Solid) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,6 @@ import trimesh
 
 from scenes.errors import InvalidInput
 
-FORMATS = (".glb", ".3mf")
 MOST_BODIES = 10_000
 _NAMED = 12  # bodies in a message
 _MOST_UNPACKED = 512 << 20  # bytes of a 3MF file's XML

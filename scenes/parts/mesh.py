@@ -23,12 +23,13 @@ from scenes.parts.chains import Chain
 from scenes.parts.facets import Facets, facets
 from scenes.parts.joined import joined
 from scenes.parts.mend import mended
+from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
 from scenes.units import Unit, in_unit
 
 _PLAINLY = (".stl", ".ply", ".obj")  # one body, in no unit
-FORMATS = (*_PLAINLY, *bodies.FORMATS)
+FORMATS = (*_PLAINLY, *SAY_UNIT)
 MOST_BYTES = 64 << 20
 MOST_TRIANGLES = 1_000_000
 _FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
@@ -68,7 +69,7 @@ def read(path: Path, scale: float | None = 1.0, unit: Unit = "mm", body: str | i
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            if f".{kind}" in bodies.FORMATS:
+            if f".{kind}" in SAY_UNIT:
                 several, millimetres = bodies.read(path, data, MOST_TRIANGLES)
                 mesh, told = bodies.chosen(several, body) if several else None, in_unit(millimetres, "mm", unit)
             else:  # without a resolver: a texture or a material beside the file is none of our business

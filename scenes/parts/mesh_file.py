@@ -12,6 +12,8 @@ from scenes.parts.part_file import PartFile
 from scenes.parts.solid import Solid
 from scenes.units import Unit, in_unit
 
+SAY_UNIT = (".glb", ".3mf")  # what they hold is in it
+
 
 class Mesh(PartFile):
     """A part from a mesh file (STL, PLY, OBJ, GLB or 3MF).
@@ -35,8 +37,9 @@ class Mesh(PartFile):
 
     def solid_in(self, unit: Unit | None) -> Solid:
         """Vertices, faces, edges and circles in a unit, the file's own where not given; read once."""
-        told = None if self.units is None else in_unit(1.0, self.units, unit or self.units)
-        return self._once(self._read, told, unit or "mm")
+        if self.units is None and self.file.suffix.lower() in SAY_UNIT:
+            return self._once(self._read, None, unit or "mm")
+        return self._once(self._read, 1.0 if None in (unit, self.units) else in_unit(1.0, self.units, unit))
 
     def curved_in(self, unit: Unit | None) -> tuple[Curved, ...]:
         """Cylinders recognised among the facets that can be measured."""
@@ -44,7 +47,7 @@ class Mesh(PartFile):
 
         return recognised_walls(self.solid_in(unit))
 
-    def _read(self, file: Path, scale: float | None, unit: Unit) -> Solid:
+    def _read(self, file: Path, scale: float | None, unit: Unit = "mm") -> Solid:
         from scenes.parts import mesh  # loads trimesh
 
         return mesh.renamed(mesh.read(file, scale, unit, self.body), self.names)
