@@ -16,6 +16,7 @@ from scenes.load import from_document
 from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
 from scenes.parts import step
+from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
 from validation.first_look import FirstLook, first_look
@@ -69,20 +70,26 @@ _NOTHING = """
 
 
 def written(
-    part: Path, path: Path, units: str, report: Callable[[str, int, int], None] = lambda *_: None
+    part: Path,
+    path: Path,
+    units: str,
+    report: Callable[[str, int, int], None] = lambda *_: None,
+    body: str | int | None = None,
 ) -> tuple[Scene, FirstLook | None]:
     """Write a scene of a part's file.
 
     Parameters
     ----------
     part : Path
-        STL, PLY, OBJ or STEP.
+        STL, PLY, OBJ, GLB, 3MF or STEP.
     path : Path
         The scene's file.
     units : str
-        Of a mesh's numbers, and then of the scene.
+        Of the scene, and of a mesh's numbers where its file says none.
     report : callable
         Called with what is done, how many steps are done, and of how many.
+    body : str or int, optional
+        One of several bodies by its name or number; all where not given.
 
     Returns
     -------
@@ -98,8 +105,8 @@ def written(
     if units not in scenes.UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(scenes.UNITS)}, got {units!r}")
     report("reading", 0, 5)
-    record = _record(part, units)
-    text = _text(part, path, units, *_box(record.solid_in(units)))
+    record = _record(part, units, body)
+    text = _text(record, path, units, *_box(record.solid_in(units)))
     scene = _loaded(text, path, record)
     candidates = proposed(scene.all_walls, units)
     look = first_look(scene, candidates, report) if candidates else None
@@ -109,13 +116,11 @@ def written(
     return made, look
 
 
-def _is_step(part: Path) -> bool:
-    return part.suffix.lower() in step.FORMATS
-
-
-def _record(part: Path, units: str) -> Step | Mesh:
+def _record(part: Path, units: str, body: str | int | None) -> Step | Mesh:
     """The part as a scene would say it."""
-    return Step(kind="step", file=part) if _is_step(part) else Mesh(kind="mesh", file=part, units=units)
+    if part.suffix.lower() in step.FORMATS:
+        return Step(kind="step", file=part, body=body)
+    return Mesh(kind="mesh", file=part, units=None if part.suffix.lower() in SAY_UNIT else units, body=body)
 
 
 def _box(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
@@ -123,16 +128,18 @@ def _box(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
     return solid.vertices.min(0), solid.vertices.max(0)
 
 
-def _text(part: Path, path: Path, units: str, low: np.ndarray, high: np.ndarray) -> str:
+def _text(record: Step | Mesh, path: Path, units: str, low: np.ndarray, high: np.ndarray) -> str:
     """All but what is measured, and where."""
     focal, distance = _lens(in_unit(float(np.linalg.norm(high - low)), units, "mm"))
-    said = [f'kind = "{"step" if _is_step(part) else "mesh"}"', f"file = {_quoted(os.path.relpath(part, path.parent))}"]
-    if not _is_step(part):
+    said = [f'kind = "{record.kind}"', f"file = {_quoted(os.path.relpath(record.file, path.parent))}"]
+    if record.body is not None:
+        said.append(f"body = {json.dumps(record.body)} # one of several")
+    if getattr(record, "units", None):
         said.append(f'units = "{units}" # of the numbers in that file')
     return _TEXT.format(
         units=units,
         name=path.name,
-        title=part.stem.replace('"', "'").replace("\\", "/"),
+        title=record.file.stem.replace('"', "'").replace("\\", "/"),
         part="\n".join(said),
         **_SENSOR,
         focal=f"{focal:.1f}",

@@ -21,7 +21,9 @@ from imaging.light.appearance import seen_by_rays
 from imaging.pictures import Pictures
 from scenes import Circle
 
-_BESIDE, _SHARES = np.array([-np.sqrt(3), 0.0, np.sqrt(3)]), np.array([1, 4, 1]) / 6  # Gauss-Hermite, tangentially
+_BESIDE = np.linspace(-2.5, 2.5, 11)  # standard deviations, tangentially: facets of a wall end anywhere between them
+_SHARES = np.exp(-(_BESIDE**2) / 2) / np.exp(-(_BESIDE**2) / 2).sum()
+_MIDDLE = len(_BESIDE) // 2
 _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS = 8  # of Newton's method
@@ -30,8 +32,9 @@ _STEEPER = 0.3  # by which the slope there may differ from a lone step's
 _ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
 _LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
 _AT = 1e-6  # of the way to the next place: there is the place itself
-_MOST = 4  # times `RIM_POINTS`
-_SPACING = 2.0  # smoothing scales between places, while there are not so many
+_MOST = 12  # times `RIM_POINTS`
+_SPACING = 0.7  # smoothing scales between places, while there are not so many
+_AT_ONCE = 1 << 17  # rays
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     levels = _levels(pictures, circle, angle, normals, width, where)
     alone = zero_of_steps(where, _SHARES)
     crossing, slope = _zero(levels, where, alone)
-    sides = levels[:, 1, [_CELLS - 1, _CELLS]].T
+    sides = levels[:, _MIDDLE, [_CELLS - 1, _CELLS]].T
     noise = sensor.recorded(scene.noise, scene.noise.dark_level + sides).noise_variance
     moved = (crossing - alone) * width
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -167,8 +170,13 @@ def _uneven(levels: np.ndarray) -> np.ndarray:
 def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     """Signal at image points (k, 2) from the image's middle, ideal px."""
     axes = camera_frame(pictures.scene.camera, pictures.sensors)
-    rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points) @ np.stack([axes.right, axes.down])
-    return seen_by_rays(pictures, rays)
+    across = np.stack([axes.right, axes.down])
+    found = np.empty(len(points))
+    for k in range(0, len(points), _AT_ONCE):
+        part = slice(k, k + _AT_ONCE)
+        rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points[part]) @ across
+        found[part] = seen_by_rays(pictures, rays)
+    return found
 
 
 def _zero(levels: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, light_position, project
 from imaging.pictures import Pictures
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Pose, Scene
 
 _BODY = 0.05  # of the distance: radius of a body of which nothing is said
 Region = tuple[float, float, float]  # polar, azimuth, radius, degrees
@@ -156,6 +157,16 @@ def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray
     low, high = limits
     width = high - low if abs(high - low) == 360 else (high - low) % 360
     return ((poses[:, 1] - low + 1e-9) % 360 <= abs(width) + 2e-9) | (poses[:, 0] < 1e-9)
+
+
+def same_side(poses: Iterable[Pose]) -> tuple[float, float]:
+    """Polar angles of the hemisphere in which poses stand: the upper one without any, both where some are in each.
+
+    >>> same_side([Pose(160, 20)]), same_side([]), same_side([Pose(20, 0), Pose(100, 0)])
+    ((90.0, 180.0), (0.0, 90.0), (0.0, 180.0))
+    """
+    polar = [pose.polar_deg for pose in poses]
+    return (0.0 if min(polar, default=0.0) <= 90 else 90.0), (180.0 if max(polar, default=0.0) > 90 else 90.0)
 
 
 def _polar(poses: np.ndarray, limits: tuple[float, float]) -> np.ndarray:

@@ -18,14 +18,18 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
+from scenes.parts import bodies
 from scenes.parts.chains import Chain
 from scenes.parts.facets import Facets, facets
 from scenes.parts.joined import joined
 from scenes.parts.mend import mended
+from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.rims import Rim, boundaries, rims
 from scenes.parts.solid import Circle, Edge, Solid
+from scenes.units import Unit, in_unit
 
-FORMATS = (".stl", ".ply", ".obj")
+_PLAINLY = (".stl", ".ply", ".obj")  # one body, in no unit
+FORMATS = (*_PLAINLY, *SAY_UNIT)
 MOST_BYTES = 64 << 20
 MOST_TRIANGLES = 1_000_000
 _FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
@@ -34,13 +38,23 @@ _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
 _SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a height
 
 
-def read(path: Path, scale: float = 1.0) -> Solid:
-    """Solid from an STL, PLY or OBJ file, its lengths multiplied by ``scale``.
+def read(path: Path, scale: float | None = 1.0, unit: Unit = "mm", body: str | int | None = None) -> Solid:
+    """Solid from an STL, PLY, OBJ, GLB or 3MF file.
+
+    Parameters
+    ----------
+    path : Path
+    scale : float, optional
+        What its lengths are multiplied by. None: GLB and 3MF files say their unit, and are brought to ``unit``; others
+        stay as they are.
+    unit : {"mm", "cm", "m", "inch"}
+    body : str or int, optional
+        Name or number of one of several bodies (GLB, 3MF); all where not given.
 
     Raises
     ------
     InvalidInput
-        If the file cannot be read, or its surface is not closed.
+        If the file cannot be read, there is no such body, or its surface is not closed.
     """
     if path.suffix.lower() not in FORMATS:
         raise InvalidInput(f"object.file must be one of {', '.join(FORMATS)}, got {path.name!r}")
@@ -48,12 +62,20 @@ def read(path: Path, scale: float = 1.0) -> Solid:
         data, kind = read_bytes(path, MOST_BYTES), path.suffix.lower()[1:]
     except Unreadable as error:
         raise InvalidInput(f"object.file must be a readable mesh, got {path} ({error.reason})") from None
+    if body is not None and f".{kind}" in _PLAINLY:
+        raise InvalidInput(f"object.body must be left out for a {kind.upper()} file, which is one body, got {body!r}")
     _check_told(path, data, kind)
+    told = 1.0
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            # without a resolver: a texture or a material beside the file is none of our business
-            mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, resolver=None, **_PLAIN.get(kind, {}))
+            if f".{kind}" in SAY_UNIT:
+                several, millimetres = bodies.read(path, data, MOST_TRIANGLES)
+                mesh, told = bodies.chosen(several, body) if several else None, in_unit(millimetres, "mm", unit)
+            else:  # without a resolver: a texture or a material beside the file is none of our business
+                mesh = trimesh.load_mesh(io.BytesIO(data), file_type=kind, resolver=None, **_PLAIN.get(kind, {}))
+    except InvalidInput:
+        raise
     except ImportError:  # the reader's guess at the text's encoding
         raise InvalidInput(f"object.file must be a readable mesh, got {path} (text that is not UTF-8)") from None
     except Exception as error:  # every reader raises its own
@@ -61,8 +83,9 @@ def read(path: Path, scale: float = 1.0) -> Solid:
         raise InvalidInput(f"object.file must be a readable mesh, got {path} ({reason})") from None
     if isinstance(mesh, trimesh.Trimesh):
         _check_mesh(path, mesh)
-        if scale != 1:
-            mesh.vertices *= scale
+        factor = told if scale is None else scale
+        if factor != 1:
+            mesh.vertices *= factor
     with np.errstate(all="ignore"):
         return solid(mesh)
 
@@ -272,12 +295,20 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
             continue
         away = corners[small] - middles[large]
         near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
-        if (np.abs(away @ normals[large]) <= near).all():
+        if (np.abs(away @ normals[large]) <= near).all() and not _folded(corners[small], normals[[large, small]], near):
             sets.merge(large, small)
             largest[sets[large]] = large
             corners[large] = np.concatenate([corners[large], corners.pop(small)])
             kept.append((one, other))
     return np.array(kept, int).reshape(-1, 2)
+
+
+def _folded(triangles: np.ndarray, normals: np.ndarray, near: np.ndarray) -> bool:
+    """Whether triangles (t, 3, 3) look back from the plane that they lie in; a sliver looks anywhere, and does not."""
+    one, other = (triangles[:, k] - triangles[:, 0] for k in (1, 2))
+    area = (np.cross(one, other) @ normals[1]).sum() / 2
+    thin = near.max() * np.ptp(triangles.reshape(-1, 3), axis=0).max()
+    return bool(normals[0] @ normals[1] < 0 and area > thin)
 
 
 def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

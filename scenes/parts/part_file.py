@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import PrivateAttr, ValidationInfo, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from scenes.model import Model
 from scenes.parts.curved import Curved
@@ -23,6 +23,8 @@ class PartFile(Model):
     kind: str
     file: Path
     """Relative to the scene's file."""
+    body: Annotated[int, Field(ge=1)] | str | None = None
+    """Name or number, from 1, of one of several bodies (STEP, GLB, 3MF); all of them where not given."""
 
     _made: _Made | None = PrivateAttr(None)  # what the file held when it was read
 
@@ -42,7 +44,7 @@ class PartFile(Model):
     @property
     def _said(self) -> tuple:
         """What the scene says of the part, to be compared."""
-        return (self.file,)
+        return self.file, self.body
 
     @property
     def solid(self) -> Solid:

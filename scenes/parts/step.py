@@ -177,8 +177,8 @@ class StepPart:
         return tuple(found)
 
 
-def read(path: Path, unit: Unit = "mm") -> StepPart:
-    """The part of a STEP file in a unit of length; the file says its own.
+def read(path: Path, unit: Unit = "mm", body: str | int | None = None) -> StepPart:
+    """The part of a STEP file in a unit of length, or one of its bodies by name or number; the file says its own.
 
     Raises
     ------
@@ -195,12 +195,13 @@ def read(path: Path, unit: Unit = "mm") -> StepPart:
         raise InvalidInput(f"{_MISSING}, got {path}")
     if b"ISO-10303-21" not in data[:1000]:
         raise InvalidInput(f"object.file must be a readable STEP file, got {path} (without its first line)")
-    return part(_asked(path, data), unit)
+    return part(_asked(path, data, body), unit)
 
 
-def _asked(path: Path, data: bytes) -> dict[str, Any]:
+def _asked(path: Path, data: bytes, body: str | int | None) -> dict[str, Any]:
     """The kernel's record, from a process of its own."""
     command = [sys.executable, "-P", step_kernel.__file__, str(SEGMENTS), str(MOST_FACES)]
+    command += [] if body is None else [json.dumps(body)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, timeout=MOST_SECONDS, check=False)
     except subprocess.TimeoutExpired:

@@ -35,4 +35,4 @@ class Step(PartFile):
         """Exact surfaces and edges in a unit, mm where not given; read once."""
         from scenes.parts import step  # loads trimesh
 
-        return self._once(step.read, unit or "mm")
+        return self._once(step.read, unit or "mm", self.body)

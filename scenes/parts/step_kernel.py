@@ -1,10 +1,10 @@
 """What OpenCASCADE reads from a STEP file, as plain JSON; run as a process of its own.
 
-    python -P scenes/parts/step_kernel.py SEGMENTS MOST_FACES < part.step > part.json
+    python -P scenes/parts/step_kernel.py SEGMENTS MOST_FACES [BODY] < part.step > part.json
 
 The kernel is C++, and a hostile file may end its process: then only this one ends. Lengths are mm, whatever the file's
-unit. One body: several solids are told apart by nothing here, and surfaces beside them (datum targets) are left
-out. Exit status 2 with one line on standard error where the file cannot be used.
+unit. Several solids are one part unless BODY names one, a number or a string of JSON; surfaces beside them (datum
+targets) are left out. Exit status 2 with one line on standard error where the file cannot be used.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from typing import Any
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
-_WAYS = (False, 1, False), (True, 1, False), (False, 2, False), (True, 2, False), (False, 1, True)
-"""Whether the shape is healed, what the pieces of a turn are divided by, whether what comes is taken as it is."""
+_WAYS = ("", 1), ("healed", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
+"""What is done to the shape, and what the pieces of a turn are divided by; the first if all of them leave it open."""
+_NAMED = 12  # bodies in a message
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
@@ -31,12 +32,14 @@ class Unusable(Exception):
     """A file that is no STEP file of a solid."""
 
 
-def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
+def record(data: bytes, segments: int, most_faces: int, body: str | int | None = None) -> dict[str, Any]:
     """Faces on their surfaces, edges on their curves, and triangles of ``segments`` pieces a turn.
 
     Where these leave the surface open, of a healed shape, or of fewer pieces.
     """
     reader, shape = _read(data)
+    if body is not None:
+        shape = _chosen(reader, shape, body)
     faces = _faces(shape)
     if len(faces) > most_faces:
         raise Unusable(f"of at most {most_faces} faces, got {len(faces)}")
@@ -44,16 +47,16 @@ def record(data: bytes, segments: int, most_faces: int) -> dict[str, Any]:
         raise Unusable("of a solid body, got none")
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
-    for heals, divisor, last in _WAYS:
-        body, wanted = _healed(shape) if heals else shape, max(_FEWEST, pieces // divisor)
+    for done, divisor in (*_WAYS, _WAYS[0]):
+        body, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
-            found = _divided(reader, body, wanted)
-        except Unusable:
-            if last:
-                raise
-            continue
-        if last or _is_closed(found):
+            found = _divided(reader, body, _splined(shape) if done == "splines" else body, wanted)
+        except Unusable as error:
+            found, broken = [], error
+        if found and _is_closed(found):
             break
+    if not found:
+        raise broken
     return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(body))}
 
 
@@ -62,18 +65,42 @@ def _faces(shape: Any) -> list[Any]:
     return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
 
 
-def _divided(reader: Any, shape: Any, pieces: int) -> list[dict[str, Any]]:
-    """The faces, in triangles of so many pieces a turn."""
+def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
+    """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
+    _cut(cut, pieces, controlled=cut is shape)
+    faces = _faces(shape)
+    found = [
+        {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
+        for face, divided in zip(faces, _faces(cut), strict=True)
+    ]
+    for face in _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")[len(faces) :]:
+        _triangles(face)  # or the file is broken, and this one may be missing in a solid
+    return found
+
+
+def _cut(shape: Any, pieces: int, controlled: bool) -> None:
+    """Cut a shape into triangles; where it is not controlled how near they come within a face the angle decides."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
 
     BRepTools.Clean_s(shape)
-    BRepMesh_IncrementalMesh(shape, _LINEAR, True, 4 * math.pi / pieces, False)
-    faces = _faces(shape)
-    found = [{"name": _name(reader, face), **_surface(face), **_triangles(face)} for face in faces]
-    for face in _parts([*_parts([shape], "TopAbs_SOLID", "Solid"), shape], "TopAbs_FACE", "Face")[len(faces) :]:
-        _triangles(face)  # or the file is broken, and this one may be missing in a solid
-    return found
+    angle = 4 * math.pi / pieces
+    if controlled:
+        BRepMesh_IncrementalMesh(shape, _LINEAR, True, angle, False)
+        return
+    from OCP.IMeshTools import IMeshTools_Parameters
+    from OCP.Message import Message_ProgressRange
+
+    how = IMeshTools_Parameters()
+    how.Deflection, how.Relative, how.Angle, how.ControlSurfaceDeflection = _LINEAR, True, angle, False
+    BRepMesh_IncrementalMesh(shape, how, Message_ProgressRange())
+
+
+def _splined(shape: Any) -> Any:
+    """The shape with all its faces as splines: they are cut another way, where a cone's own parameters leave holes."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+
+    return BRepBuilderAPI_NurbsConvert(shape).Shape()
 
 
 def _healed(shape: Any) -> Any:
@@ -107,6 +134,19 @@ def _read(data: bytes) -> tuple[Any, Any]:
     if not reader.TransferRoots() or not reader.NbShapes():
         raise Unusable("of a solid body, got none")
     return reader, reader.OneShape()
+
+
+def _chosen(reader: Any, shape: Any, body: str | int) -> Any:
+    """The solid of a name, or of a number from 1 in the file's order."""
+    solids = _parts([shape], "TopAbs_SOLID", "Solid")
+    names = [_name(reader, solid) for solid in solids]
+    if isinstance(body, int) and 0 < body <= len(solids):
+        return solids[body - 1]
+    if body in names:
+        return solids[names.index(body)]
+    told = [f"{number} {name!r}" if name else str(number) for number, name in enumerate(names[:_NAMED], 1)]
+    listed = ", ".join(told) + (f", ... {len(names)}" if len(names) > _NAMED else "")
+    raise Unusable(f"with object.body one of {listed}, got {body!r}")
 
 
 def _parts(shapes: list[Any], kind: str, cast: str) -> list[Any]:
@@ -272,7 +312,8 @@ def main() -> int:
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     try:
-        found = record(sys.stdin.buffer.read(), int(sys.argv[1]), int(sys.argv[2]))
+        body = json.loads(sys.argv[3]) if len(sys.argv) > 3 else None
+        found = record(sys.stdin.buffer.read(), int(sys.argv[1]), int(sys.argv[2]), body)
     except ImportError:
         print("missing", file=sys.stderr)
         return 3

@@ -28,6 +28,7 @@ from scenes.parts import mesh, step
 KINDS = (*mesh.FORMATS, *step.FORMATS)
 MOST_SECONDS = 200  # of a command's processor
 PATIENCE = 6  # times that on the wall, for a machine that does other things, too
+COMMANDS = ("new", "show", "plan", "render", "measure", "validate")
 VALIDATED = 3  # measurands
 FAR = 4.0  # standard deviations that a value may be from the part's own
 
@@ -81,7 +82,7 @@ def run(command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
 
 
 def steps(part: Path, folder: Path, renders: int) -> Iterator[Step]:
-    """All of a part, as far as it goes."""
+    """All of a part, as far as it goes; each when it is asked for."""
     scene, picture, few = folder / "part.toml", folder / "part.png", folder / "few.toml"
     made, facts = run("new", part, "-o", scene)
     asked = facts.get("measurands", [])
@@ -145,22 +146,33 @@ def _only(text: str, plan: dict[str, Any]) -> str:
 def corpus(
     folder: Annotated[Path, typer.Argument(help="Of files of parts; those within its folders, too.")],
     renders: Annotated[int, typer.Option(help="Of the first three measurands.")] = 200,
-    every: Annotated[int, typer.Option(help="Only every so manieth file.")] = 1,
+    sample: Annotated[int, typer.Option(help="Only so many files, drawn with the seed; 0: all.")] = 0,
+    seed: Annotated[int, typer.Option()] = 1,
+    until: Annotated[str, typer.Option(help=f"The last command: {', '.join(COMMANDS)}.")] = COMMANDS[-1],
     log: Annotated[Path, typer.Option(help="What is done; begun anew where it is not there.")] = Path("corpus.jsonl"),
 ) -> None:
     """Parts from files through new, show, plan, render, measure and validate; resumable."""
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS)[::every]
+    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS)
+    if sample:
+        files = [files[k] for k in np.random.default_rng(seed).permutation(len(files))[:sample]]
     known = {row["part"] for row in map(json.loads, log.read_text("utf-8").splitlines())} if log.exists() else set()
     for number, part in enumerate(files, 1):
         name = str(part.relative_to(folder))
         if name in known:
             continue
         with tempfile.TemporaryDirectory() as place:
-            rows = [asdict(each) for each in steps(part, Path(place), renders)]
+            rows = [asdict(each) for each in _upto(until, steps(part, Path(place), renders))]
         with log.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"part": name, "steps": rows}) + "\n")
         print(f"{number}/{len(files)} {name}: " + "; ".join(map(_line, rows)), flush=True)
     print(table([json.loads(line) for line in log.read_text("utf-8").splitlines()]))
+
+
+def _upto(last: str, made: Iterator[Step]) -> Iterator[Step]:
+    for each in made:
+        yield each
+        if each.command == last:
+            return
 
 
 def _line(row: dict[str, Any]) -> str:
@@ -170,7 +182,7 @@ def _line(row: dict[str, Any]) -> str:
 def table(rows: list[dict[str, Any]]) -> str:
     """How many parts came through each command, in which time and memory; and why the others did not."""
     lines = [f"{len(rows)} parts", f"{'command':<10}{'parts':>6}{'done':>6}{'median s':>10}{'95 % s':>8}{'MiB':>7}"]
-    for command in ("new", "show", "plan", "render", "measure", "validate"):
+    for command in COMMANDS:
         found = [each for row in rows for each in row["steps"] if each["command"] == command]
         if found:
             middle, late = np.quantile([each["seconds"] for each in found], [0.5, 0.95])

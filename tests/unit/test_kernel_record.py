@@ -67,8 +67,9 @@ def curve(kind, **numbers):
 def kernel(monkeypatch):
     """OpenCASCADE's names as far as they are used; ``said`` is what the test lets it read."""
     said = SimpleNamespace(
-        status=1, roots=1, shapes=1, whole=None, names={}, mesh=None, moved=(0, 0, 0), cut=None, healed=lambda: None
-    )
+        status=1, roots=1, shapes=1, whole=None, names={}, mesh=None, moved=(0, 0, 0), cut=None,
+        healed=lambda: None, splined=lambda shape: shape,
+    )  # fmt: skip
     entity = lambda face, _: said.names.get(face.name)  # noqa: E731
 
     class Reader:
@@ -88,6 +89,11 @@ def kernel(monkeypatch):
         "OCP.BRepMesh": {"BRepMesh_IncrementalMesh": cut},
         "OCP.BRepTools": {"BRepTools": SimpleNamespace(Clean_s=lambda shape: None)},
         "OCP.ShapeFix": {"ShapeFix_Shape": lambda shape: SimpleNamespace(Perform=said.healed, Shape=lambda: shape)},
+        "OCP.BRepBuilderAPI": {
+            "BRepBuilderAPI_NurbsConvert": lambda shape: SimpleNamespace(Shape=lambda: said.splined(shape)),
+        },
+        "OCP.IMeshTools": {"IMeshTools_Parameters": SimpleNamespace},
+        "OCP.Message": {"Message_ProgressRange": lambda: None},
         "OCP.STEPControl": {"STEPControl_Reader": Reader},
         "OCP.TopAbs": {
             "TopAbs_ShapeEnum": kinds, "TopAbs_Orientation": SimpleNamespace(TopAbs_REVERSED="reversed"),
@@ -173,7 +179,9 @@ def test_triangles_are_counter_clockwise_from_outside(kernel):
 
 
 def test_ways_to_a_closed_surface(kernel):
-    """Triangles of a tetrahedron are taken at once; of an open one the shape is healed, then divided more coarsely."""
+    """Triangles of a tetrahedron are taken at once; of an open one the shape is healed, divided more coarsely, and cut
+    as splines, whose faces are still what they were.
+    """
     tried = []
     tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
     nodes = [vector(0, 0, 0), vector(1, 0, 0), vector(0, 1, 0), vector(0, 0, 1)]
@@ -184,20 +192,33 @@ def test_ways_to_a_closed_surface(kernel):
             NbNodes=lambda: 4, Node=lambda i: nodes[i - 1], NbTriangles=lambda: len(triangles), Triangle=corner
         )
 
-    sys.modules["OCP.BRepMesh"].BRepMesh_IncrementalMesh = lambda *given: tried.append(round(4 * math.pi / given[3]))
+    def cut(shape, *how):
+        kernel.mesh = of(tetrahedron if shape is splined and kernel.helps else kernel.there)
+        tried.append(round(4 * math.pi / (how[2] if shape is not splined else how[0].Angle)))
+
+    sys.modules["OCP.BRepMesh"].BRepMesh_IncrementalMesh = cut
     kernel.healed = lambda: tried.append("healed")
-    kernel.whole, kernel.mesh = body(plain("f")), of(tetrahedron)
+    kernel.whole, splined = body(plain("f")), body(plain("g", kind="BSplineSurface"))
+    kernel.splined = lambda shape: tried.append("splines") or splined
+    kernel.there, kernel.helps = tetrahedron, False
     assert len(step_kernel.record(b"data", 96, 2000)["faces"][0]["triangles"]) == 4
     assert tried == [96]
     tried.clear()
-    kernel.mesh = of(tetrahedron[:3])
+    kernel.there, kernel.names = tetrahedron[:3], {"f": SimpleNamespace(Name=lambda: None)}
+    coarser = ["healed", 96, 48, "healed", 48, "splines"]
     assert step_kernel.record(b"data", 96, 2000)["segments"] == 96
-    assert tried == [96, "healed", 96, 48, "healed", 48, 96]
+    assert tried == [96, *coarser, 96, "splines", 48, 96]
     tried.clear()
-    kernel.mesh = None
+    kernel.helps = True
+    found = step_kernel.record(b"data", 96, 2000)
+    assert tried == [96, *coarser, 96]
+    assert (len(found["faces"][0]["triangles"]), found["segments"]) == (4, 96)
+
+
+def test_faces_that_cannot_be_cut_are_refused(kernel):
+    kernel.whole = body(plain("f"))
     with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
         step_kernel.record(b"data", 20, 2000)
-    assert tried == [20, "healed", 20, 12, "healed", 12, 20]
 
 
 @pytest.mark.parametrize(

@@ -178,3 +178,19 @@ def test_coplanar_pieces_are_one_face_in_whatever_order_they_meet():
         pieces = trimesh.Trimesh(corners, np.arange(3 * count).reshape(-1, 3), process=False)
         tree = np.array([(k, rng.integers(k)) for k in range(1, count)])
         assert len(mesh._in_plane(pieces, np.arange(count), rng.permutation(tree))) == count - 1
+
+
+def test_a_fin_of_no_thickness_has_two_sides():
+    """On a box's top, as files of several bodies have them, its sides divided in other ways. They lie in one plane and
+    look away from each other: one face of both would look nowhere.
+    """
+    corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (4, 0), (4, 2), (0, 2))]
+    corners += [(1, 1, 1), (3, 1, 1), (1, 1, 2), (3, 1, 2), (2, 1, 1)]  # the last one for the back side alone
+    faces = [(0, 2, 1), (0, 3, 2), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6)]
+    faces += [(3, 0, 4), (3, 4, 7), (4, 5, 9), (4, 9, 8), (5, 6, 9), (6, 7, 8), (6, 8, 12), (6, 12, 9), (7, 4, 8)]
+    faces += [(8, 9, 11), (8, 11, 10), (12, 8, 10), (12, 10, 11), (9, 12, 11)]
+    solid = mesh.solid(trimesh.Trimesh(corners, faces, process=False))
+    assert len(solid.faces) == 8
+    assert np.isfinite(solid.normals).all()
+    sides = solid.normals[np.abs(solid.offsets) == 1][:, 1]
+    assert sorted(sides[sides != 0].tolist()) == [-1.0, 1.0]

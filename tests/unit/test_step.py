@@ -217,3 +217,21 @@ def test_a_surface_beside_the_solid_is_none_of_its_faces(tmp_path):
     )
     assert len(beside.surfaces) == len(alone.surfaces) == 8
     np.testing.assert_allclose(beside.solid.triangles, alone.solid.triangles, atol=1e-12)
+
+
+@kernel
+def test_a_part_cut_as_splines_is_the_same_part(tmp_path, monkeypatch):
+    """Where the surfaces leave holes: the faces are still cylinders and planes, and the volume is theirs."""
+    from tests.step_parts import drilled, written
+
+    monkeypatch.setattr(step_kernel, "_WAYS", (("splines", 1),))
+    record = step_kernel.record(written(drilled(*PLATE), tmp_path / "plate.step").read_bytes(), 96, 2000)
+    part = step.part(record)
+    assert sorted(surface.kind for surface in part.surfaces) == 2 * ["cylinder"] + 6 * ["plane"]
+    assert sorted(round(circle.radius, 9) for circle in part.solid.circles) == [3.0, 3.0, 6.0, 6.0]
+    assert len(part.solid.sharp) == 12
+    a, b, c = part.solid.triangles.swapaxes(0, 1)
+    volume = np.einsum("ti,ti->", a, np.cross(b, c)) / 6
+    exact = 60 * 40 * 10 - np.pi * (6**2 + 3**2) * 10
+    chords = 10 * (6**2 + 3**2) * np.pi * (2 * np.pi / 96) ** 2 / 6  # of polygons of 96 sides
+    assert exact < volume < exact + 1.5 * chords

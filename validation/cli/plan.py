@@ -48,7 +48,13 @@ Step = Annotated[
 Pair = Annotated[str | None, typer.Option(metavar="P,A", help="Hold it fixed: polar angle and azimuth, degrees.")]
 Shares = Annotated[str, typer.Option(help="Of several lights in their total: best, or given by the scene.")]
 Start = Annotated[str, typer.Option(metavar="P,A", help="First sensor of the alternating search.")]
-Range = Annotated[str | None, typer.Option(metavar="LOW,HIGH", help="Polar angles allowed, degrees; default 0,90.")]
+Range = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LOW,HIGH",
+        help="Polar angles allowed, degrees; default 0,90, or 90,180 where the scene's first setting stands there.",
+    ),
+]
 MinEdge = Annotated[float, typer.Option(help="Least usable length of a required edge, px.")]
 MinClearance = Annotated[float, typer.Option(help="Least distance between required edges, px.")]
 Azimuths = Annotated[str | None, typer.Option(metavar="FROM,TO", help="Azimuths allowed, degrees; 350,20 are 30.")]
@@ -142,8 +148,10 @@ def plan_command(
     loaded = scenes.load(scene)
     import planner
 
+    stand = loaded.settings[:1]
     limits = planner.Constraints(
-        sensor_polar_deg=_range("--sensor-polar", sensor_polar), light_polar_deg=_range("--light-polar", light_polar),
+        sensor_polar_deg=_range("--sensor-polar", sensor_polar, *(each.sensor for each in stand)),
+        light_polar_deg=_range("--light-polar", light_polar, *(at for each in stand for at in each.lights)),
         sensor_azimuth_deg=_azimuths("--sensor-azimuth", sensor_azimuth),
         light_azimuth_deg=_azimuths("--light-azimuth", light_azimuth), camera_body=camera_body, light_body=light_body,
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
@@ -262,8 +270,11 @@ def _check_varied(found: planner.Plan) -> VaryCheck:
         return check_varied(found, report=shown)
 
 
-def _range(option: str, text: str | None) -> tuple[float, float]:
-    return (0.0, 90.0) if text is None else _two(option, text)
+def _range(option: str, text: str | None, *poses: scenes.Pose) -> tuple[float, float]:
+    """What is asked for; where nothing is, the hemisphere in which a scene's poses stand."""
+    from planner.search.constraints import same_side
+
+    return same_side(poses) if text is None else _two(option, text)
 
 
 def _azimuths(option: str, text: str | None) -> tuple[float, float] | None:

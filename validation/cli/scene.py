@@ -15,15 +15,23 @@ from validation.report.terminal import console
 
 commands = commands()
 
-Part = Annotated[Path, typer.Argument(metavar="PART", help="STL, PLY, OBJ or STEP file.")]
+Part = Annotated[Path, typer.Argument(metavar="PART", help="STL, PLY, OBJ, GLB, 3MF or STEP file.")]
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Default: PART.toml here.")]
-Units = Annotated[str, typer.Option(help=f"Unit of a mesh's numbers and of the scene: {', '.join(scenes.UNITS)}.")]
+Units = Annotated[
+    str,
+    typer.Option(help=f"Unit of the scene, and of the file's numbers where it says none: {', '.join(scenes.UNITS)}."),
+]
+Body = Annotated[
+    str | None, typer.Option(metavar="BODY", help="Name or number of one of several bodies (STEP, GLB, 3MF).")
+]
 Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.png", help="Draw them with their names.")]
 Sensor = Annotated[str | None, typer.Option(metavar="P,A", help="Seen from there; else the first setting's sensor.")]
 
 
 @commands.command("new")
-def new_command(part: Part, output: Output = None, units: Units = "mm", as_json: Json = False) -> None:
+def new_command(
+    part: Part, output: Output = None, units: Units = "mm", body: Body = None, as_json: Json = False
+) -> None:
     """Write a commented scene of a part: camera, light, what could be measured, a setting. It runs as it is."""
     path = output or Path(f"{part.stem}.toml")
     check_file("--output", path, ".toml")
@@ -32,7 +40,7 @@ def new_command(part: Part, output: Output = None, units: Units = "mm", as_json:
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
 
-        made, look = written(part, path, units, shown)
+        made, look = written(part, path, units, shown, int(body) if body and body.isdecimal() else body)
     asked = [] if look is None else look.facts
     facts = {
         "file": str(path),

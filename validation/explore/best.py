@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.models import variance_model
 from imaging.pictures import Pictures
-from planner.search.constraints import Constraints
+from planner.search.constraints import Constraints, same_side
 from planner.search.grid import by_light
 from planner.search.local import Start, descend
 from scenes import InvalidInput, Pose, Scene
@@ -20,7 +20,7 @@ _STEP_DEG = 10.0
 def best_from(scene: Scene, state: State) -> State:
     """Sensor and all free lights moved to the next local minimum of the measurand's variance in the object.
 
-    Bodies of camera and lamps keep clear of each other, as in `ice plan`; rims of circles are glanced at.
+    Bodies of camera and lamps keep clear of each other, each on its side of the part; rims of circles are glanced at.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def best_from(scene: Scene, state: State) -> State:
     sensor = np.array(list(state.sensor))
     lights = np.array([list(pose) for pose in state.lights]).reshape(-1)
 
-    limits = Constraints()
+    limits = Constraints(same_side([state.sensor]), same_side(state.lights))
 
     def variance(sensor: np.ndarray, lights: np.ndarray, _: np.ndarray | None = None) -> float:
         if not limits.allows(scene, sensor, lights):

@@ -1,0 +1,48 @@
+"""A part that is seen from below is planned from below."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+import scenes
+from planner.search.constraints import same_side
+from scenes import Pose
+from tests.commands import ice
+
+ASKED = """[[measurands]]
+name = "length"
+kind = "width"
+features = [{{ edge = "{}" }}, {{ edge = "{}" }}]
+
+[[settings]]
+sensor = [{}, 20.0]
+light = [{}, 60.0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("polar", "sides"),
+    [([], (0, 90)), ([20, 90], (0, 90)), ([91, 160], (90, 180)), ([20, 91], (0, 180))],
+)
+def test_sides(polar, sides):
+    assert same_side(Pose(each, 30.0) for each in polar) == sides
+
+
+def test_the_lower_face_of_a_box(tmp_path):
+    """Its ends are seen at once from below alone; a scene whose setting stands above is planned above, as ever."""
+    trimesh.creation.box((2, 1, 1)).export(tmp_path / "box.stl")
+    assert ice("new", "box.stl", "-o", "box.toml", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "box.toml").read_text().split("[[measurands]]")[0]
+    solid = scenes.load(tmp_path / "box.toml").solid
+    ends = {edge.name: solid.vertices[list(edge.ends)] for edge in solid.sharp}
+    across = [name for name, at in ends.items() if np.ptp(at[:, 0]) == 0 and (at[:, 2] < 0).all()]
+    found = {}
+    for polar in (160.0, 20.0):
+        (tmp_path / "asked.toml").write_text(text + ASKED.format(*across, polar, polar))
+        found[polar] = ice("plan", "asked.toml", "--step", 30, "--no-check", "--json", cwd=tmp_path)
+    document = json.loads(found[160.0].stdout)
+    assert min(document["sensor"][0], document["light"][0]) > 90
+    assert found[20.0].returncode == 2
+    assert "constraints must leave a setting that can measure" in found[20.0].stderr

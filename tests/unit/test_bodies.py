@@ -1,0 +1,163 @@
+"""Files of several bodies that say their unit: GLB, 3MF and STEP, and which of them is measured."""
+
+import json
+import zipfile
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+import trimesh
+
+from scenes import InvalidInput, Mesh
+from scenes.parts import bodies, mesh, step
+from scenes.parts.step_file import Step
+from tests.commands import ice
+
+lxml = pytest.mark.skipif(find_spec("lxml") is None, reason="needs lxml: pip install 'ice-vision[3mf]'")
+kernel = pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
+SINGLE = 1e-6  # of a length in single precision
+MODEL = """<?xml version="1.0"?>
+<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>{objects}</resources>
+<build><item objectid="1"/><item objectid="2" transform="1 0 0 0 1 0 0 0 1 30 0 0"/></build></model>"""
+
+
+def two():
+    """A block of 10 x 20 x 30 about the origin, and a pin of radius 2 and length 20 about its own."""
+    return {"block": trimesh.creation.box((10, 20, 30)), "pin": trimesh.creation.cylinder(2, 20, sections=48)}
+
+
+@pytest.fixture
+def glb(tmp_path):
+    """Both, the pin 30 mm aside, in metres as GLB has them."""
+    scene = trimesh.Scene()
+    for name, body in two().items():
+        aside = trimesh.transformations.translation_matrix((0.03 * (name == "pin"), 0, 0))
+        scene.add_geometry(body.apply_scale(1e-3), node_name=name, geom_name=f"mesh of {name}", transform=aside)
+    path = tmp_path / "two.glb"
+    path.write_bytes(scene.export(file_type="glb"))
+    return path
+
+
+def three_mf(path, unit):
+    """The same, written out."""
+    objects = ""
+    for number, (name, body) in enumerate(two().items(), 1):
+        corners = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*at) for at in body.vertices)
+        faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*face) for face in body.faces)
+        inside = f"<mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh>"
+        objects += f'<object id="{number}" name="{name}" type="model">{inside}</object>'
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("3D/3dmodel.model", MODEL.format(unit=unit, objects=objects))
+    return path
+
+
+def check(read, scale=1.0):
+    """All, and each by its name: sizes and middles."""
+    for body, low, high in (
+        ("block", (-5, -10, -15), (5, 10, 15)),
+        ("pin", (28, -2, -10), (32, 2, 10)),
+        (None, (-5, -10, -15), (32, 10, 15)),
+    ):
+        solid = read(body)
+        ends = solid.vertices.min(0), solid.vertices.max(0)
+        np.testing.assert_allclose(ends, scale * np.array([low, high]), atol=32 * scale * SINGLE)
+        assert len(solid.circles) == (0 if body == "block" else 2)
+
+
+def test_glb(glb):
+    """In metres; brought to the unit that is asked for, or read as the unit that the scene says its numbers are in."""
+    check(lambda body: mesh.read(glb, None, "mm", body))
+    check(lambda body: Mesh(kind="mesh", file=glb, body=body).solid_in("inch"), 1 / 25.4)
+    check(lambda body: Mesh(kind="mesh", file=glb, body=body).solid)
+    check(lambda body: Mesh(kind="mesh", file=glb, units="cm", body=body).solid_in("mm"), 1 / 100)
+    numbers = {number: np.ptp(mesh.read(glb, None, "mm", number).vertices[:, 2]) for number in (1, 2)}
+    assert sorted(round(height) for height in numbers.values()) == [20, 30]
+
+
+@lxml
+@pytest.mark.parametrize(("unit", "millimetres"), [("millimeter", 1), ("inch", 25.4), ("micron", 1e-3), ("meter", 1e3)])
+def test_3mf(tmp_path, unit, millimetres):
+    path = three_mf(tmp_path / "two.3mf", unit)
+    check(lambda body: mesh.read(path, None, "mm", body), millimetres)
+    check(lambda body: mesh.read(path, None, "mm", {"block": 1, "pin": 2}.get(body)), millimetres)
+
+
+def test_what_cannot_be_chosen(glb, tmp_path):
+    trimesh.creation.box((1, 1, 1)).export(tmp_path / "box.stl")
+    for body in ("lid", 3, ""):
+        with pytest.raises(InvalidInput, match=r"object.body must be one of \d '(pin|block)', \d '(pin|block)', got"):
+            mesh.read(glb, None, "mm", body)
+    with pytest.raises(InvalidInput, match=r"object.body must be left out for a STL file, which is one body, got 1"):
+        mesh.read(tmp_path / "box.stl", body=1)
+
+
+def test_a_body_of_another_name_is_another_part(glb):
+    one, other = (Mesh(kind="mesh", file=glb, body=body) for body in ("pin", "block"))
+    assert one != other
+    assert hash(one) != hash(other)
+
+
+def test_hostile_files_are_refused_before_memory_is_taken(tmp_path):
+    """A GLB that counts numbers which it does not have, and broken ones."""
+    told = json.dumps({"asset": {"version": "2.0"}, "accessors": [{"count": 10**12, "type": "VEC3"}]}).encode()
+    sizes = [each.to_bytes(4, "little") for each in (2, 20 + len(told), len(told))]
+    for name, data, match in (
+        ("bomb.glb", b"glTF" + sizes[0] + sizes[1] + sizes[2] + b"JSON" + told, "of at most 1000000 triangles"),
+        ("broken.glb", b"glTF nothing of the kind", "a broken GLB header"),
+        ("none.glb", b"", "a broken GLB header"),
+    ):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InvalidInput, match=match):
+            mesh.read(tmp_path / name)
+
+
+@lxml
+def test_archives_that_are_none_or_too_large(tmp_path, monkeypatch):
+    path = three_mf(tmp_path / "two.3mf", "millimeter")
+    monkeypatch.setattr(bodies, "_MOST_UNPACKED", 1000)
+    with pytest.raises(InvalidInput, match=r"of at most 1000000 triangles, got .* unpacked"):
+        mesh.read(path)
+    path.write_bytes(b"no archive")
+    with pytest.raises(InvalidInput, match="no archive"):
+        mesh.read(path)
+
+
+def test_without_lxml_it_says_what_to_install(tmp_path, monkeypatch):
+    path = three_mf(tmp_path / "two.3mf", "millimeter")
+    monkeypatch.setattr(bodies, "find_spec", lambda name: None)
+    with pytest.raises(InvalidInput, match=r"a 3MF file needs lxml, pip install 'ice-vision\[3mf\]'"):
+        mesh.read(path)
+
+
+@kernel
+def test_step(tmp_path):
+    """Two plates in one file, 100 mm apart: both, each by its number, and what is told of another."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.gp import gp_Pnt
+    from OCP.TopoDS import TopoDS_Compound
+
+    from tests.step_parts import written
+
+    both, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(both)
+    for at, side in ((0, 10), (100, 20)):
+        builder.Add(both, BRepPrimAPI_MakeBox(gp_Pnt(at, 0, 0), side, side, side).Shape())
+    path = written(both, tmp_path / "two.step")
+    for body, low, high, faces in ((None, 0, 120, 12), (1, 0, 10, 6), (2, 100, 120, 6)):
+        solid = Step(kind="step", file=path, body=body).solid
+        assert (solid.vertices[:, 0].min(), solid.vertices[:, 0].max()) == pytest.approx((low, high))
+        assert len(solid.faces) == faces
+    with pytest.raises(InvalidInput, match=r"object.file must be with object.body one of 1.*, 2.*, got 'x'"):
+        step.read(path, "mm", "x")
+
+
+def test_a_scene_of_one_body(glb, tmp_path):
+    """``ice new`` writes which, and the scene that it writes is read."""
+    assert ice("new", "two.glb", "--body", "block", "-o", "block.toml", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "block.toml").read_text()
+    assert 'body = "block"' in text
+    assert 'units = "mm" # of the numbers' not in text
+    shown = json.loads(ice("show", "block.toml", "--json", cwd=tmp_path).stdout)
+    assert (len(shown["vertices"]), len(shown["circles"])) == (8, 0)
+    assert "object.body must be one of" in ice("new", "two.glb", "--body", "lid", "-o", "x.toml", cwd=tmp_path).stderr
