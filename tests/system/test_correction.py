@@ -218,7 +218,9 @@ def test_the_renders_noise_is_told_by_all_lines(small):
     for _ in range(20):
         renders = tuple(exact + sigma * rng.normal(size=exact.shape) for _ in range(3))
         off = measure.correction(Images(renders), picture)
-        told.append(off.sources["rendering"][0] * np.sqrt(3) / off.sigma[0])
+        sigma_image = np.sqrt(off.covariance_image[0, 0])
+        told.append((off.sources["rendering"][0] / off.sigma[0], off.sources_image["rendering"][0] / sigma_image))
+    told = np.sqrt(3) * np.array(told)
     # margin: 20 x 16 independent numbers tell it to 4 %, and no less than the value's own scatter counts
-    assert np.median(told) == pytest.approx(share, rel=0.25)
-    assert min(told) > share / 2
+    assert np.median(told, axis=0) == pytest.approx([share, share], rel=0.25)
+    assert told.min() > share / 2
