@@ -2,8 +2,12 @@
 
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
+import scenes
+from imaging.geometry.projection import project
 from scenes import Pose
 from validation.report import plan_figures
 
@@ -26,3 +30,20 @@ def test_what_is_held_is_said():
     assert plan_figures._held(plan, "light") == f", sensor at {plan_figures.short(SENSOR)}"
     assert plan_figures._held(plan, "sensor") == f", light at {plan_figures.short(LIGHT)}"
     assert plan_figures._held(SimpleNamespace(sensor=SENSOR, light=()), "sensor") == ""
+
+
+def test_what_is_required_is_drawn_from_end_to_end():
+    """Each line ends where the camera shows a corner of the part, the circle's pieces too, each one once."""
+    scene, figure = scenes.load("plate"), plt.figure()
+    axis, sensor = figure.add_subplot(), Pose(20, 60)
+    try:
+        plan_figures._rim(axis, scene, np.array(list(sensor)), scene.solid.circles[0])
+        drawn = [line.get_xydata() for line in axis.lines]
+        assert [line.get_label() for line in axis.lines][0] == scene.solid.circles[0].name
+    finally:
+        plt.close(figure)
+    corners = project(scene.solid.vertices, np.array(list(sensor), float), scene.camera)
+    ends = np.array([[line[0], line[-1]] for line in drawn])
+    away = np.linalg.norm(ends[:, :, None] - corners, axis=-1)
+    assert away.min(-1).max() < 1e-9
+    assert np.bincount(away.argmin(-1).ravel()).tolist().count(2) == len(drawn)
