@@ -96,10 +96,10 @@ def test_a_measurand_s_value_and_variance_are_what_noisy_images_show(bracket):
     assert told.value_object == pytest.approx(18.0 - 48.0)  # of the holes, along the part's length
     clean = render.image(bracket, (20, 0), (20, 225), effects=(*PLAIN, "cast_shadow"))
     known = measure.propagate(clean, bracket, (20, 0), (20, 225)).measurands
-    images = render.expose(clean, bracket.noise, np.random.default_rng(5), 200)
+    images = render.expose(clean, bracket.noise, np.random.default_rng(5), 100)
     found = measure.measure(images, bracket, (20, 0), (20, 225)).value[:, 0]
     ratio = np.var(found, ddof=1) / known.covariance[0, 0]
-    assert abs(ratio - 1) < 4 * np.sqrt(2 / 199)  # margin: 4 standard errors
+    assert abs(ratio - 1) < 4 * np.sqrt(2 / 99)  # margin: 4 standard errors
 
 
 def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):
