@@ -39,7 +39,7 @@ def test_what_is_required_is_drawn_from_end_to_end():
     try:
         plan_figures._rim(axis, scene, np.array(list(sensor)), scene.solid.circles[0])
         drawn = [line.get_xydata() for line in axis.lines]
-        assert [line.get_label() for line in axis.lines][0] == scene.solid.circles[0].name
+        assert axis.lines[0].get_label() == scene.solid.circles[0].name
     finally:
         plt.close(figure)
     corners = project(scene.solid.vertices, np.array(list(sensor), float), scene.camera)
