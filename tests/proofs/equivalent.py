@@ -78,6 +78,9 @@ EQUIVALENT: dict[str, str] = {
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
     "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
     "measure/fitting/noise.py: continue": "at a fixed point: rounds that are left move it by less than 1e-9",
+    "imaging/geometry/visibility.py: f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), -1, 1))":
+        "what ends before a triangle's beginning hides nothing, as what ends there",
+    "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
