@@ -8,7 +8,7 @@ import scenes
 from imaging.light.between import light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, exchange_of, exchanged
+from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, exchange_of, exchanged
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -135,3 +135,59 @@ def test_what_rays_gather():
 def test_a_convex_body_has_none():
     pictures = Pictures.of(scenes.load("task1"), (30, 135), (15, 315))
     assert light_between(pictures, np.zeros((3, 3)), np.zeros(3, int)) == 0
+
+
+@pytest.fixture(scope="module")
+def pierced():
+    """The plate, and the number of a face of it that has holes."""
+    solid = scenes.load("plate").solid
+    return solid, next(f for f, holes in enumerate(solid.holes) if holes)
+
+
+def test_places_within_a_rim_are_beside_each_of_its_boundaries(pierced):
+    """A hundredth off the outline, and off each hole's, all the way around; never in a hole."""
+    solid, face = pierced
+    places, within = _rim(solid, face, 0.01), 0.01
+    loops = [solid.faces[face], *solid.holes[face]]
+    near = np.array([_apart(places, solid.vertices[list(loop)]) for loop in loops])
+    assert near.min(0) == pytest.approx(within, rel=0.02)
+    lengths = [np.linalg.norm(np.roll(c, -1, 0) - c, axis=1).sum() for c in (solid.vertices[list(p)] for p in loops)]
+    count = np.bincount(near.argmin(0), minlength=len(loops))
+    share = 400 * np.divide(lengths, sum(lengths))
+    assert (share <= count).all()
+    assert (count <= share + list(map(len, loops))).all()  # margin: of each piece up to one more
+
+
+def _apart(points, corners):
+    """Distance of points (n, 3) from a closed line of corners (k, 3)."""
+    found = np.full(len(points), np.inf)
+    for start, stop in zip(corners, np.roll(corners, -1, 0), strict=True):
+        t = np.clip((points - start) @ (stop - start) / ((stop - start) @ (stop - start)), 0, 1)
+        found = np.minimum(found, np.linalg.norm(points - start - t[:, None] * (stop - start), axis=1))
+    return found
+
+
+def test_nodes_that_are_not_on_a_face_are_brought_to_its_nearest_rim(pierced):
+    """From a hole's middle to its own rim, from beyond the outline to that; what is on the face stays."""
+    solid, face = pierced
+    hole = solid.vertices[list(solid.holes[face][0])]
+    outline = solid.vertices[list(solid.faces[face])]
+    beyond = outline[0] + 0.3 * (outline[0] - outline.mean(0)) / np.linalg.norm(outline[0] - outline.mean(0))
+    on = hole.mean(0) + 1.2 * (hole[0] - hole.mean(0))
+    moved = _onto(solid, face, np.stack([hole.mean(0), beyond, on]), 0.01)
+    radius = np.linalg.norm(hole[0] - hole.mean(0))
+    assert np.linalg.norm(moved[0] - hole.mean(0)) == pytest.approx(radius + 0.01, rel=0.01)
+    assert np.linalg.norm(moved[1] - outline[0]) < 0.3
+    assert moved[2].tolist() == on.tolist()
+
+
+def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
+    for solid, face in (pierced, (scenes.load("wedge").solid, 0), (scenes.load("bracket").solid, 1)):
+        frame, corners = _frame(solid, face), solid.vertices[list(solid.faces[face])]
+        placed = (corners - frame.corner) @ frame.sides.T
+        assert placed.min(0) == pytest.approx(0, abs=1e-9)
+        assert placed.max(0) == pytest.approx(frame.size)
+        assert frame.sides @ frame.sides.T == pytest.approx(np.eye(2), abs=1e-12)
+        assert frame.sides @ solid.normals[face] == pytest.approx(0, abs=1e-12)
+        ways = np.roll(corners, -1, 0) - corners
+        assert np.abs(ways @ frame.sides[0]).max() == pytest.approx(np.linalg.norm(ways, axis=1).max())
