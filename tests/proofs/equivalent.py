@@ -90,6 +90,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         "core/NumberReplacer",
         r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
     ): "how a figure's words are set, not what is shown",
+    ("core/NumberReplacer", r"\btextwrap\.(?:wrap|fill)\("): "where a figure's lines are broken",
     ("core/NumberReplacer", r"\blegend_below\(\w+, "): "in how many columns a legend is set",
     ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
     ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",
