@@ -6,7 +6,7 @@ examples of its own module, the tests that read the code and, where it may have 
 unit tests and the stored numbers that call the changed function and others of the module, the quickest first
 (``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
 the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
-run, too, after those of its file that came before it. What survives is printed with its line: a test is missing, or the
+run, too, after those of its file that came before it (stored numbers are each by itself). What survives is printed with its line: a test is missing, or the
 mutant is equivalent.
 """
 
@@ -213,8 +213,8 @@ def judged(
     if code in (*_PASSED, *_ENDED):
         return "survived", ""
     asked = rest or others or near
-    before_it = asked[: asked.index(by) + 1] if by in asked else [by] if by else asked
-    clean, wrong = _tested([each for each in before_it if _file(each) == _file(by) or not by], runner, 2 * _REST_S)
+    again = asked[: asked.index(by) + 1] if by in asked and _file(by) not in STORED else [by] if by else asked
+    clean, wrong = _tested([each for each in again if _file(each) == _file(by) or not by], runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
 
 
