@@ -6,8 +6,8 @@ examples of its own module, the tests that read the code and, where it may have 
 unit tests and the stored numbers that call the changed function and others of the module, the quickest first
 (``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
 the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
-run, too, after those of its file that came before it (stored numbers are each by itself). What survives is printed with its line: a test is missing, or the
-mutant is equivalent.
+run, too, after those of its file that came before it (stored numbers are each by itself). What survives is printed with
+its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
