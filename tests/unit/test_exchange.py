@@ -154,8 +154,9 @@ def test_places_within_a_rim_are_beside_each_of_its_boundaries(pierced):
     lengths = [np.linalg.norm(np.roll(c, -1, 0) - c, axis=1).sum() for c in (solid.vertices[list(p)] for p in loops)]
     count = np.bincount(near.argmin(0), minlength=len(loops))
     share = 400 * np.divide(lengths, sum(lengths))
-    assert (share <= count).all()
-    assert (count <= share + list(map(len, loops))).all()  # margin: of each piece up to one more
+    more = count - share
+    assert (more >= 0).all()
+    assert (more <= list(map(len, loops))).all()  # margin: up to one more of each piece
 
 
 def _apart(points, corners):
@@ -177,7 +178,7 @@ def test_nodes_that_are_not_on_a_face_are_brought_to_its_nearest_rim(pierced):
     moved = _onto(solid, face, np.stack([hole.mean(0), beyond, on]), 0.01)
     radius = np.linalg.norm(hole[0] - hole.mean(0))
     assert np.linalg.norm(moved[0] - hole.mean(0)) == pytest.approx(radius + 0.01, rel=0.01)
-    assert np.linalg.norm(moved[1] - outline[0]) < 0.3
+    assert np.linalg.norm(moved[1] - outline[0]) < 0.3  # margin: places along the rim are 0.1 apart
     assert moved[2].tolist() == on.tolist()
 
 

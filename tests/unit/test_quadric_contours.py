@@ -38,6 +38,7 @@ def test_points_beside_a_contour_are_moved_across_it_alone(off):
     assert np.abs(quadric.function(found)).max() < 1e-12
     assert np.abs((quadric.gradient(found) * (found - EYE)).sum(1)).max() < 1e-11
     along = np.cross(normal, sight)
+    # margin: what two rounds leave is of the order of off^2
     assert np.abs(((found - exact) * along).sum(1)).max() < 1e-3 * abs(off)
     unknown = exact + np.array([5.0, 0, 0])  # nothing is near: a step that is too long is not made
     assert (np.abs(_polished(quadric, EYE, unknown) - unknown).max(1) == 0).any()

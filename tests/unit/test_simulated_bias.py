@@ -84,7 +84,7 @@ def test_the_renders_noise_counts_in_the_image_by_the_images_own_scatter(picture
     in_object = off.sources["rendering"][0] / off.sigma[0]
     in_image = off.sources_image["rendering"][0] / math.sqrt(off.covariance_image[0, 0])
     assert in_image == pytest.approx(in_object, rel=0.1)  # margin: one length, not quite the same of both
-    assert 0.005 < in_object < 0.5
+    assert 0.01 < in_object < 0.5  # margin: 0.05 by chance: two renders tell it to 70 %
 
 
 @pytest.mark.parametrize(("texture", "status"), [(0.5, "ok"), (math.inf, "clutter")])
