@@ -77,7 +77,7 @@ def test_standard_uncertainty_of_a_mean_of_renders():
 
 
 def test_the_renders_noise_counts_in_the_image_by_the_images_own_scatter(picture, exact):
-    """Equal renders but for a thousandth of the camera's noise: value for value the same part of sigma, cm and px."""
+    """Equal renders but for a twentieth of the camera's noise: value for value the same part of sigma, cm and px."""
     rng = np.random.default_rng(5)
     renders = tuple(exact + 0.05 * picture.scene.noise.sigma * rng.normal(size=exact.shape) for _ in range(2))
     off = measure.correction(Images(renders), picture)
