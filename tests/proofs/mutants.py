@@ -6,7 +6,7 @@ examples of its own module, the tests that read the code and, where it may have 
 unit tests and the stored numbers that call the changed function and others of the module, the quickest first
 (``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
 the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
-run, too, after those of its file that came before it (stored numbers are each by itself). What survives is printed with
+run, too, after some of its file that came before it (stored numbers are each by itself). What survives is printed with
 its line: a test is missing, or the mutant is equivalent.
 """
 
@@ -63,6 +63,7 @@ _MODULE_S = 3  # of those that call others of the module
 _REST_S = 90  # of those that call the changed function and are asked last, of what survived until then
 _LIMIT_S = 45  # after which these do not end
 _OTHERS_S = 45  # of the files that are asked then
+_BEFORE = 20  # tests up to the one that kills, that are asked of clean code
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 _RECORDS = re.compile(r"^from (?:pydantic|scenes\.(?:model|ranges)) ", re.MULTILINE)
@@ -213,8 +214,9 @@ def judged(
     if code in (*_PASSED, *_ENDED):
         return "survived", ""
     asked = rest or others or near
-    again = asked[: asked.index(by) + 1] if by in asked and _file(by) not in STORED else [by] if by else asked
-    clean, wrong = _tested([each for each in again if _file(each) == _file(by) or not by], runner, 2 * _REST_S)
+    before_it = asked[: asked.index(by) + 1][-_BEFORE:] if by in asked and _file(by) not in STORED else [by]
+    again = [each for each in before_it if _file(each) == _file(by)] if by else asked
+    clean, wrong = _tested(again, runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
 
 
