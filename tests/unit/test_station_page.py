@@ -76,6 +76,16 @@ def test_the_sentence_counts_all_and_names_what_is_wrong():
     assert requirements.sentence(several[:1]).startswith("The requirement is measured well within tolerance")
 
 
+def test_the_worst_is_improved_first():
+    """By its U over half the zone: what cannot be told is worst, of equals the first comes first."""
+    a, b, c = required(1, u=0.03, name="a"), required(2, u=0.05, name="b"), required(3, u=0.05, name="c")
+    assert requirements.next_step([a, b, c]).startswith("Improve b first; most of it comes from pixel noise.")
+    assert requirements.next_step([c, b, a]).startswith("Improve b first")
+    assert requirements.next_step([a, b, required(4, u=None, name="d")]).startswith("Improve d first")
+    wide = required(5, u=0.06, name="e", tolerance=Tolerance(plus=0.1, minus=0.1))
+    assert requirements.next_step([a, wide]).startswith("Improve a first")
+
+
 def test_every_status_says_what_to_do():
     assert set(REMEDIES) == set(MEANINGS)
     assert all(REMEDIES[status] for status in MEANINGS if status != "ok")
