@@ -185,6 +185,8 @@ def test_the_sketch_is_to_scale(plate):
     assert above @ eye == pytest.approx([100 * np.sin(polar), 0.0], abs=1e-9)
     for pair in (side, above):
         assert pair @ pair.T == pytest.approx(np.eye(2))
+    assert np.cross(*above) == pytest.approx([0, 0, 1])  # or it were a view from below, or in a mirror
+    assert np.cross(*side) == pytest.approx([np.sin(azimuth), -np.cos(azimuth), 0])
     assert "camera 100 cm away, 15.0° from the vertical, azimuth 85.0°; lamp 100 cm away" in station_sketch.told(plate)
 
 
