@@ -215,7 +215,7 @@ def judged(
         return "survived", ""
     asked = rest or others or near
     before_it = asked[: asked.index(by) + 1][-_BEFORE:] if by in asked and _file(by) not in STORED else [by]
-    again = [each for each in before_it if _file(each) == _file(by)] if by else asked
+    again = [each for each in before_it if _file(each) == _file(by)] if by else asked[: 1 if code == _USAGE else None]
     clean, wrong = _tested(again, runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
 
@@ -240,6 +240,7 @@ def _rest(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Pat
 
 
 _PASSED = 0, 5  # exit status of pytest; the second: no tests
+_USAGE = 4  # exit status where nothing can be run: not even conftest.py is imported
 _ENDED = -signal.SIGXCPU, -signal.SIGKILL  # for processor time
 
 
