@@ -80,6 +80,8 @@ EQUIVALENT: dict[str, str] = {
     "measure/fitting/noise.py: continue": "at a fixed point: rounds that are left move it by less than 1e-9",
     "imaging/geometry/visibility.py: f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), -1, 1))":
         "what ends before a triangle's beginning hides nothing, as what ends there",
+    "render/curved.py: return next(face for face in solid.edge(circle.edges[ -1]).faces if face != circle.face)":
+        "any facet of the wall: which one is not asked",
     "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
 }  # fmt: skip
 
