@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 from imaging.geometry.projection import frame, project, project_ideal, sensor_position
 from imaging.pictures import Pictures
 from planner.budgeting import plans
@@ -172,3 +173,21 @@ def test_a_plan_is_checked_where_it_can_be_measured(monkeypatch):
     assert plan_check.check_plan(found, 2, "quick") == ([], "nothing is seen")
     with pytest.raises(InvalidInput, match="check must be at least 1, got 0"):
         plan_check.check_plan(found, 0)
+
+
+@pytest.mark.parametrize(("objective", "noise", "doubt"), [("object", 0.04, 0.3), ("image", 9.0, 2.0)])
+def test_a_setting_is_checked_by_its_noise_and_what_its_bias_may_be_off(objective, noise, doubt, task1, monkeypatch):
+    """Variances add, of the object or of the image; the status is the worst once the bias is off."""
+    measured = SimpleNamespace(covariance=np.array([[0.04]]), covariance_image=np.array([[9.0]]))
+    off = SimpleNamespace(u_bias=np.array([0.3]), u_bias_image=np.array([2.0]), status=("clutter",))
+    monkeypatch.setattr(plan_check, "propagated", lambda *_: (None, measured))
+    monkeypatch.setattr(plan_check.simulation, "of_render", lambda *_: off)
+    monkeypatch.setattr(plan_check, "without_formula", lambda *_: ("floor",))
+    found = SimpleNamespace(scene=task1, objective=objective, over="minimax")
+    row = plan_check._checked(found, Pose(30, 135), Pose(15, 315), task1.required, 3, None)
+    told = planner.predict(task1, (30, 135), (15, 315), "calibrated").measurands[0]
+    assert row.calibrated == pytest.approx(told.variance_object if objective == "object" else told.variance_image)
+    assert row.propagated == pytest.approx(noise)
+    assert row.with_bias == row.minimised == pytest.approx(noise + doubt**2)
+    assert row.ratio == pytest.approx(noise / row.calibrated)
+    assert (row.status, row.rank_before, row.without_formula) == ("clutter", 3, ("floor",))
