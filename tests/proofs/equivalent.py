@@ -84,7 +84,8 @@ EQUIVALENT: dict[str, str] = {
         "any facet of the wall: which one is not asked",
     "measure/propagation.py: gradient = np.where(measured[:, None], np.nan_to_num(gradient), 1.0)":
         "what is not measured is replaced in the next line",
-    "render/phenomena/edges.py: return np.where(share < 1, 1 / np.maximum(1 - share, -0.999999999999) ** 2 - 1, np.inf)":
+    "render/phenomena/edges.py: return np.where(share < 1, 1 / np.maximum(1 - share, -0.999999999999) ** 2 - 1, "
+    "np.inf)":
         "1 - share is above 0 where it counts, and what is within 1e-12 of 0 is beyond any tolerance",
     "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
 }  # fmt: skip
