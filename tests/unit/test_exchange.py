@@ -1,5 +1,7 @@
 """Light between surfaces against closed forms of form factors: a wall, a right angle, a blind hole, a cavity."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +10,7 @@ import scenes
 from imaging.light.between import light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, exchange_of, exchanged
+from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -192,3 +194,17 @@ def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
         assert frame.sides @ solid.normals[face] == pytest.approx(0, abs=1e-12)
         ways = np.roll(corners, -1, 0) - corners
         assert np.abs(ways @ frame.sides[0]).max() == pytest.approx(np.linalg.norm(ways, axis=1).max())
+
+
+def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
+    """Of the rectangle's nodes all that lie in a hole or on the rim, too: light comes to the rim from both sides."""
+    solid, face = pierced
+    exchange = SimpleNamespace(solid=solid, cell=4.0, met=lambda nodes, normals, rays: nodes)
+    sheet = _sheet.__wrapped__(exchange, face)
+    first = min(sheet.u[1], sheet.v[1])
+    loops = [solid.faces[face], *solid.holes[face]]
+    near = np.min([_apart(sheet.met, solid.vertices[list(loop)]) for loop in loops], axis=0)
+    assert near.min() == pytest.approx(0.01 * first, rel=0.02)
+    assert len(sheet.met) == sheet.u.size * sheet.v.size
+    assert np.ptp(sheet.u) == pytest.approx(sheet.frame.size[0])
+    assert np.ptp(sheet.v) == pytest.approx(sheet.frame.size[1])

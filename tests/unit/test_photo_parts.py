@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from measure.find.search import find_quadrilateral
+from measure.photo import profiles
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput
@@ -95,3 +96,13 @@ def test_shapes_are_asked_for_by_so_many_numbers_each():
             _wanted(**{name: value})
     with pytest.raises(InvalidInput, match="--most must be left out with --all, got 3"):
         _wanted(all=True, most=3)
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize(("off", "is_taken"), [(11.5, True), (12.5, False), (-12.5, False)])
+def test_one_corner_that_is_far_off_leaves_all_as_they_were(corner, off, is_taken, monkeypatch):
+    """Beyond 12 px along x or y, twice the reach of the profiles, whichever of the four it is."""
+    found = CORNERS + 0.3
+    found[corner, 1] = CORNERS[corner, 1] + off
+    monkeypatch.setattr(profiles, "intersect", lambda *_: (found, None))
+    assert refined(picture(), CORNERS).tolist() == (found if is_taken else CORNERS).tolist()
