@@ -87,6 +87,8 @@ EQUIVALENT: dict[str, str] = {
     "render/phenomena/edges.py: return np.where(share < 1, 1 / np.maximum(1 - share, -0.999999999999) ** 2 - 1, "
     "np.inf)":
         "1 - share is above 0 where it counts, and what is within 1e-12 of 0 is beyond any tolerance",
+    "validation/batch/work.py: cv2.setNumThreads( 0)  # workers share the cores among themselves":
+        "no threads beside the one, as with 1",
     "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
 }  # fmt: skip
 
