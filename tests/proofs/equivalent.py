@@ -78,6 +78,18 @@ EQUIVALENT: dict[str, str] = {
     "validation/hard/fit_cases.py: five, many = np.array([0.1, 1.2, 2.7, 3.9, 5.1]), "
     "np.linspace( -1, 2 * np.pi, 60, endpoint=False)": "other points of the same ellipses",
     "measure/fitting/noise.py: continue": "at a fixed point: rounds that are left move it by less than 1e-9",
+    "imaging/geometry/visibility.py: f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), -1, 1))":
+        "what ends before a triangle's beginning hides nothing, as what ends there",
+    "render/curved.py: return next(face for face in solid.edge(circle.edges[ -1]).faces if face != circle.face)":
+        "any facet of the wall: which one is not asked",
+    "measure/propagation.py: gradient = np.where(measured[:, None], np.nan_to_num(gradient), 1.0)":
+        "what is not measured is replaced in the next line",
+    "render/phenomena/edges.py: return np.where(share < 1, 1 / np.maximum(1 - share, -0.999999999999) ** 2 - 1, "
+    "np.inf)":
+        "1 - share is above 0 where it counts, and what is within 1e-12 of 0 is beyond any tolerance",
+    "validation/batch/work.py: cv2.setNumThreads( 0)  # workers share the cores among themselves":
+        "no threads beside the one, as with 1",
+    "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
@@ -87,6 +99,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         "core/NumberReplacer",
         r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
     ): "how a figure's words are set, not what is shown",
+    ("core/NumberReplacer", r"\btextwrap\.(?:wrap|fill)\("): "where a figure's lines are broken",
     ("core/NumberReplacer", r"\blegend_below\(\w+, "): "in how many columns a legend is set",
     ("core/NumberReplacer", r"\b(?:lw|linewidths?|mew|markeredgewidth|ms|markersize)= "): "how thick a line is drawn",
     ("core/ReplaceFalseWithTrue", r"\bprint\(.*\bhighlight=True\)"): "numbers of another colour, in a terminal",

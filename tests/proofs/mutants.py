@@ -6,8 +6,8 @@ examples of its own module, the tests that read the code and, where it may have 
 unit tests and the stored numbers that call the changed function and others of the module, the quickest first
 (``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
 the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
-run, too, or was when it was noted what it calls. What survives is printed with its line: a test is missing, or the
-mutant is equivalent.
+run, too, after some of its file that came before it (stored numbers are each by itself). What survives is printed with
+its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -61,8 +61,9 @@ _FILES = 3  # test files that a mutant meets after the unit tests
 _CALLING_S = 12  # processor seconds, on clean code, of the tests that call the changed function
 _MODULE_S = 3  # of those that call others of the module
 _REST_S = 90  # of those that call the changed function and are asked last, of what survived until then
-_LIMIT_S = 90  # after which these do not end
+_LIMIT_S = 45  # after which these do not end
 _OTHERS_S = 45  # of the files that are asked then
+_BEFORE = 20  # tests up to the one that kills, that are asked of clean code
 _IMPORTED = 2.0  # what a test file's import of the module counts beside its names
 _COMMON = 4  # letters; shorter names say nothing
 _RECORDS = re.compile(r"^from (?:pydantic|scenes\.(?:model|ranges)) ", re.MULTILINE)
@@ -194,7 +195,7 @@ def judged(
     own = [mutant.file] if ">>> " in before else []
     fields = FIELDS if _RECORDS.search(before) else []
     number = int(line.split(":")[1])
-    near = [*own, *READERS, *fields, *calling(mutant, number, tests, root)]
+    near = together([*own, *READERS, *fields, *calling(mutant, number, tests, root)])
     others, rest = [], []
     path.write_text(after, encoding="utf-8")
     try:
@@ -212,18 +213,34 @@ def judged(
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # the compiled one is of this text
     if code in (*_PASSED, *_ENDED):
         return "survived", ""
-    if by in tests:
-        return "killed", by
-    clean, wrong = _tested([by] if by else rest or others or near, runner, 2 * _REST_S)
+    asked = rest or others or near
+    before_it = asked[: asked.index(by) + 1][-_BEFORE:] if by in asked and _file(by) not in STORED else [by]
+    again = [each for each in before_it if _file(each) == _file(by)] if by else asked[: 1 if code == _USAGE else None]
+    clean, wrong = _tested(again, runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
+
+
+def together(tests: list[str]) -> list[str]:
+    """Tests of one file one after the other, or what is set up for a module is set up again in between.
+
+    >>> together(["b.py::one", "a.py", "b.py::two"])
+    ['b.py::one', 'b.py::two', 'a.py']
+    """
+    files = list(dict.fromkeys(map(_file, tests)))
+    return sorted(tests, key=lambda test: files.index(_file(test)))
+
+
+def _file(test: str) -> str:
+    return test.split("::")[0]
 
 
 def _rest(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path, asked: list[str]) -> list[str]:
     """The slower tests that call the changed function."""
-    return [each for each in calling(mutant, line, tests, root, (_REST_S, 0.0)) if each not in asked]
+    return together([each for each in calling(mutant, line, tests, root, (_REST_S, 0.0)) if each not in asked])
 
 
 _PASSED = 0, 5  # exit status of pytest; the second: no tests
+_USAGE = 4  # exit status where nothing can be run: not even conftest.py is imported
 _ENDED = -signal.SIGXCPU, -signal.SIGKILL  # for processor time
 
 

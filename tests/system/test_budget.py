@@ -105,6 +105,24 @@ def test_numbers_know_what_measurands_share() -> None:
     assert ratio.s < 0.3 * numbers["step"].s / 40
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"temperature_K": {"value": 1.0, "sd": 50.0}, "expansion_per_K": {"value": 1e-3, "sd": 1e-9}},
+        {"temperature_K": {"value": 50.0, "sd": 1e-6}, "expansion_per_K": {"value": 1e-3, "sd": 1e-3}},
+    ],
+    ids=["temperature", "expansion"],
+)
+def test_lengths_of_a_part_share_its_temperature_and_its_expansion(said) -> None:
+    """Each is 5 % uncertain by one of them, as the other is: their ratio hardly at all."""
+    scene = scenes.load("two_lights").with_(uncertainty=said)
+    numbers = planner.budget(scene, scene.settings[0].sensor, scene.settings[0].light).ufloats()
+    for each in numbers.values():
+        assert each.s / each.n == pytest.approx(0.05, rel=0.01)
+    ratio = numbers["top"] / numbers["front"]
+    assert ratio.s / ratio.n < 0.01  # margin: noise alone, 0.2 %; independent lengths would give 7 %
+
+
 def test_what_is_needed_reaches_it() -> None:
     (found,) = _found("calibrated_rig")
     wanted = 0.97 * found.U

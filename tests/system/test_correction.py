@@ -61,7 +61,7 @@ def test_what_is_left_of_an_exact_image_is_what_it_is_told_with(crowded, estimat
     if estimator in ("gradient", "canny"):
         assert np.abs(raw).max() > 0.5
         assert np.abs(left + raw / 2).max() > 0.25  # a correction of half, or of twice as much, is seen
-    assert told.max() < 0.2
+    assert told.max() < 0.2  # margin: the renders' noise, 0.03 to 0.06 of sigma, by chance
 
 
 def _length(picture):
@@ -219,10 +219,12 @@ def test_the_renders_noise_is_told_by_all_lines(small):
     for _ in range(20):
         renders = tuple(exact + sigma * rng.normal(size=exact.shape) for _ in range(3))
         off = measure.correction(Images(renders), picture)
-        told.append(off.sources["rendering"][0] * np.sqrt(3) / off.sigma[0])
+        sigma_image = np.sqrt(off.covariance_image[0, 0])
+        told.append((off.sources["rendering"][0] / off.sigma[0], off.sources_image["rendering"][0] / sigma_image))
+    told = np.sqrt(3) * np.array(told)
     # margin: 20 x 16 independent numbers tell it to 4 %, and no less than the value's own scatter counts
-    assert np.median(told) == pytest.approx(share, rel=0.25)
-    assert min(told) > share / 2
+    assert np.median(told, axis=0) == pytest.approx([share, share], rel=0.25)
+    assert told.min() > share / 2  # margin: no less than what all lines tell, to 4 %
 
 
 def test_light_from_the_floor_is_part_of_the_contrast():

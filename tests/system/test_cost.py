@@ -58,9 +58,9 @@ def test_two_goals_are_refused_in_one_line(small_toml):
 
 
 def test_json_tells_the_goal(small_toml, tmp_path):
-    done = ice("validate", small_toml, "--accuracy", "0.4", "--out", tmp_path, "--workers", "1", "--json")
+    done = ice("validate", small_toml, "--accuracy", "0.8", "--out", tmp_path, "--workers", "1", "--json")
     document = json.loads(done.stdout)
-    assert document["goal"]["half_width"] == pytest.approx(0.4, rel=0.1)
+    assert document["goal"]["half_width"] == pytest.approx(0.8, rel=0.1)
     assert set(document["goal"]["errors"]) == {"sampling", "render", "phase", "model"}
 
 

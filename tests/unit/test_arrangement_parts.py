@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from imaging.sensor import Levels, squared_errors
 from measure.estimators.arrangement import ArrangementEstimator, _chi_square
 from measure.estimators.ellipse import _Linear, _with_axes, free_parameters
-from measure.estimators.expansion import ROWS, Pieces, _vertex_steps
+from measure.estimators.expansion import ROWS, Pieces, _gram, _vertex_steps
 from measure.estimators.registry import estimator
 from measure.features.arranged import _seen
 from measure.features.blurred_ellipse import from_symmetric, to_symmetric
@@ -244,3 +244,15 @@ def test_only_free_vertices_move_pieces():
     found = _vertex_steps(model, moving) @ steps
     assert found[:, 0] == pytest.approx(places[pieces[moving, 0]])
     assert found[:, 1] == pytest.approx(places[pieces[moving, 1]] - places[pieces[moving, 0]])
+
+
+def test_products_of_columns_are_those_of_the_whole_matrix(rng):
+    """Columns everywhere, and of three pieces at pixels of their own: two share some, the third none."""
+    linear = rng.normal(size=(40, 3))
+    pixels = np.arange(2, 20), np.arange(15, 31), np.array([35, 33, 38])
+    rows = tuple(rng.normal(size=(each.size, ROWS)) for each in pixels)
+    whole = np.zeros((40, 3 + 3 * ROWS))
+    whole[:, :3] = linear
+    for n, (here, own) in enumerate(zip(pixels, rows, strict=True)):
+        whole[here, 3 + n * ROWS : 3 + (n + 1) * ROWS] = own
+    assert _gram(linear, pixels, rows) == pytest.approx(whole.T @ whole, abs=1e-12)

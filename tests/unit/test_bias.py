@@ -9,6 +9,7 @@ import planner
 import scenes
 from imaging.blurred.segment import Segments, second_and_third
 from imaging.features.sampling import sampled_line
+from imaging.models import bias as bias_model
 from imaging.models.bias import bias, cluttered
 from imaging.pictures import Pictures
 from tests.oracle import polygon_image
@@ -123,3 +124,26 @@ def test_nothing_surrounds_a_plain_edge(task1):
     assert found.status == "ok"
     assert 1e-4 < abs(found.bias_px) < 2e-3  # margin: small, but not nothing
     assert all(0 < abs(end) < 3e-3 for edge in found.edges for end in edge.bias_px)  # margin: small, but not nothing
+
+
+@pytest.mark.parametrize(
+    ("lent", "direct", "rough"),
+    [
+        ([[0, 0, 0], [0, 0, 0]], [[10, 10, 10], [110, 110, 110]], False),
+        ([[0, 0, 0], [0, 8, 0]], [[10, 10, 10], [110, 110, 110]], False),
+        ([[0, 0, 0], [0, 12, 0]], [[10, 10, 10], [110, 110, 110]], True),
+        ([[12, 0, 0], [0, 0, 0]], [[10, 22, 22], [110, 110, 110]], True),
+        ([[20, 20, 20], [0, 0, 0]], [[15, 15, 15], [110, 110, 110]], True),
+        ([[20, 20, 20], [0, 0, 0]], [[25, 25, 25], [110, 110, 110]], False),
+        ([[3, 3, 3], [0, 0, 0]], [[1, 1, 1], [110, 110, 110]], False),
+        ([[0, 0, 0], [90, 90, 90]], [[1, 1, 1], [80, 80, 80]], True),
+    ],
+    ids=["none", "a little", "changing", "one end", "most of a side", "less", "what is not felt", "the other side"],
+)
+def test_light_from_other_faces_is_too_rough_where_it_prevails_or_changes(lent, direct, rough, task1, monkeypatch):
+    """More than half of a side's and felt by the contrast, or more than a tenth of the contrast along the edge."""
+    lent, direct = (np.array([[each]], float) for each in (lent, direct))
+    given = iter((lent + direct, direct))
+    monkeypatch.setattr(bias_model, "side_signals", lambda *_: next(given))
+    pictures = Pictures.of(task1, (30, 90), (15, 270))
+    assert bias_model._by_other_faces(pictures, ("e1",)).tolist() == [[rough]]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 import scenes
 from measure.bounds import corner_bound
 from measure.features.layout import polygon_layout
@@ -50,3 +51,13 @@ def test_corners_of_a_polygon():
     assert found.shape == (8, 8)
     assert np.diag(found) == pytest.approx(np.diag(expected), rel=0.012)
     assert found == pytest.approx(expected, abs=0.012 * np.diag(expected).max())
+
+
+def test_what_cannot_be_measured_takes_no_bound_from_the_others():
+    """Seen from above the front is too short: the top has the bound that it has alone."""
+    scene, sensor, light = scenes.load("two_lights"), (0.05, 277), ((40, 190), (30, 100))
+    told = planner.predict(scene, sensor, light, "bound").measurands
+    alone = scene.model_copy(update={"measurands": scene.measurands[:1]})
+    (top,) = planner.predict(alone, sensor, light, "bound").measurands
+    assert [np.isfinite(each.variance_object) for each in told] == [True, False]
+    assert told[0].variance_object == pytest.approx(top.variance_object, rel=0.1)  # margin: edges that lie beside

@@ -87,4 +87,26 @@ def test_pieces_of_any_length_and_direction_are_filled_from_end_to_end(count):
         chord = vertices[b] - vertices[a]
         beyond = np.abs(np.cross(arc[:, 1:] - vertices[a], chord) @ axis) / np.linalg.norm(chord)
         bulge = 2.5 * (1 - math.cos(math.asin(np.linalg.norm(chord) / 5)))
+        # margin: the arc's middle is no corner of its pieces: a part of 1 / pieces^2
         assert beyond.max() == pytest.approx(bulge, rel=1e-3)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_facets_of_a_wall_are_those_around_its_axis_between_its_ends(axis):
+    """Cylinder, shoulder, cone, cylinder: 48 facets of each wall, none of a shoulder or an end, and its own numbers."""
+    profile = [(0.0, 6.0), (20.0, 6.0), (20.0, 10.0), (30.0, 8.0), (34.0, 8.0)]
+    solid, k = Turned(kind="turned", axis=axis, profile=profile).solid, "xyz".index(axis)
+    radii, slopes = {"d1": 6, "d2": 9, "d3": 8}, {"d1": 0, "d2": -0.2, "d3": 0}
+    ends = {"d1": (0, 20), "d2": (20, 30), "d3": (30, 34)}
+    assert [wall.name for wall in solid.curved] == list(radii)
+    for wall in solid.curved:
+        corners = solid.vertices[np.unique([v for f in wall.faces for v in solid.faces[f]])]
+        low, high = ends[wall.name]
+        assert len(wall.faces) == 48
+        assert np.ptp(corners[:, k]) == pytest.approx(high - low)
+        assert wall.centre[k] == pytest.approx((low + high) / 2)
+        assert wall.radius == pytest.approx(radii[wall.name])
+        assert math.tan(wall.half_angle) == pytest.approx(slopes[wall.name])
+        assert np.abs(solid.normals[list(wall.faces)][:, k]).max() < 0.3  # margin: a cone's normals: 0.2
+    used = sorted(f for wall in solid.curved for f in wall.faces)
+    assert used == sorted(np.flatnonzero(np.abs(solid.normals[:, k]) < 0.9))

@@ -1,5 +1,7 @@
 """Light between surfaces against closed forms of form factors: a wall, a right angle, a blind hole, a cavity."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +10,7 @@ import scenes
 from imaging.light.between import light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, exchange_of, exchanged
+from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -160,3 +162,74 @@ def test_a_wall_sees_half_of_the_floor(task1, height, half_side):
     expected = scene.camera.exposure * 0.05 * 0.4 * ends / np.pi
     assert found == pytest.approx(expected, rel=0.02)
     assert light_between(Pictures.of(scene, (40, 20), (0, 0)), point, np.array([solid.normals[:, 2].argmax()])) == 0
+
+
+@pytest.fixture(scope="module")
+def pierced():
+    """The plate, and the number of a face of it that has holes."""
+    solid = scenes.load("plate").solid
+    return solid, next(f for f, holes in enumerate(solid.holes) if holes)
+
+
+def test_places_within_a_rim_are_beside_each_of_its_boundaries(pierced):
+    """A hundredth off the outline, and off each hole's, all the way around; never in a hole."""
+    solid, face = pierced
+    places, within = _rim(solid, face, 0.01), 0.01
+    loops = [solid.faces[face], *solid.holes[face]]
+    near = np.array([_apart(places, solid.vertices[list(loop)]) for loop in loops])
+    assert near.min(0) == pytest.approx(within, rel=0.02)
+    lengths = [np.linalg.norm(np.roll(c, -1, 0) - c, axis=1).sum() for c in (solid.vertices[list(p)] for p in loops)]
+    count = np.bincount(near.argmin(0), minlength=len(loops))
+    share = 400 * np.divide(lengths, sum(lengths))
+    more = count - share
+    assert (more >= 0).all()
+    assert (more <= list(map(len, loops))).all()  # margin: up to one more of each piece
+
+
+def _apart(points, corners):
+    """Distance of points (n, 3) from a closed line of corners (k, 3)."""
+    found = np.full(len(points), np.inf)
+    for start, stop in zip(corners, np.roll(corners, -1, 0), strict=True):
+        t = np.clip((points - start) @ (stop - start) / ((stop - start) @ (stop - start)), 0, 1)
+        found = np.minimum(found, np.linalg.norm(points - start - t[:, None] * (stop - start), axis=1))
+    return found
+
+
+def test_nodes_that_are_not_on_a_face_are_brought_to_its_nearest_rim(pierced):
+    """From a hole's middle to its own rim, from beyond the outline to that; what is on the face stays."""
+    solid, face = pierced
+    hole = solid.vertices[list(solid.holes[face][0])]
+    outline = solid.vertices[list(solid.faces[face])]
+    beyond = outline[0] + 0.3 * (outline[0] - outline.mean(0)) / np.linalg.norm(outline[0] - outline.mean(0))
+    on = hole.mean(0) + 1.2 * (hole[0] - hole.mean(0))
+    moved = _onto(solid, face, np.stack([hole.mean(0), beyond, on]), 0.01)
+    radius = np.linalg.norm(hole[0] - hole.mean(0))
+    assert np.linalg.norm(moved[0] - hole.mean(0)) == pytest.approx(radius + 0.01, rel=0.01)
+    assert np.linalg.norm(moved[1] - outline[0]) < 0.3  # margin: places along the rim are 0.1 apart
+    assert moved[2].tolist() == on.tolist()
+
+
+def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
+    for solid, face in (pierced, (scenes.load("wedge").solid, 0), (scenes.load("bracket").solid, 1)):
+        frame, corners = _frame(solid, face), solid.vertices[list(solid.faces[face])]
+        placed = (corners - frame.corner) @ frame.sides.T
+        assert placed.min(0) == pytest.approx(0, abs=1e-9)
+        assert placed.max(0) == pytest.approx(frame.size)
+        assert frame.sides @ frame.sides.T == pytest.approx(np.eye(2), abs=1e-12)
+        assert frame.sides @ solid.normals[face] == pytest.approx(0, abs=1e-12)
+        ways = np.roll(corners, -1, 0) - corners
+        assert np.abs(ways @ frame.sides[0]).max() == pytest.approx(np.linalg.norm(ways, axis=1).max())
+
+
+def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
+    """Of the rectangle's nodes all that lie in a hole or on the rim, too: light comes to the rim from both sides."""
+    solid, face = pierced
+    exchange = SimpleNamespace(solid=solid, cell=4.0, met=lambda nodes, normals, rays: nodes)
+    sheet = _sheet.__wrapped__(exchange, face)
+    first = min(sheet.u[1], sheet.v[1])
+    loops = [solid.faces[face], *solid.holes[face]]
+    near = np.min([_apart(sheet.met, solid.vertices[list(loop)]) for loop in loops], axis=0)
+    assert near.min() == pytest.approx(0.01 * first, rel=0.02)
+    assert len(sheet.met) == sheet.u.size * sheet.v.size
+    assert np.ptp(sheet.u) == pytest.approx(sheet.frame.size[0])
+    assert np.ptp(sheet.v) == pytest.approx(sheet.frame.size[1])

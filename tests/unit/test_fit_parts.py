@@ -5,13 +5,13 @@ import pytest
 
 import planner
 from imaging.blurred.whole import signal_at
-from measure.fitting.fit import fit
+from measure.fitting.fit import _with_noise, fit
 from measure.fitting.goodness import p_value, parts
 from measure.fitting.likelihood import Problem
-from measure.fitting.noise import by_neighbours, curve
+from measure.fitting.noise import Curve, by_neighbours, curve
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots, grouped
-from scenes import InvalidInput, Picture, Pose
+from scenes import InvalidInput, Noise, Picture, Pose
 
 
 @pytest.fixture(scope="module")
@@ -171,3 +171,10 @@ def test_darkness_tells_nothing(small, rng):
     assert found.status == "low_contrast"
     assert (found.values == found.start).all()
     assert not found.covariance.any()
+
+
+def test_sigma_and_gain_are_told_with_the_noise_s_own_covariance():
+    """Of the variance's two numbers: sigma = sqrt(dark) has a variance of var(dark) / 4 sigma^2, the gain its own."""
+    told = Curve(4.0, 0.1, np.array([[1.0, 0.3], [0.3, 0.25]]), 50.0)
+    found = _with_noise(np.array([[7.0]]), told, Noise(sigma=2.0))
+    assert found == pytest.approx(np.array([[7, 0, 0], [0, 1 / 16, 0.3 / 4], [0, 0.3 / 4, 0.25]]))

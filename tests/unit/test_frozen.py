@@ -1,4 +1,7 @@
-"""Values do not change once they are made: every dataclass is frozen, but for those that collect."""
+"""Values do not change once they are made: every dataclass is frozen, but for those that collect.
+
+Records of arrays that are looked up by what they are say ``eq=False``: arrays are neither compared nor hashed.
+"""
 
 import ast
 from pathlib import Path
@@ -26,6 +29,13 @@ def test_dataclasses_are_frozen(package):
     for path in (ROOT / package).rglob("*.py"):
         names = thawed(path.read_text(encoding="utf-8"))
         assert not names or str(path.relative_to(ROOT)) in COLLECTING, f"{path}: {names}"
+
+
+@pytest.mark.parametrize("package", ["scenes", "imaging", "planner", "render", "measure", "validation"])
+def test_what_is_said_of_equality_is_that_there_is_none(package):
+    """``eq=True`` is what a dataclass has anyway: who says something means the other."""
+    for path in (ROOT / package).rglob("*.py"):
+        assert "eq=True" not in path.read_text(encoding="utf-8").replace(" ", ""), path
 
 
 def test_it_would_be_seen():

@@ -19,3 +19,10 @@ def test_neighbours_are_within_1_6_steps(step):
     assert {tuple(sorted(pair)) for pair in pairs.tolist()} == {
         (i, int(j)) for i in range(len(space)) for j in space.neighbours(i) if i < j
     }  # fmt: skip
+
+
+def test_a_range_between_two_rings_is_its_middle():
+    """Rings stand at 20 and 25 degrees: of 21 to 24 there is the one at 22.5, of 20 to 24 that at 20."""
+    assert set(ViewingSpace(5.0, (21, 24)).poses[:, 0]) == {22.5}
+    assert set(ViewingSpace(5.0, (20, 24)).poses[:, 0]) == {20.0}
+    assert set(ViewingSpace(5.0, (16, 20)).poses[:, 0]) == {20.0}

@@ -144,6 +144,20 @@ def test_shells_inside_out_are_turned_and_cavities_stay():
     assert said == ("inverted shells turned: 1",)
 
 
+def test_a_shell_inside_out_in_two_bodies_is_none_of_their_cavities():
+    """Around it are two that look outwards: it is turned; around one more in it are three, and that stays a cavity."""
+    block, inner, core, hollow = box(), *(box((at, at, at), (2.7 - 2 * at,) * 3) for at in (0.3, 0.5, 0.7))
+    core.invert()
+    found, said = mended(of(block, inner, core))
+    assert said == ("inverted shells turned: 1",)
+    assert found.volume == pytest.approx(72 + inner.volume + abs(core.volume))
+    hollow.invert()
+    core.invert()
+    found, said = mended(of(block, inner, core, hollow))
+    assert said == ()
+    assert found.volume == pytest.approx(72 + inner.volume + core.volume - abs(hollow.volume))
+
+
 def test_a_sheet_of_no_thickness_is_left_out():
     sheet = np.array([[8.0, 0, 0], [9, 0, 0], [9, 1, 0], [8, 1, 0]])
     faces = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]]) + 8

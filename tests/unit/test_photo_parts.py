@@ -5,10 +5,12 @@ import pytest
 from scipy.stats import norm
 
 from measure.find.search import find_quadrilateral
+from measure.photo import profiles
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput
 from tests.oracle import polygon_image
+from validation.cli.measure import _shapes_wanted
 
 CORNERS = np.array([[40.0, 30.0], [150.0, 38.0], [141.0, 118.0], [33.0, 108.0]])
 SHAPE = (150, 190)
@@ -74,3 +76,33 @@ def test_found(background, rng):
     cut = polygon_image(CORNERS - [39.5, 29.5], SHAPE, 0.8, 100.0, 30.0)
     with pytest.raises(InvalidInput, match="must show a convex quadrilateral"):
         find_quadrilateral(cut)
+
+
+def _wanted(**given):
+    options = {f"--{name}": None for name in ("near", "box", "corners", "kind", "most", "mtf")} | {"--all": False}
+    return _shapes_wanted(options | {f"--{name}": value for name, value in given.items()})
+
+
+def test_shapes_are_asked_for_by_so_many_numbers_each():
+    """A place has two, a box four, four corners two each; one more or less is refused by its name."""
+    assert _wanted() == {"near": None, "box": None, "corners": None, "kinds": None, "most": 5}
+    found = _wanted(near="1,2.5", box="1,2,3,4", kind="circle,tag", most=3)
+    assert found == {"near": (1, 2.5), "box": (1, 2, 3, 4), "corners": None, "kinds": ("circle", "tag"), "most": 3}
+    assert _wanted(all=True)["most"] == 1000
+    assert _wanted(corners=("1,2", "3,4", "5,6", "7,8"))["corners"] == [(1, 2), (3, 4), (5, 6), (7, 8)]
+    wrong = {"near": "1", "box": "1,2,3", "corners": ("1,2", "3,4", "5,6", "7,8,9")}
+    for name, value in wrong.items():
+        with pytest.raises(InvalidInput, match=f"--{name} must be {4 if name == 'box' else 2} numbers"):
+            _wanted(**{name: value})
+    with pytest.raises(InvalidInput, match="--most must be left out with --all, got 3"):
+        _wanted(all=True, most=3)
+
+
+@pytest.mark.parametrize("corner", range(4))
+@pytest.mark.parametrize(("off", "is_taken"), [(11.5, True), (12.5, False), (-12.5, False)])
+def test_one_corner_that_is_far_off_leaves_all_as_they_were(corner, off, is_taken, monkeypatch):
+    """Beyond 12 px along x or y, twice the reach of the profiles, whichever of the four it is."""
+    found = CORNERS + 0.3
+    found[corner, 1] = CORNERS[corner, 1] + off
+    monkeypatch.setattr(profiles, "intersect", lambda *_: (found, None))
+    assert refined(picture(), CORNERS).tolist() == (found if is_taken else CORNERS).tolist()

@@ -174,3 +174,12 @@ def test_a_broken_note_beside_good_pixels(tmp_path):
     Image.fromarray(GREY).save(packed, "PNG", exif=b"Exif\0\0II*\0nonsense")
     (tmp_path / "a.png").write_bytes(packed.getvalue())
     assert (photograph.read(tmp_path / "a.png").levels == GREY).all()
+
+
+@pytest.mark.parametrize("shape", [(16, 20), (16, 20, 1)])
+def test_a_raw_mosaic_has_one_channel_however_it_is_kept(shape, tmp_path, rng):
+    np.save(tmp_path / "raw.npy", 100 + rng.normal(size=shape))
+    assert photograph.read(tmp_path / "raw.npy", bayer="RGGB").levels.shape == (16, 20)
+    np.save(tmp_path / "three.npy", 100 + rng.normal(size=(16, 20, 3)))
+    with pytest.raises(InvalidInput, match=r"--bayer must go with a file of one channel, got .*three\.npy with 3"):
+        photograph.read(tmp_path / "three.npy", bayer="RGGB")

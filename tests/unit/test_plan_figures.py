@@ -2,10 +2,14 @@
 
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
+import scenes
+from imaging.geometry.projection import project
 from scenes import Pose
-from validation.report import plan_figures
+from validation.report import plan_figures, scene_figure
 
 SENSOR, LIGHT = Pose(30, 135), Pose(15, 315)
 
@@ -26,3 +30,40 @@ def test_what_is_held_is_said():
     assert plan_figures._held(plan, "light") == f", sensor at {plan_figures.short(SENSOR)}"
     assert plan_figures._held(plan, "sensor") == f", light at {plan_figures.short(LIGHT)}"
     assert plan_figures._held(SimpleNamespace(sensor=SENSOR, light=()), "sensor") == ""
+
+
+def test_what_is_required_is_drawn_from_end_to_end():
+    """Each line ends where the camera shows a corner of the part, the circle's pieces too, each one once."""
+    scene, figure = scenes.load("plate"), plt.figure()
+    axis, sensor = figure.add_subplot(), Pose(20, 60)
+    try:
+        plan_figures._rim(axis, scene, np.array(list(sensor)), scene.solid.circles[0])
+        drawn = [line.get_xydata() for line in axis.lines]
+        assert axis.lines[0].get_label() == scene.solid.circles[0].name
+    finally:
+        plt.close(figure)
+    corners = project(scene.solid.vertices, np.array(list(sensor), float), scene.camera)
+    ends = np.array([[line[0], line[-1]] for line in drawn])
+    away = np.linalg.norm(ends[:, :, None] - corners, axis=-1)
+    assert away.min(-1).max() < 1e-9
+    assert np.bincount(away.argmin(-1).ravel()).tolist().count(2) == len(drawn)
+
+
+def test_what_is_near_is_drawn_over_what_is_far():
+    """The bracket's faces that are turned to the sensor, from the farthest on, by their middles."""
+    scene, sensor, figure = scenes.load("bracket"), Pose(40, 30), plt.figure()
+    axis = figure.add_subplot()
+    try:
+        scene_figure._faces(axis, scene_figure._View(scene, sensor))
+        drawn = [path.vertices[:3] for path in axis.collections[0].get_paths()]
+    finally:
+        plt.close(figure)
+    polar, azimuth = np.radians(list(sensor))
+    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    eye = np.array(scene.camera.look_at) + scene.camera.distance * way
+    middles = scene.solid.triangles.mean(1)
+    places = project(scene.solid.triangles.reshape(-1, 3), np.array(list(sensor), float), scene.camera)
+    which = [np.abs(places.reshape(-1, 3, 2) - each).sum((1, 2)).argmin() for each in drawn]
+    turned = (scene.solid.normals[scene.solid.triangle_faces] * (eye - middles)).sum(1) > 0
+    assert sorted(which) == np.flatnonzero(turned).tolist()
+    assert (np.diff(np.linalg.norm(eye - middles[which], axis=1)) <= 1e-9).all()

@@ -25,7 +25,7 @@ from validation import budgets
 from validation.boards import Boards
 from validation.cli import measurands, plan_json, plan_views
 from validation.cli import predict as predict_cli
-from validation.effects_check import Switched
+from validation.effects_check import RENDERED, Switched
 from validation.plan_check import CheckedSetting, PlanCheck
 from validation.report import (
     budget_table,
@@ -699,6 +699,18 @@ def test_the_lines_for_a_scene_are_those_of_the_boards_camera(calibrated, tmp_pa
 
 
 # --- effects
+
+
+def test_a_choice_of_effects_saves_what_is_left_out():
+    """Random rays are paid for once, by the dearest; what costs each picture alone is no part of a render."""
+    known = sorted(RENDERED)[:4]
+    costs = ((1.4, False, True), (1.3, False, False), (3.0, True, False), (2.0, True, True))
+    decisions = [
+        Decision(SimpleNamespace(name=name, cost=cost, random=random), on, "", Influence(0, 0))
+        for name, (cost, random, on) in zip(known, costs, strict=True)
+    ]
+    jitter = Decision(SimpleNamespace(name="pose_jitter", cost=9.0, random=False), True, "", Influence(0, 0))
+    assert effects_table.saving((*decisions, jitter)) == pytest.approx((1 + 2.0 + 0.4 + 0.3) / (1 + 1.0 + 0.4))
 
 
 def test_effects_are_printed_by_name():

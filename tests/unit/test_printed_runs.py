@@ -335,6 +335,35 @@ def test_the_csv_of_measurands_is_the_document_s(run, tmp_path):
         assert line["status"] == each["status"]
 
 
+def test_the_csv_of_settings_is_the_document_s(run, tmp_path):
+    """Poses, what is predicted, and every method's numbers, each under its own name."""
+    found, told = run
+    with export.write_csv(found, tmp_path / "t.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    scale = statistics.median([0.2 / told[0].predicted["paper"], 0.5 / told[1].predicted["paper"]])
+    for line, here, setting in zip(lines, told, _scene().settings, strict=True):
+        wanted = {
+            "sensor_polar": setting.sensor.polar_deg, "sensor_azimuth": setting.sensor.azimuth_deg,
+            "light_polar": setting.light.polar_deg, "light_azimuth": setting.light.azimuth_deg,
+            "paper_ice": setting.paper_ice, "our_ice": scale * here.predicted["paper"],
+            "paper_real_12": (setting.paper_real or (None, None))[0],
+            "paper_real_10": (setting.paper_real or (None, None))[1],
+            "calibrated": here.predicted["calibrated"], "bound": here.predicted["bound"],
+        }  # fmt: skip
+        for name, each in zip(METHODS, methods_of(here), strict=True):
+            low, high = each["ratio_interval"]
+            numbers = {
+                "propagated": each["propagated"], "empirical": each["empirical"], "n": each["n"],
+                "failed": each["failed"], "ratio": each["ratio"], "ratio_low": low, "ratio_high": high,
+                "bias_px": each["bias"], "predicted_bias_px": each["predicted_bias"], "rmse_px": each["rmse"],
+                "correction_px": each["correction"], "u_bias_px": each["u_bias"],
+            }  # fmt: skip
+            wanted |= {f"{name}_{key}": value for key, value in numbers.items()}
+            assert line[f"{name}_status"] == each["status"]
+        for key, value in wanted.items():
+            assert (line[key] == "") if value is None else float(line[key]) == pytest.approx(value), key
+
+
 def test_of_many_settings_those_farthest_from_their_prediction_are_shown(run, monkeypatch):
     """By the logarithm of the ratio: 1/2 is as far as 2."""
     found, told = run

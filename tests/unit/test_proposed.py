@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
+import planner
 import scenes
+from scenes import Pose
 from scenes.measurands.proposed import proposed
 from scenes.parts import mesh
 from scenes.parts.part_file import with_walls
@@ -137,3 +139,24 @@ class _Told:
 class _Forecast:
     def __init__(self, status):
         self.status = status
+
+
+def test_a_first_look_is_worth_what_is_predicted_there():
+    """Half the zone over eight sigma, at most 1, and half of that from below: 192 pictures, as one by one."""
+    scene = scenes.load("calibrated_rig").with_(**{"measurands[0].tolerance": {"plus": 0.02, "minus": 0.0}})
+    sensors, lights, worth = first_look._from_everywhere(scene)
+    assert len(sensors) == len(lights) == len(worth) == 192
+    seen = np.flatnonzero(worth[:, 0])
+    assert (worth[seen] < 1).any()
+    assert (sensors[seen, 0] < 90).any()
+    for i in [*seen[::9], *np.setdiff1d(np.arange(192), seen)[::20]]:
+        told = planner.predict(scene, Pose.of(sensors[i]), Pose.of(lights[i])).measurands[0]
+        expected = min(0.01 / 8 / told.variance_object**0.5, 1) * (0.5 if sensors[i, 0] > 90 else 1)
+        assert worth[i, 0] == pytest.approx(expected, abs=1e-6)
+
+
+def test_of_each_sensor_the_best_light_is_looked_at_closely():
+    """Four lights of each of three sensors: the sensors by their best."""
+    worth = np.array([[1, 2, 0, 0], [5, 0, 7, 0], [0, 0, 0, 6]], float).ravel()
+    assert first_look._apart(worth, 2) == [1 * 4 + 2, 2 * 4 + 3]
+    assert first_look._apart(worth, 5) == [1 * 4 + 2, 2 * 4 + 3, 0 * 4 + 1]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imaging.contours.quadrics import _polished, quadric_branches, touching_cone
+from imaging.contours.quadrics import _polar_plane, _polished, quadric_branches, touching_cone
 from scenes.parts.surfaces import Quadric
 
 EYE = np.array([3.0, 4.0, 5.0])
@@ -38,6 +38,20 @@ def test_points_beside_a_contour_are_moved_across_it_alone(off):
     assert np.abs(quadric.function(found)).max() < 1e-12
     assert np.abs((quadric.gradient(found) * (found - EYE)).sum(1)).max() < 1e-11
     along = np.cross(normal, sight)
+    # margin: what two rounds leave is of the order of off^2
     assert np.abs(((found - exact) * along).sum(1)).max() < 1e-3 * abs(off)
     unknown = exact + np.array([5.0, 0, 0])  # nothing is near: a step that is too long is not made
     assert (np.abs(_polished(quadric, EYE, unknown) - unknown).max(1) == 0).any()
+
+
+def test_the_polar_plane_is_as_large_as_what_it_cuts():
+    """Of a unit sphere seen from 3: a circle of radius sqrt(8) / 3 about 1/3. Of a cone: through its apex, where
+    the cut has no size of its own, as large as the eye is far."""
+    sphere, eye = Quadric(np.eye(3), (0, 0, 0), -1.0), np.array([0.0, 0.0, 3.0])
+    start, frame = _polar_plane(sphere, eye, sphere.gradient(eye) / 2)
+    assert start == pytest.approx([0, 0, 1 / 3], abs=1e-12)
+    assert frame.T @ frame == pytest.approx(np.eye(2) * 8 / 9, abs=1e-12)
+    cone, eye = Quadric(np.diag([1.0, 1.0, -1.0]), (0, 0, 0), 0.0), np.array([4.0, 0.0, 3.0])
+    start, frame = _polar_plane(cone, eye, cone.gradient(eye) / 2)
+    assert start == pytest.approx([0, 0, 0], abs=1e-12)
+    assert frame.T @ frame == pytest.approx(np.eye(2) * 25, abs=1e-9)

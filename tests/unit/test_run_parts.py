@@ -82,3 +82,20 @@ def test_machines_that_give_the_same_digits():
 def test_a_machine_in_words():
     assert machine.named(ONE) == "processor P, numpy AVX2, blas Haswell, embree AVX2"
     assert machine.named({**ONE, "blas": "", "numpy": "AVX512"}) == "processor P, numpy AVX512, embree AVX2"
+
+
+@pytest.mark.parametrize(("processor", "expected"), [("a chip", "a chip"), ("", "arm64")])
+def test_a_machine_that_tells_nothing_of_itself_is_named_by_its_kind(processor, expected, monkeypatch):
+    def unreadable(*_):
+        raise OSError("no such file")
+
+    monkeypatch.setattr(machine.Path, "read_text", unreadable)
+    monkeypatch.setattr(machine.platform, "processor", lambda: processor)
+    monkeypatch.setattr(machine.platform, "machine", lambda: "arm64")
+    assert machine._processor() == (expected, set())
+
+
+def test_a_machine_is_named_by_its_model_and_its_first_processors_instructions(monkeypatch):
+    text = "model name\t: Chip 7\nflags\t\t: sse avx\n\nmodel name\t: Chip 7\nflags\t\t: sse\n"
+    monkeypatch.setattr(machine.Path, "read_text", lambda *_: text)
+    assert machine._processor() == ("Chip 7", {"sse", "avx"})

@@ -10,7 +10,9 @@ import pytest
 
 import planner
 import scenes
+from render.phenomena.base import Influence
 from scenes import Pose
+from tests.commands import ice
 from validation import budgets, effects_check
 from validation.cli import measure as measure_cli
 from validation.cli import photograph, plan, verbosity
@@ -285,3 +287,17 @@ def test_edges_that_cannot_be_relied_on_are_told_of():
         f"contrast {edge.contrast:.3g} grey levels."
     )
     assert predict_cli.doubtful_edges([found] * 10)[-1] == "and 2 more places"
+
+
+@pytest.mark.parametrize(("holds", "code"), [((), 0), ((True, True), 0), ((True, False), 1), ((False, True), 1)])
+def test_an_effect_beyond_its_bound_is_exit_status_1(holds, code, monkeypatch):
+    rows = [
+        effects_check.Switched(
+            scenes.Setting(sensor=(20, 100), light=(40, 250)), "floor", Influence(0.01, 0.2),
+            0.005 if good else 0.5, 0.1, 0.003, 0.04, 3.0, 1.5,
+        )
+        for good in holds
+    ]  # fmt: skip
+    monkeypatch.setattr(effects_check, "check", lambda *_, **__: rows)
+    assert [row.holds for row in rows] == list(holds)
+    assert ice("effects", "task1", *["--check"] * bool(rows), "--json").returncode == code

@@ -73,7 +73,7 @@ def test_what_cannot_be_set_up_is_not_proposed(monkeypatch):
     assert not ways.is_steady(np.array([30.1, 40.0]), light)
     assert ways.is_steady(np.array([30.2001, 40.0]), light)
     first = next(ways.offers(sensor, light))
-    assert 30.1 < first[0][0] <= 30.4
+    assert 30.1 < first[0][0] <= 30.4  # margin: the first shell's radius
     assert np.array_equal(np.concatenate(first), np.round(np.concatenate(first), 1))
     assert next(SettingUp(Cliff(), (True, False)).offers(sensor, light), None) is None  # what is held stays
 
@@ -85,6 +85,60 @@ def test_a_steep_place_is_a_cliff(monkeypatch):
     for factor, steady in ((70, True), (80, False)):  # 1 + factor * 0.04: 3.8 and 4.2
         steep.values = lambda sensors, lights, factor=factor: 1 + factor * (sensors[:, 0] - 30) ** 2
         assert SettingUp(steep, (False, False)).is_steady(np.array([30.0, 40.0]), light) == steady
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_cliff_is_seen_on_either_side_and_by_any_quantity(side, monkeypatch):
+    """0.15 degrees before it nothing is steady, for one of two quantities is lost there; 0.21 before it all is."""
+
+    def ranks(errors, _):
+        return np.stack([np.full(len(errors.polar), 11), np.where(side * (errors.polar - 30) < 0, 0, 11)], -1)
+
+    monkeypatch.setattr(setting_up, "quantity_ranks", ranks)
+    ways, light = SettingUp(Cliff(), (False, False)), np.array([20.0, 300.0])
+    assert not ways.is_steady(np.array([30 + 0.15 * side, 40.0]), light)
+    assert ways.is_steady(np.array([30 + 0.21 * side, 40.0]), light)
+
+
+def test_sensor_and_lights_are_moved_by_what_each_may_be_off():
+    """Sensor 0.6 and lights 0.5 degrees, both ways along each coordinate alone; all together by half of the square."""
+    cliff = Cliff()
+    cliff.scene = scenes.load("two_lights").with_(uncertainty={"sensor_deg": 0.3, "light_deg": 0.25})
+    places = np.array([40.0, 10.0, 60.0, 200.0])
+    sensors, lights = SettingUp(cliff, (False, False))._around(np.array([50.0, 100.0]), places)
+    there = (sensors, [50, 100]), (lights[:, :2], [40, 10]), (lights[:, 2:], [60, 200])
+    off = np.degrees([_apart(each, here) for each, here in there]).T
+    assert off[0] == pytest.approx(0)
+    single = [row for row in off[1:].round(3).tolist() if row.count(0.0) == 2]
+    assert sorted(single) == sorted([[0.6, 0, 0]] * 4 + [[0, 0.5, 0]] * 4 + [[0, 0, 0.5]] * 4)
+    ways = sensors[1:13] - [50.0, 100.0]
+    # margin: to one side as far as to the other, but for the sphere's bend: 0.6^2 / 2 tan(50)
+    assert ways.sum(0) == pytest.approx(0, abs=0.02)
+    assert off[13:] == pytest.approx(np.broadcast_to([0.6, 0.5, 0.5], (16, 3)), rel=0.01)
+
+
+def _apart(poses, here):
+    """Angles between the directions of poses (n, 2) and one, rad."""
+    return np.linalg.norm(direction(np.asarray(poses)) - direction(np.array(here, float)), axis=-1)
+
+
+def test_poses_are_rounded_in_each_of_their_angles():
+    """Azimuths of all lights stay below 360 degrees."""
+    assert setting_up.rounded(np.array([30.04, 359.96, 20.06, 359.97])).tolist() == [30.0, 0.0, 20.1, 0.0]
+
+
+@pytest.mark.parametrize("held", [(False, True), (True, False)])
+def test_what_is_held_keeps_the_digits_of_every_light(held):
+    cliff = Cliff()
+    cliff.scene = scenes.load("two_lights")
+    sensor, lights = np.array([35.04, 40.03]), np.array([20.04, 300.02, 31.03, 11.04])
+    for sensors, places in (
+        SettingUp(cliff, held)._nearest(sensor, lights),
+        SettingUp(cliff, held)._shell(sensor, lights, 0.4),
+    ):
+        for kept, given, stays in ((sensors, sensor, held[0]), (places, lights, held[1])):
+            whole = np.broadcast_to(given, kept.shape)
+            assert np.array_equal(kept, whole if stays else np.round(kept, 1))
 
 
 def test_the_nearest_offer_is_the_best_of_all_roundings():

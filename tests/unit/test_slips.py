@@ -168,6 +168,16 @@ def test_no_mixture_of_lights_is_below_the_bound_of_its_sensor(larger):
     assert max(ratios) > 0.5  # margin: an inequality: the bound is near what it bounds
 
 
+@pytest.mark.parametrize(("bright", "contrast", "noise"), [(150, 50, 1.0), (300, 135, 0.5)])
+def test_a_mixture_of_lights_that_is_too_bright_is_cut_off(bright, contrast, noise):
+    """At 255 levels, 20 of them darkness: what is beyond is 235 and has no noise."""
+    scene = scenes.load("two_lights")
+    mixed = np.array([[[[bright] * 3, [100.0] * 3]]])
+    squared, variance = _Contrasts._contrast(SimpleNamespace(scene=scene), mixed)
+    assert squared == pytest.approx(np.full((1, 1, 3), contrast**2), rel=1e-3)
+    assert variance == pytest.approx(noise * scene.noise.variance, rel=0.02)
+
+
 def test_levels_of_a_single_edge_that_are_cut_off_are_enough(task1):
     part = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 1.0], [0.9, 1.0, 1.0]]) * task1.noise.variance
     assert cut_off(SimpleNamespace(noise_variance=part), task1).tolist() == [True, False, True]

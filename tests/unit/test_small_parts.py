@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 from imaging.geometry.projection import frame, project, project_ideal, sensor_position
 from imaging.pictures import Pictures
 from planner.budgeting import plans
@@ -14,6 +15,8 @@ from scenes import InvalidInput, Jitter, Picture, Pose
 from scenes.measurands import position
 from validation import plan_check
 from validation.batch import work
+from validation.batch.found import Found, row_status
+from validation.cli import budget as budget_command
 from validation.cli import plan as plan_command
 from validation.cli import recorded
 from validation.explore import preview
@@ -172,3 +175,58 @@ def test_a_plan_is_checked_where_it_can_be_measured(monkeypatch):
     assert plan_check.check_plan(found, 2, "quick") == ([], "nothing is seen")
     with pytest.raises(InvalidInput, match="check must be at least 1, got 0"):
         plan_check.check_plan(found, 0)
+
+
+@pytest.mark.parametrize(("objective", "noise", "doubt"), [("object", 0.04, 0.3), ("image", 9.0, 2.0)])
+def test_a_setting_is_checked_by_its_noise_and_what_its_bias_may_be_off(objective, noise, doubt, task1, monkeypatch):
+    """Variances add, of the object or of the image; the status is the worst once the bias is off."""
+    measured = SimpleNamespace(covariance=np.array([[0.04]]), covariance_image=np.array([[9.0]]))
+    off = SimpleNamespace(u_bias=np.array([0.3]), u_bias_image=np.array([2.0]), status=("clutter",))
+    monkeypatch.setattr(plan_check, "propagated", lambda *_: (None, measured))
+    monkeypatch.setattr(plan_check.simulation, "of_render", lambda *_: off)
+    monkeypatch.setattr(plan_check, "without_formula", lambda *_: ("floor",))
+    found = SimpleNamespace(scene=task1, objective=objective, over="minimax")
+    row = plan_check._checked(found, Pose(30, 135), Pose(15, 315), task1.required, 3, None)
+    told = planner.predict(task1, (30, 135), (15, 315), "calibrated").measurands[0]
+    assert row.calibrated == pytest.approx(told.variance_object if objective == "object" else told.variance_image)
+    assert row.propagated == pytest.approx(noise)
+    assert row.with_bias == row.minimised == pytest.approx(noise + doubt**2)
+    assert row.ratio == pytest.approx(noise / row.calibrated)
+    assert (row.status, row.rank_before, row.without_formula) == ("clutter", 3, ("floor",))
+
+
+def test_poses_that_are_given_take_the_place_of_the_first_settings(task1):
+    """Each by itself; without any it is the first setting."""
+    first = task1.settings[0]
+    given = Pose(33, 44), Pose(11, 22)
+    for sensor, light in ((None, None), (given[0], None), (None, given[1]), given):
+        found = budget_command._picture(task1, sensor, light)
+        assert found.sensor == (sensor or first.sensor)
+        assert found.lights == ((light or first.light),)
+    bare = task1.model_copy(update={"settings": ()})
+    assert budget_command._picture(bare, *given).lights == (given[1],)
+    for some in ((None, None), (given[0], None), (None, given[1])):
+        with pytest.raises(InvalidInput, match="--sensor and --light must be given for a scene without settings"):
+            budget_command._picture(bare, *some)
+
+
+@pytest.mark.parametrize(
+    ("lost", "expected"),
+    [
+        ({}, "ok"),
+        ({"short": 1}, "ok"),
+        ({"short": 2}, "short"),
+        ({"short": 1, "low_contrast": 1}, "short"),
+        ({"short": 1, "low_contrast": 2}, "low_contrast"),
+    ],
+)
+def test_too_many_lost_images_of_a_setting_are_its_status(lost, expected):
+    """More than one of a hundred in all, whatever became of each; of a doubtful setting the doubt stays."""
+    assert row_status("ok", lost, 100) == expected
+    assert row_status("clutter", lost, 100) == "clutter"
+
+
+def test_what_was_measured_is_off_by_its_mean_less_what_is_taken_off_and_what_is_there():
+    values = np.array([3.0, 5.0, np.nan, 7.0])
+    told = Found(4.0, values, {"short": 1}, "ok", correction=0.5, u_bias=0.1).scatter(2.0)
+    assert told == {"empirical": pytest.approx(4.0), "bias": pytest.approx(5 - 0.5 - 2), "n": 4, "failed": 1}

@@ -3,6 +3,7 @@
 import math
 import re
 from itertools import combinations
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -76,6 +77,16 @@ def test_the_sentence_counts_all_and_names_what_is_wrong():
     assert requirements.sentence(several[:1]).startswith("The requirement is measured well within tolerance")
 
 
+def test_the_worst_is_improved_first():
+    """By its U over half the zone: what cannot be told is worst, of equals the first comes first."""
+    a, b, c = required(1, u=0.03, name="a"), required(2, u=0.05, name="b"), required(3, u=0.05, name="c")
+    assert requirements.next_step([a, b, c]).startswith("Improve b first; most of it comes from pixel noise.")
+    assert requirements.next_step([c, b, a]).startswith("Improve b first")
+    assert requirements.next_step([a, b, required(4, u=None, name="d")]).startswith("Improve d first")
+    wide = required(5, u=0.06, name="e", tolerance=Tolerance(plus=0.1, minus=0.1))
+    assert requirements.next_step([a, wide]).startswith("Improve a first")
+
+
 def test_every_status_says_what_to_do():
     assert set(REMEDIES) == set(MEANINGS)
     assert all(REMEDIES[status] for status in MEANINGS if status != "ok")
@@ -89,7 +100,7 @@ def test_requirements_are_the_forecasts_beside_the_budgets_u(plate):
         assert (each.name, each.status, each.nominal) == (forecast.name, forecast.status, forecast.nominal)
         assert each.sigma == pytest.approx(math.sqrt(forecast.variance_object))
         assert pytest.approx(u[each.name]) == each.U
-        assert 1.9 * each.sigma < each.U
+        assert 1.9 * each.sigma < each.U  # margin: k is 1.96, and there is more than noise
 
 
 def test_one_that_cannot_be_measured_takes_nothing_from_the_others(plate):
@@ -141,7 +152,7 @@ def test_balloons_keep_apart_and_their_leaders_do_not_cross(count, rng):
     outside = (spots < corner) | (spots > corner + size)
     assert outside.any(1).all()
     apart = min((np.linalg.norm(a - b) for a, b in combinations(spots, 2)), default=1.0)
-    assert apart > (0.25 if count < 40 else 0.1)
+    assert apart > (0.25 if count < 40 else 0.1)  # margin: the order is said: balloons do not touch
     leaders = list(zip(tied, spots, strict=True))
     assert not any(crossing(a, b) for a, b in combinations(leaders, 2))
 
@@ -175,6 +186,8 @@ def test_the_sketch_is_to_scale(plate):
     assert above @ eye == pytest.approx([100 * np.sin(polar), 0.0], abs=1e-9)
     for pair in (side, above):
         assert pair @ pair.T == pytest.approx(np.eye(2))
+    assert np.cross(*above) == pytest.approx([0, 0, 1])  # or it were a view from below, or in a mirror
+    assert np.cross(*side) == pytest.approx([np.sin(azimuth), -np.cos(azimuth), 0])
     assert "camera 100 cm away, 15.0° from the vertical, azimuth 85.0°; lamp 100 cm away" in station_sketch.told(plate)
 
 
@@ -282,3 +295,121 @@ def test_a_page_does_not_sign_what_a_simulation_doubts(plate, tmp_path, monkeypa
 def test_a_bias_is_said_with_the_digits_of_sigma(bias, u, told):
     one = Requirement(1, "bore", "mm", 4.0, TOLERANCE, 0.0005, bias, u, 0.001, "ok", "")
     assert station_table._bias(one, 4) == told
+
+
+def setting(index, *measured):
+    """A run's row: (name, sigma, status) of each requirement."""
+    told = [SimpleNamespace(name=n, predicted=sigma**2, status=status) for n, sigma, status in measured]
+    return SimpleNamespace(index=index, measurands=told)
+
+
+def test_the_best_setting_proves_most_and_then_is_the_least_uncertain():
+    """By the largest sigma over half of its own zone; without zones by the product of all; of equals the first."""
+    halves = {"a": 0.1, "b": 1.0}
+    rows = [
+        setting(0, ("a", 0.01, "ok"), ("b", 0.9, "ok")),
+        setting(1, ("a", 0.02, "ok"), ("b", 0.3, "ok")),
+        setting(2, ("a", 0.02, "ok"), ("b", 0.3, "ok")),
+        setting(3, ("a", 0.001, "ok"), ("b", 0.001, "clutter")),
+        setting(4, ("a", 0.04, "ok"), ("b", 0.01, "ok")),
+    ]
+    assert [station.worst(row, halves) for row in rows] == pytest.approx([0.9, 0.3, 0.3, 0.01, 0.4])
+    assert [station.merit(row, halves)[0] for row in rows] == [0, 0, 0, 1, 0]
+    assert station.best(SimpleNamespace(rows=rows[::-1]), halves) is rows[1]
+    assert station.worst(rows[0], {}) is None
+    assert station.best(SimpleNamespace(rows=rows[:3] + rows[4:]), {}) is rows[4]
+    assert station.best(SimpleNamespace(rows=[setting(5, ("a", math.inf, "ok")), rows[0]]), {}) is rows[0]
+
+
+def test_half_of_a_zone_is_between_its_limits_and_of_every_scene():
+    def quantity(name, tolerance):
+        return SimpleNamespace(name=name, tolerance=tolerance)
+
+    one = [quantity("a", Tolerance(plus=0.3, minus=0.1)), quantity("b", None)]
+    campaign = SimpleNamespace(scenes=[SimpleNamespace(quantities=each) for each in (one, [quantity("c", TOLERANCE)])])
+    assert station.halves_of(campaign) == {"a": pytest.approx(0.2), "c": pytest.approx(0.02)}
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_the_station_of_a_run_is_told_by_what_was_measured(plate, corrected, monkeypatch):
+    """Predicted variances and the statuses found; doubts where one value's bias was taken off, infinite for others."""
+    names = [each.name for each in planner.predict(plate).measurands]
+    doubts = [0.001, None, 0.003, None, 0.005] if corrected else [None] * 5
+    rows = [
+        SimpleNamespace(
+            name=n, predicted=0.01 * (k + 1), status="ok" if k else "clutter", bias=0.1 * k, u_bias=u, value=k
+        )
+        for k, (n, u) in enumerate(zip(names, doubts, strict=True))
+    ]
+    row = SimpleNamespace(index=3, measurands=rows, main=SimpleNamespace(method="gradient"))
+    campaign = SimpleNamespace(case=lambda index: SimpleNamespace(picture=plate) if index == 3 else None, scenes=[])
+    store = SimpleNamespace(
+        identity=lambda: {}, has_image=lambda index: False,
+        propagated=lambda index, column: (None, 10.0 + float(column.split(":")[-1]) if ":" in column else 10.0),
+    )  # fmt: skip
+    asked = []
+    monkeypatch.setattr(station, "measurable_budget", lambda *given, **more: asked.append((given, more)))
+    made = station.of_run(campaign, SimpleNamespace(rows=[row]), store)
+    ((picture, variances), more), states = asked[0], ["clutter", "ok", "ok", "ok", "ok"]
+    assert picture is plate
+    assert variances == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
+    expected = {"doubts": [0.001, math.inf, 0.003, math.inf, 0.005]} if corrected else {"biases": [10.0] * 5}
+    assert more == {"statuses": states, **expected}
+    assert [each.sigma for each in made.requirements] == pytest.approx([0.1 * math.sqrt(k) for k in range(1, 6)])
+    assert [each.bias for each in made.requirements] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])
+    assert [each.u_bias for each in made.requirements] == doubts
+    assert [each.status for each in made.requirements] == states
+    assert made.number == 4
+
+
+def proof_line(name="a", number=1, place=1, ratio=1.0, bias=0.0, half=None, status="ok"):
+    return proof_figures.Line(name, number, place, status, ratio, 0.9, 1.2, 50, bias, 0.01, 0.5, half)
+
+
+def test_what_is_far_from_1_is_so_by_its_factor():
+    lines = [proof_line(ratio=r) for r in (1.0, 3.0, 0.25, 1.1, 0.8)] + [proof_line(ratio=1.0)] * 12
+    assert [line.ratio for line in proof_figures._farthest(lines)][:4] == [0.25, 3.0, 0.8, 1.1]
+
+
+def test_a_bias_is_told_in_per_cent_of_half_the_zone_or_in_sigmas():
+    """0.02 of half a zone of 0.1 is 20 %, of sigma 0.5 it is 0.04; the largest is so beside its own zone."""
+    assert proof_figures._biased(proof_line(bias=0.02, half=0.1), True) == pytest.approx((20.0, 19.6))
+    assert proof_figures._biased(proof_line(bias=0.02, half=0.1), False) == pytest.approx((0.04, 0.0392))
+    several = [proof_line(bias=-0.02, half=0.1), proof_line("wide", 2, bias=0.05, half=1.0), proof_line(bias=9.0)]
+    assert proof_figures.bias_told(several).endswith("the largest, of a, is 20 % of it.")
+
+
+@pytest.mark.parametrize(
+    ("camera", "aligned"),
+    [
+        ((0.06, 0.0), ["left", "right"]),
+        ((-0.06, 0.0), ["right", "left"]),
+        ((0.0, 0.06), ["right", "left"]),
+        ((0.0, 0.8), ["center", "center"]),
+        ((-0.8, 0.0), ["center", "center"]),
+    ],
+)
+def test_names_stand_side_by_side_where_camera_and_lamp_are_near(camera, aligned):
+    """Within 0.7 of half the picture along both axes; the one on the left to the left. All is 2 wide and high."""
+    figure = plt.figure()
+    axis, part = figure.add_subplot(), np.array([[-1.0, -1], [1, 1]])
+    places = [("camera", np.array(camera), "k"), ("lamp", np.zeros(2), "k")]
+    try:
+        station_sketch._labels(axis, places, part, np.zeros(2))
+        assert [text.get_ha() for text in axis.texts] == aligned
+        assert axis.get_xlim() == pytest.approx((-1.6, 1.6))
+        assert axis.get_ylim() == pytest.approx((-1.35, 1.45))
+    finally:
+        plt.close(figure)
+
+
+@pytest.mark.parametrize(("height", "side"), [(0.5, "bottom"), (-0.04, "bottom"), (-0.06, "top")])
+def test_names_stand_above_what_they_name_unless_it_is_below_the_middle(height, side):
+    figure = plt.figure()
+    axis = figure.add_subplot()
+    try:
+        places = [("lamp", np.array([0.5, height]), "k")]
+        station_sketch._labels(axis, places, np.array([[-1.0, -1], [1, 1]]), np.zeros(2))
+        assert [text.get_va() for text in axis.texts] == [side]
+    finally:
+        plt.close(figure)

@@ -1,10 +1,14 @@
 """Tables of brightness on plane faces, against the planner's reflectance at points between their nodes."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
+from scipy.signal import convolve2d
 
 import scenes
+from imaging.models.texture import _covariance
 from render import texture
 from render.build import textured
 from scenes import Material, Picture, Pose
@@ -114,3 +118,18 @@ def test_no_table_where_brightness_has_no_such_form():
     assert made(scene, *poses, LOBE | {"depth_of_field"}) is None
     assert made(scene, *poses, LOBE | {"interreflection"}) is None
     assert made(glossy(1e-6), *poses) is None
+
+
+def test_sums_over_a_filtered_field_vary_as_on_an_endless_sheet(rng):
+    """White noise through a filter without symmetry, weighted at nodes near both ends: no tail of it is cut off."""
+    kernel = rng.normal(size=(5, 7))
+    field = SimpleNamespace(margin=(2, 3), filtered=lambda each: convolve2d(each, kernel, mode="same"))
+    sheet = SimpleNamespace(field=field, values=np.zeros((12, 14)))
+    weights = np.zeros((2, 12, 14))
+    parts = []
+    for k, (rows, columns) in enumerate((([1, 0, 6], [2, 0, 7]), ([11, 9, 5], [13, 10, 6]))):
+        weights[k, rows, columns] = own = rng.normal(size=3)
+        parts.append((slice(k, k + 1), np.stack([columns, rows], 1).astype(float), own[None]))
+    endless = [convolve2d(np.pad(each, 8), kernel, mode="same").ravel() for each in weights]
+    found = _covariance(sheet, parts, 2)
+    assert found == pytest.approx(np.array([[a @ b for b in endless] for a in endless]), abs=1e-12)

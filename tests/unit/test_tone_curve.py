@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import measure
-from measure.photo.tone_curve import UNTOLD, ToneCurve, together
+from measure.photo.tone_curve import UNTOLD, ToneCurve, together, tone_curve
 from scenes import photograph, status
 from scenes.cameras import tone
 from scenes.photograph import Photograph
@@ -86,3 +86,16 @@ def test_edges_together():
     assert ToneCurve(0.39, 0.1, 3.0).bent
     assert not ToneCurve(0.38, 0.1, 3.0).bent
     assert tone.NONE.plain
+
+
+@pytest.mark.parametrize("darkest", [0.0, -3.0, 10.0])
+def test_pixels_without_light_count_as_dark_ones(darkest):
+    """What a power of 1 + b leaves of levels is b times -x log(x / mean x): found again, black pixels among them."""
+    levels = np.concatenate([np.linspace(20.0, 200.0, 40), [darkest] * 4])
+    shown = np.where(levels > 0, levels, 0.2)  # a thousandth of the brightest
+    left = 0.3 * -shown * np.log(shown / shown.mean())
+    design = np.cos(np.arange(44.0))[:, None]
+    left = left - design @ np.linalg.lstsq(design, left)[0]
+    found = tone_curve(design, levels, left, np.full(44, 0.5), 1)
+    assert found.bend == pytest.approx(0.3)
+    assert found.error == pytest.approx(0.3 / np.linalg.norm(0.5 * left))

@@ -47,3 +47,28 @@ def test_nothing_is_left_out_and_other_things_are_refused():
     assert tomllib.loads(edited("a = 1\nb = true\nc = 1.0\n", {"a": 1.0, "b": 1})) == {"a": 1.0, "b": 1}
     with pytest.raises(TypeError, match="set has no place in a TOML document"):
         edited("", {"a": {1, 2}})
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "written"),
+    [
+        ("a = 1", True, "a = true"),
+        ("a = true", 1, "a = 1"),
+        ("a = 1", 1.0, "a = 1.0"),
+        ("a = 1.0", 1, "a = 1"),
+        ("a = 1 # one", 1, "a = 1 # one"),
+        ("a = [1, 2] # two", [1, 2], "a = [1, 2] # two"),
+        ("a = [1, 2] # two", [1, 3], "a = [1, 3]"),
+    ],
+)
+def test_numbers_and_truths_that_are_equal_are_told_apart(text, value, written):
+    """1, 1.0 and true are; what is as it was keeps its comment."""
+    assert edited(text + "\n", {"a": value}).splitlines()[0].startswith(written)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_lists_of_tables_may_grow_and_shrink(count):
+    before = "[[a]] # first\nb = 1 # one\n[[a]]\nb = 2 # two\n"
+    wanted = {"a": [{"b": 1 + k} for k in range(count)]}
+    assert tomllib.loads(edited(before, wanted)) == wanted
+    assert (edited(before, wanted) == before) == (count == 2)

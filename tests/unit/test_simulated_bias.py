@@ -1,0 +1,260 @@
+"""Corrections from simulated images: what they depend on, what is changed for them, and who counts in what."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import measure
+import scenes
+from measure import Correction, Images
+from measure.correction import _by_rays
+from render import Quality, Tolerance
+from scenes import Picture, Pose
+from tests.oracle import block_image
+from validation import kept, simulation
+from validation.remeasured import Method
+from validation.simulation import How
+
+POSES = (30, 90), (15, 270)
+
+
+@pytest.fixture(scope="module")
+def small(task1):
+    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
+    return task1.model_copy(update={"camera": camera})
+
+
+@pytest.fixture(scope="module")
+def picture(small):
+    return Picture.of(small, *POSES)
+
+
+@pytest.fixture(scope="module")
+def exact(small):
+    return block_image(small, *POSES)
+
+
+def _made(picture, **more):
+    """A correction of a length known to a tolerance, by hand."""
+    given = {
+        "quantities": picture.scene.quantities, "estimator": "gradient", "threshold": None,
+        "bias": np.array([0.3]), "bias_image": np.array([-0.4]),
+        "sources": {"rendering": np.array([0.03])}, "sources_image": {"rendering": np.array([0.02])},
+        "covariance": np.array([[0.04]]), "covariance_image": np.array([[0.09]]), "simulated": ("ok",),
+    }  # fmt: skip
+    return Correction(**(given | more))
+
+
+def test_what_needs_no_image_counts_in_the_object_and_in_the_image_as_it_is_told(picture, exact):
+    off = measure.correction(Images((exact,), known={"light_place": (np.array([0.25]), np.array([0.5]))}), picture)
+    assert off.sources["light_place"].tolist() == [0.25]
+    assert off.sources_image["light_place"].tolist() == [0.5]
+
+
+def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small, picture, exact):
+    """Of a sensor that stands 0.05 degrees aside the other image is: the bias stays that of the first alone."""
+    other = block_image(small, (30.05, 90), (15, 270))
+    alone, beside, both = (
+        measure.correction(images, picture)
+        for images in (Images((exact,)), Images((exact,), beside=(other,)), Images((exact, other)))
+    )
+    assert beside.bias.tolist() == alone.bias.tolist()
+    assert beside.bias_image.tolist() == alone.bias_image.tolist()
+    assert abs(both.bias_image[0] - alone.bias_image[0]) > 1e-4
+    assert np.isfinite(beside.u_bias).all()
+    assert np.isinf(alone.u_bias).all()
+    assert beside.sources["rendering"] == pytest.approx(both.sources["rendering"] * math.sqrt(2))
+
+
+def test_standard_uncertainty_of_a_mean_of_renders():
+    """Values 1, 2, 3, 6 scatter by the root of 14/3, the mean of the first two of them by that over the root of two."""
+    values = np.array([[1.0, 5.0], [2.0, 5.0], [3.0, 5.0], [6.0, 5.0]])
+    told = _by_rays(values, 2, np.array([0.5, 0.5]))["rendering"]
+    assert told == pytest.approx([math.sqrt(14 / 3 / 2), 0.5 / math.sqrt(2)])
+
+
+def test_the_renders_noise_counts_in_the_image_by_the_images_own_scatter(picture, exact):
+    """Equal renders but for a twentieth of the camera's noise: value for value the same part of sigma, cm and px."""
+    rng = np.random.default_rng(5)
+    renders = tuple(exact + 0.05 * picture.scene.noise.sigma * rng.normal(size=exact.shape) for _ in range(2))
+    off = measure.correction(Images(renders), picture)
+    in_object = off.sources["rendering"][0] / off.sigma[0]
+    in_image = off.sources_image["rendering"][0] / math.sqrt(off.covariance_image[0, 0])
+    assert in_image == pytest.approx(in_object, rel=0.1)  # margin: one length, not quite the same of both
+    assert 0.01 < in_object < 0.5  # margin: 0.05 by chance: two renders tell it to 70 %
+
+
+@pytest.mark.parametrize(("texture", "status"), [(0.5, "ok"), (math.inf, "clutter")])
+def test_textures_that_a_closed_form_tells_are_no_reason_to_doubt(picture, texture, status):
+    """Their scatter is in the uncertainty; sigma is 0.2, and what else is not known 0.03."""
+    sources = {"rendering": np.array([0.03]), "texture": np.array([texture])}
+    made = _made(picture, sources=sources)
+    assert made.status == (status,)
+    assert made.u_bias == pytest.approx([math.hypot(0.03, texture)])
+    other = {"rendering": np.array([0.03]), "reflectance": np.array([0.5])}
+    assert _made(picture, sources=other).status == ("clutter",)
+
+
+def test_all_that_the_numbers_depend_on_names_the_file(small, picture, tmp_path, monkeypatch):
+    """Each of these changed alone is another correction; the same said again is the same."""
+    method, how = Method("canny", 12.0), How()
+    lens = small.model_copy(update={"camera": small.camera.model_copy(update={"blur_px": 0.7})})
+    others = [
+        (Picture.of(small, (30, 91), (15, 270)), method, how),
+        (Picture.of(small, (31, 90), (15, 270)), method, how),
+        (Picture.of(small, (30, 90), (15, 271)), method, how),
+        (Picture.of(small, (30, 90), (16, 270)), method, how),
+        (picture.with_scene(lens), method, how),
+        (picture, Method("canny", 10.0), how),
+        (picture, Method("gradient"), how),
+        (picture, method, dataclasses.replace(how, quality=Quality(seed=7))),
+        (picture, method, dataclasses.replace(how, effects="physical")),
+        (picture, method, dataclasses.replace(how, variant="scalar_rgb_double")),
+        (picture, method, dataclasses.replace(how, tolerance=Tolerance(bias_px=0.5))),
+        *((_on_other_parts(picture, each), method, how) for each in ("vertices", "curved")),
+    ]
+    named = [kept._digest(*each) for each in [(picture, method, how), *others]]
+    assert len(set(named)) == len(named)
+    assert kept._digest(Picture.of(small, *POSES), Method("canny", 12.0), How()) == named[0]
+    monkeypatch.setattr(kept, "_code", lambda: b"other code")
+    assert kept._digest(picture, method, how) not in named
+
+
+def _on_other_parts(picture, what):
+    """The picture of a part with the same keys in its scene's file: another mesh at the same path, or another wall."""
+    solid = picture.scene.solid
+    if what == "vertices":
+        other = dataclasses.replace(solid, vertices=solid.vertices * [1, 1, 1.001])
+    else:
+        ball = scenes.load("ball").solid.curved
+        other = dataclasses.replace(solid, curved=ball)
+    return _Stands(picture, other)
+
+
+@dataclass
+class _Stands:
+    """A picture whose scene says what it said, of another solid."""
+
+    picture: Picture
+    solid: object
+
+    @property
+    def scene(self):
+        return self
+
+    @property
+    def bodies(self):
+        return self.solid
+
+    def __getattr__(self, name):
+        given = self.__dict__["picture"]
+        return getattr(given, name) if name in ("sensor", "lights") else getattr(given.scene, name)
+
+
+@pytest.mark.parametrize("package", ["scenes", "imaging", "render", "measure"])
+def test_another_line_of_the_code_names_another_file(package, tmp_path, monkeypatch):
+    """Each package's: a program that measures otherwise corrects otherwise."""
+    before = kept._code.__wrapped__()
+    (tmp_path / "changed.py").write_text("another = 1\n")
+    module = getattr(kept, package)
+    monkeypatch.setattr(module, "__file__", str(tmp_path / "__init__.py"))
+    assert kept._code.__wrapped__() != before
+
+
+def test_what_is_kept_comes_back(picture, tmp_path):
+    """Each number in its own place, what is not known as it was."""
+    two = {"first": np.array([0.1]), "second": np.array([np.inf])}
+    image = {"first": np.array([0.5]), "second": np.array([0.25])}
+    made = _made(picture, sources=two, sources_image=image, bias=np.array([np.nan]), covariance=np.array([[np.inf]]))
+    kept._write(tmp_path / "a.json", made)
+    found = kept._read(tmp_path / "a.json", picture, Method("gradient"))
+    for field in dataclasses.fields(Correction):
+        ours, theirs = getattr(found, field.name), getattr(made, field.name)
+        if isinstance(theirs, dict):
+            assert list(ours) == list(theirs)
+            assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
+        elif isinstance(theirs, np.ndarray):
+            np.testing.assert_array_equal(ours, theirs)
+        else:
+            assert ours == theirs
+
+
+@pytest.mark.parametrize(
+    ("noise", "sigma", "half", "quiet"),
+    [
+        ((0.09, 0.09), (1.0, 1.0), 0.0, True),
+        ((0.09, 0.11), (1.0, 1.0), 0.0, False),
+        ((0.11, 0.09), (1.0, 1.0), 0.0, False),
+        ((0.9, 0.9), (1.0, 1.0), 100.0, True),
+        ((1.1, 0.9), (1.0, 1.0), 100.0, False),
+        ((0.09, np.inf), (1.0, 1.0), 0.0, True),
+        ((0.09, 5.0), (1.0, np.inf), 0.0, True),
+    ],
+)
+def test_renders_are_enough_when_every_value_s_noise_is_a_tenth_of_sigma_or_a_hundredth_of_the_tolerance(
+    picture, noise, sigma, half, quiet
+):
+    quantity = picture.scene.quantities[0]
+    if half:
+        quantity = dataclasses.replace(quantity, tolerance=scenes.Tolerance(plus=0.5 * half, minus=1.5 * half))
+    made = _made(
+        picture, quantities=(quantity,) * 2, sources={"rendering": np.array(noise)},
+        covariance=np.diag(np.square(sigma)), bias=np.zeros(2),
+    )  # fmt: skip
+    assert simulation._is_quiet(made) is quiet
+
+
+def test_lights_are_moved_one_at_a_time():
+    """Each a hundredth of its distance away, and by as much to the side; all else stays."""
+    scene = scenes.load("two_lights").with_(uncertainty={"light_place": 0.01})
+    picture = Picture.of(scene, (60, 277), [(75, 280), (45, 276)])
+    moved, seen = list(simulation._with_lights_moved(picture)), []
+    for each in moved:
+        far = [b.distance / a.distance for a, b in zip(scene.lights, each.scene.lights, strict=True)]
+        turned = [_angle(a, b) for a, b in zip(picture.lights, each.lights, strict=True)]
+        assert each.sensor == picture.sensor
+        assert [light.intensity for light in each.scene.lights] == [0.6, 0.4]
+        seen.append((*np.round(far, 9), *np.round(turned, 9)))
+    step = round(0.01, 9)
+    assert seen == [
+        (1.01, 1, 0, 0), (1, 1, step, 0), (1, 1, step, 0), (1, 1.01, 0, 0), (1, 1, 0, step), (1, 1, 0, step),
+    ]  # fmt: skip
+
+
+def _angle(one: Pose, other: Pose) -> float:
+    """Between two directions, rad."""
+    ways = []
+    for polar, azimuth in (np.radians(list(one)), np.radians(list(other))):
+        ways.append([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    return math.asin(np.linalg.norm(np.cross(*ways)))
+
+
+def test_each_surface_reflects_less_by_a_tenth():
+    """One at a time: the part, the floor, and a face's own material."""
+    scene = scenes.load("grey_floor").with_(uncertainty={"reflectance": 0.1})
+    own = {"kind": "torrance_sparrow", "name": "matt", "where": "top", "diffuse_reflectance": 0.3}
+    scene = scene.with_(materials=[own])
+    picture = Picture.of(scene, (30, 90), (15, 270))
+
+    def reflected(each):
+        return each.material.specular_fraction, each.floor.reflectance, each.materials[0].diffuse_reflectance
+
+    found = [np.divide(reflected(each.scene), reflected(scene)) for each in simulation._of_other_surfaces(picture)]
+    assert np.array(found) == pytest.approx(np.array([[0.9, 1, 1], [1, 0.9, 1], [1, 1, 0.9]]))
+    assert scene.floor.reflectance == 0.2
+
+
+def test_the_light_in_closed_form_is_what_exact_images_show(task1):
+    """The value is measured in an exact image for each other place of the light; a place farther away changes none."""
+    scene, values = task1.with_(uncertainty={"light_place": 0.05}), []
+    picture = Picture.of(scene, (30, 135), (15, 315))
+    for each in (picture, *simulation._with_lights_moved(picture)):
+        image = block_image(scene, (30, 135), tuple(each.lights[0]))
+        found = measure.measure(image, picture, estimator="gradient")
+        values.append((found.value[0], found.first.value_px))
+    expected = np.linalg.norm(np.array(values[1:]) - values[0], axis=0)
+    told = np.concatenate(simulation._light_in_closed_form(picture))
+    assert told == pytest.approx(expected, rel=0.6)  # margin: differences of 1e-4 px of a form of first order
