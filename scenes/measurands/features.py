@@ -113,8 +113,9 @@ def points_of(solid: Solid, quantity: Quantity) -> np.ndarray:
 def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     """Unit normal of the plane in which a quantity is measured, shape (3,); its sign has no meaning.
 
-    The plane of its features. Two points span none: theirs is the plane of the one face that has both, or that of a
-    circle if the other point lies in it; None where there is no such plane or there are several.
+    The plane of its features: that of a circle if all lies in it, else the one that its centre and an edge span, whose
+    heights may differ. Two points span none: theirs is the plane of the one face that has both. None where there is no
+    such plane or there are several.
     """
     circles = [solid.circle(f.circle) for f in quantity.features if isinstance(f, Centre)]
     points = points_of(solid, quantity)
@@ -123,7 +124,7 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
         return None
     if circles:
         flat = (np.abs((points - circles[0].centre) @ circles[0].axis) <= near).all()
-        return circles[0].axis if flat else None
+        return circles[0].axis if flat else _spanned(points, near)
     if len(points) > 2:
         return np.linalg.svd(points - points.mean(0))[2][2]
     ends = [solid.vertex_names.index(f.vertex) for f in quantity.features]
@@ -131,6 +132,12 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     normals = solid.normals[faces]
     alike = len(faces) and (np.abs(normals @ normals[0]) > 1 - 1e-12).all()
     return normals[0] if alike else None
+
+
+def _spanned(points: np.ndarray, near: float) -> np.ndarray | None:
+    """Unit normal of the plane that points (n, 3) span, (3,); None where they lie on a line."""
+    _, size, axes = np.linalg.svd(points - points.mean(0))
+    return axes[2] if len(points) > 2 and size[1] > near else None
 
 
 def is_flat(points: np.ndarray, extent: float) -> bool:
