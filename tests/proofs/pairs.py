@@ -115,7 +115,7 @@ class Pair:
     @property
     def same(self) -> bool:
         """Whether the mesh is of this revision of the part."""
-        return self.share >= _SAME_PART
+        return self.share >= _SAME_PART  # margin: a limit, no tolerance
 
     def __str__(self) -> str:
         note = self.placed if self.same else f"{self.placed}; ANOTHER REVISION, {self.share:.0%} of the corners"

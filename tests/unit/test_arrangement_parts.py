@@ -84,6 +84,7 @@ def test_drawn_images_tell_as_much_as_the_columns_say(tool, fit, rng):
     slopes = (ahead - behind) / 2e-4
     answer = 0.2 * slopes @ expansion.inverse
     draws = linear @ answer / (answer @ answer)
+    # margin: columns in single precision
     assert linear == pytest.approx(draws[:, None] * answer, abs=1e-6 * np.abs(answer).max())
     assert draws[:200] == pytest.approx(-draws[200:])
     assert np.square(draws).mean() == pytest.approx(1, abs=0.4)  # margin: chance of 200: 4 sqrt(2 / 200)

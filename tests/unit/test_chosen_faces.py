@@ -51,6 +51,7 @@ def test_faces_within_an_angle(within, count):
     ends = 2 if within >= 90 else 0
     assert len(found) == count + ends
     cosine = found @ [np.cos(angle), np.sin(angle), 0]
+    # margin: the angle that is asked for is the limit
     assert cosine.min() >= np.cos(np.radians(within)) - 1e-9
 
 

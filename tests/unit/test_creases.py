@@ -61,6 +61,7 @@ def test_a_surface_that_bends_both_ways_has_no_edges_inside(steps):
     solid, _ = in_file(bumpy(steps))
     expected = [30.0, 30.0, 30.0, 40.0, 40.0]
     upright = [10 + 1.5 * np.sin(x / 6) * np.cos(y / 5) for x in (0, 40) for y in (0, 30)]
+    # margin: places of a file in single precision, or as it was divided
     assert lengths(solid) == pytest.approx(sorted(expected + upright), abs=1e-4)
     assert sum(solid.plane) == 5
 
@@ -94,6 +95,7 @@ def half_of_a_cone(rows=(0.0, 4.0, 7.0, 10.0), counts=(20, 23, 19, 26)):
 def test_a_straight_edge_of_a_curved_surface_is_one_whatever_divides_it():
     """Two along the cone, of sqrt(10^2 + 2^2), and those of the flat side below and above; no others."""
     solid, turn = in_file(half_of_a_cone())
+    # margin: places of a file in single precision, or as it was divided
     assert lengths(solid) == pytest.approx([6, 10, np.hypot(10, 2), np.hypot(10, 2)], abs=1e-4)
     corners = np.array([[x, 0, z] for x, z in ((-5, 0), (5, 0), (-3, 10), (3, 10))])
     there = trimesh.transformations.transform_points(corners, turn)

@@ -101,6 +101,7 @@ def test_sensors_that_can_measure_by_no_light_have_none(poses):
     assert not lost.all()
     assert ((found.best_light == -1) == lost).all()
     assert (np.isinf(found.least) == lost).all()
+    # margin: a bound that holds by its kind
     assert (found.least <= values.min(1) * (1 + 1e-9)).all()
     assert not lost[found.sensor]
     assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)

@@ -34,9 +34,12 @@ def test_the_first_photograph_tells_place_and_brightness(two):
     found = dict(zip(names, start._aligned(parameters, shots, values, noise) - values, strict=True))
     given = dict(zip(names, values, strict=True))
     pixel = camera.distance / camera.focal_px
+    # margin: a start, from a search to some tenths of a pixel
     assert found["aim.right"] / pixel == pytest.approx(-7, abs=0.2)
+    # margin: a start, from a search to some tenths of a pixel
     assert found["aim.down"] / pixel == pytest.approx(4, abs=0.2)
     assert found["camera.distance"] / given["camera.distance"] == pytest.approx(0, abs=0.01)
+    # margin: a start, within some per cent
     assert found["camera.exposure"] / given["camera.exposure"] == pytest.approx(0.3, rel=0.05)
     dark = np.median(planner.image(two[0])[:3]) * 1.3 + 9.0
     assert found["noise.dark_level"] + given["noise.dark_level"] == pytest.approx(dark, abs=0.5)
@@ -51,6 +54,7 @@ def test_images_get_ever_sharper(two, monkeypatch):
     values, rest = start._followed(parameters, (), np.zeros(4), parameters.scene.noise)
     assert asked[0] == 0.25
     assert len(asked) > 2
+    # margin: about half each time
     assert all(0.4 < after / before < 0.6 for before, after in pairwise(asked))
     assert (values.tolist(), rest, left) == ([len(asked)] * 4, 0.7, [asked[-1]])
 

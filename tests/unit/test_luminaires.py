@@ -43,8 +43,10 @@ def test_pieces_of_a_turned_line_have_its_area():
     assert normal == pytest.approx([0, 0, math.pi * 9], abs=1e-9)
     frustum = turned(np.array([2.0, 5.0]), np.array([-1.0, 3.0]))["triangles"]
     assert frustum.shape == (2 * luminaire._AROUND, 3, 3)
+    # margin: what flat pieces leave, by the form beside it
     assert area_and_normal(frustum)[0] == pytest.approx(math.pi * 7 * 5, rel=3e-4)  # (pi / 128)^2 / 2
     inner = np.hypot(frustum[..., 0], frustum[..., 1])[np.isclose(frustum[..., 2], -1.0)]
+    # margin: of corners at the radius and middles of pieces within it
     assert inner == pytest.approx(2.0, rel=3e-4)
 
 
@@ -81,6 +83,7 @@ def test_a_telecentric_backlight_gives_what_its_cone_does(cone_deg):
     assert np.sum(made.powers * cosine / square) == pytest.approx(1.3 * math.sin(angle) ** 2)
     # 2 / 3 (1 - cos^3) is the integral of 2 cos^2 sin
     assert np.sum(made.powers * cosine**2 / square) == pytest.approx(1.3 * 2 / 3 * (1 - math.cos(angle) ** 3), rel=1e-6)
+    # margin: nodes lie within the cone by their kind
     assert np.arccos(cosine).max() < angle
     assert np.abs(made.powers @ (made.places[:, :2] / square[:, None] ** 1.5)).max() < 1e-12
     assert len(made.powers) == 32
@@ -124,6 +127,7 @@ def test_a_rectangle_of_light_is_where_its_nodes_are(light, corners):
     np.testing.assert_allclose(matrix @ [0, 0, 1, 0], [0, 0, 1, 0], atol=1e-12)
     made = light.surface(6)
     local = made.places @ matrix[:3, :3] / (np.array([length, width, 2.0]) / 2) ** 2
+    # margin: digits of the number beside it
     assert np.abs(local[:, :2]).max(0) == pytest.approx([0.9325, 0.9325], abs=1e-4)  # the last node of six
     assert made.areas.sum() == pytest.approx(length * width)
 
@@ -172,4 +176,5 @@ def test_a_ball_s_shells_are_as_bright_as_its_disc():
     for axis in made.places.T:
         assert weights @ axis**2 == pytest.approx(4.0, rel=1e-9)
         assert abs(weights @ axis) < 1e-12
+    # margin: a place within the ball by its kind
     assert np.linalg.norm(made.places, axis=1).max() < 4.0

@@ -80,4 +80,5 @@ def test_a_sharp_image_is_bent_by_straight_lines_between_fine_pixels():
         (x, y), (u, v) = np.floor(at).astype(int), at % 1
         around = fine[y : y + 2, x : x + 2]
         assert found[row, column] == pytest.approx(np.array([1 - v, v]) @ around @ np.array([1 - u, u]), rel=1e-9)
+        # margin: an inequality that says where the point lies
         assert 0.005 < min(u, v) < max(u, v) < 0.995  # between fine pixels

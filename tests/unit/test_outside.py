@@ -56,9 +56,11 @@ def test_a_spotlight_is_predicted_rendered_and_measured_alike(lit):
     clean = render.image(lit, SENSOR, LIGHT, effects=PLAIN)
     point = planner.predict(lit.with_(light={"kind": "point", "distance": lit.light.distance}), SENSOR, LIGHT)
     found, told = measure.propagate(clean, lit, SENSOR, LIGHT), planner.predict(lit, SENSOR, LIGHT)
+    # margin: the order is said, by more than chance
     assert told.variance_px2 > 1.3 * point.variance_px2
     assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.05)
     off = measure.distance(clean, lit, SENSOR, LIGHT).value_px - told.value_px
+    # margin: the order is said
     assert abs(told.bias_px) > 10 * abs(point.bias_px)
     assert off == pytest.approx(told.bias_px, abs=2e-3)  # margin: 0.0006 is the renderer's own, 0.013 the bias
 
@@ -109,6 +111,7 @@ def test_vignetting_dims_the_picture_s_corners_and_can_be_left_out(task1):
     tangent2 = ((x - (width - 1) / 2) ** 2 + (y - (height - 1) / 2) ** 2) / focal**2
     dark = task1.noise.dark_level
     assert seen[y, x] - dark == pytest.approx((without[y, x] - dark) * np.cos(np.arctan(np.sqrt(tangent2))) ** 4)
+    # margin: the order is said
     assert seen[y, x] < without[y, x]
     (decision,) = (each for each in render.effects(task1) if each.effect.name == "vignetting")
     assert decision.influence.variance > 0
@@ -131,6 +134,7 @@ def test_a_material_s_lobe_is_rendered_as_it_is_predicted(satin):
     assert inside.sum() > 500
     assert (clean - matt)[inside] == pytest.approx((expected - matt)[inside], rel=0.01)  # margin: 1e-3 is measured
     told, found = planner.predict(satin, *GLEAM), measure.propagate(clean, satin, *GLEAM)
+    # margin: the renderer's own noise, half a per cent
     assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.02)
     assert measure.distance(clean, satin, *GLEAM).value_px == pytest.approx(told.value_px + told.bias_px, abs=3e-3)
 
@@ -180,8 +184,10 @@ def test_a_fixture_s_expansion_is_in_the_budget_as_the_part_s_shift(task1):
     found = planner.budget(task1.with_(uncertainty={"influences": [steel]}), SENSOR, LIGHT).measurands[0]
     by_name = {row.source: row for row in found.contributions}
     expected = {row.source: row for row in lift.contributions}["part_shift.z"]
+    # margin: what central differences of two steps leave
     assert by_name["fixture_expansion"].contribution == pytest.approx(expected.contribution, rel=1e-6)
     assert by_name["fixture_expansion"].contribution > 0
+    # margin: what central differences of two steps leave
     assert by_name["fixture_expansion"].sensitivity == pytest.approx(12e-4 * expected.sensitivity, rel=1e-6)
     with pytest.raises(InvalidInput, match=r"uncertainty\.influences must be of different kinds, got fixture_exp"):
         task1.with_(uncertainty={"influences": [steel, steel]})

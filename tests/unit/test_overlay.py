@@ -108,6 +108,7 @@ def test_how_much_is_enlarged():
     found = of(quad(residuals=(side(0.2), side(0.5), side(9.0))), quad(covariance=0.25 * quad().covariance))
     residual, corner = overlay._factors(found, 3.0)
     assert residual == 5  # 9 px over 3 times a median of 0.5 is 6
+    # margin: digits of the number beside it
     assert 26 / 3 / np.sqrt(5.991 * largest) == pytest.approx(11.4, abs=0.1)
     assert corner == 10
     assert overlay._factors(of(shape()), 3.0) == (1, 1)

@@ -63,6 +63,7 @@ def test_colour_becomes_luma(tmp_path, kind, channels):
     found = picture_file.read(tmp_path / "a.npy", Size(5, 7))
     assert found.dtype == float
     whole = np.issubdtype(kind, np.integer)
+    # margin: half a level, by rounding to whole ones
     np.testing.assert_allclose(found, colours[..., :3] @ [0.114, 0.587, 0.299], atol=0.51 if whole else 1e-3)
 
 

@@ -125,7 +125,9 @@ def test_what_is_known_of_pictures_that_were_ray_traced():
 def test_clutter_is_expected_beside_clutter():
     """Within 15 degrees of both sensor and light, of what tells something there; the rest is as a glance tells."""
     found = pool()
+    # margin: the order is said
     assert around(found.poses[0, :2], found.poses[2, :2]) < 15 < around(found.poses[0, 2:], found.poses[3, 2:])
+    # margin: the order is said
     assert around(found.poses[1, :2], found.poses[4, :2]) < 15 < around(found.poses[0, :2], found.poses[4, :2])
     told = found.expected()
     assert told.ok.tolist() == [[0, 1 / 2, 0], [1 / 4, 0, 0], [0, 8, 9], [10, 11, 12], [13, 14, 0]]
@@ -171,7 +173,9 @@ def test_a_pose_is_moved_by_two_angles_at_right_angles(pose):
         away = np.degrees(np.arctan(np.hypot(*np.tan(np.radians(by)))))
         assert around(pose, end) == pytest.approx(away)
         assert around(end, shifted(pose, -np.array(by))) == pytest.approx(2 * away)
+        # margin: a range that holds by its kind
         assert 0 <= end[0] <= 180
+        # margin: a range that holds by its kind
         assert 0 <= end[1] < 360
     one, two = (shifted(pose, np.array(by)) for by in ((8.0, 0.0), (0.0, 8.0)))
     assert np.cos(np.radians(around(one, two))) == pytest.approx(np.cos(np.radians(8)) ** 2)

@@ -152,7 +152,7 @@ def test_a_first_look_is_worth_what_is_predicted_there():
     for i in [*seen[::9], *np.setdiff1d(np.arange(192), seen)[::20]]:
         told = planner.predict(scene, Pose.of(sensors[i]), Pose.of(lights[i])).measurands[0]
         expected = min(0.01 / 8 / told.variance_object**0.5, 1) * (0.5 if sensors[i, 0] > 90 else 1)
-        assert worth[i, 0] == pytest.approx(expected, abs=1e-6)
+        assert worth[i, 0] == pytest.approx(expected, abs=1e-6)  # margin: rounded to six places
 
 
 def test_of_each_sensor_the_best_light_is_looked_at_closely():

@@ -61,6 +61,7 @@ def test_each_row_has_its_own_methods(made):
             good = found.distances[np.isfinite(found.distances)]
             assert each.empirical == pytest.approx(good.var(ddof=1))
             assert each.ratio == pytest.approx(good.var(ddof=1) / found.propagated)
+            # margin: a ratio lies in its interval by its kind
             assert each.ratio_interval[0] < each.ratio < each.ratio_interval[1]
             assert each.bias == pytest.approx(good.mean() - 80)
             assert each.rmse == pytest.approx(np.sqrt(good.var(ddof=1) + (good.mean() - 80) ** 2))

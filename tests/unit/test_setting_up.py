@@ -37,6 +37,7 @@ def test_a_plan_is_measurable_as_printed_and_around(name):
             each.variance_object / here.variance_object
             for each, here in zip(seen.measurands, found.prediction.measurands, strict=True)
         )
+        # margin: the limit that a plan is asked for
         assert worst < 4
 
 

@@ -31,6 +31,7 @@ def check_flange(part: step.StepPart, scale: float = 1.0, pieces: int = 96) -> N
     assert sorted(round(w.radius / scale, 9) for w in walls) == 6 * [4.0] + [12.0, 40.0]
     assert [w.radius / scale > 20 for w in walls] == [not w.hollow for w in walls]
     bolts = [w.point for w in walls if w.radius < 5 * scale]
+    # margin: digits of the file's own numbers
     np.testing.assert_allclose(np.hypot(*np.array(bolts)[:, :2].T), 28 * scale, rtol=1e-12)
     cone = next(s for s in part.surfaces if isinstance(s, Cone))
     assert cone.hollow

@@ -44,6 +44,7 @@ def para(form: int, power: float) -> bytes:
 def test_curves_that_are_told_by_a_number(data, name, power):
     found = of_profile(profile((b"gTRC", data)))
     assert (found.name, found.table) == (name, ())
+    # margin: a file keeps 16 binary places
     assert found.power == pytest.approx(power, abs=2**-16)
     assert found.plain == (name == "none")
 
