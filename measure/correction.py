@@ -47,6 +47,8 @@ class Correction:
         Statuses of the values there.
     renders : int
         How many independent renders the biases are the mean of.
+    beside_renders : int
+        How many the image is the mean of that is corrected, where that is one of renders.
     """
 
     quantities: tuple[Quantity, ...]
@@ -60,6 +62,7 @@ class Correction:
     covariance_image: np.ndarray
     simulated: tuple[str, ...]
     renders: int = 1
+    beside_renders: int = 1
 
     @property
     def u_bias(self) -> np.ndarray:
@@ -73,13 +76,14 @@ class Correction:
 
     @property
     def beside(self) -> np.ndarray:
-        """Standard deviations (M,) by the renderer's noise of what one more render's biases differ from `bias` by."""
-        return self.sources[RENDERING] * np.sqrt(1 + self.renders)
+        """Standard deviations (M,) by the renderer's noise of what a corrected render's biases differ from `bias`
+        by."""
+        return self.sources[RENDERING] * np.sqrt(1 + self.renders / self.beside_renders)
 
     @property
     def beside_image(self) -> np.ndarray:
         """The same in the image."""
-        return self.sources_image[RENDERING] * np.sqrt(1 + self.renders)
+        return self.sources_image[RENDERING] * np.sqrt(1 + self.renders / self.beside_renders)
 
     @property
     def sigma(self) -> np.ndarray:
@@ -172,7 +176,7 @@ def correction(
     )
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
-        told.covariance, told.covariance_image, told.status, renders,
+        told.covariance, told.covariance_image, told.status, renders, max(len(images.beside), 1),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 import measure
 import render
@@ -27,6 +28,7 @@ from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from render import Quality, Tolerance
 from render.build import MANY_WAYS
+from render.large import near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
 from validation.remeasured import Method
@@ -34,6 +36,7 @@ from validation.remeasured import Method
 REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
 _LEAST, _MOST = 2, 6  # renders of other rays
+_OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"samples": 1, "edge_samples": 16, "random_samples": 4}  # rays
 
@@ -69,24 +72,52 @@ class How:
         return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
 
 
+def steadied(picture: Picture, image: np.ndarray, method: Method, how: How = How()) -> tuple[np.ndarray, ...]:
+    """A noise-free image and renders of other rays, as many as make the noise of their mean a tenth of sigma; six at
+    most.
+
+    A camera's picture has no such noise, but what is measured in noisy copies of one render has an error of its own,
+    which no number of copies averages out.
+    """
+    if not how.active(picture) & MANY_WAYS:
+        return (image,)
+    pair = image, how.image(picture, _OTHERS)
+    found = measure.correction(Images(pair), picture, method.locator, method.threshold)
+    noise = np.sqrt(2) * found.sources[RENDERING] / (_QUIET * found.sigma)
+    most = max(noise[np.isfinite(noise)], default=0.0)
+    if most <= 1:
+        return (image,)
+    return (*pair, *(how.image(picture, _OTHERS + i) for i in range(1, min(math.ceil(most**2), _MOST) - 1)))
+
+
+def mean_of(picture: Picture, renders: tuple[np.ndarray, ...]) -> np.ndarray:
+    """The first of some renders, where something is measured their mean."""
+    if len(renders) == 1:
+        return renders[0]
+    camera = picture.scene.camera
+    near = near_required(picture, (slice(0, camera.height), slice(0, camera.width)), 1)
+    inner = binary_erosion(near, iterations=math.ceil(4 * camera.blur_px) + 1, border_value=1)
+    return np.where(inner, np.mean(renders, 0), renders[0])
+
+
 def independent(
     picture: Picture,
     methods: tuple[Method, ...],
-    beside: np.ndarray,
+    measured: tuple[np.ndarray, ...],
     propagated: tuple[PropagatedValues, ...],
     how: How = How(),
 ) -> tuple[Correction, ...]:
-    """Corrections by each method from a render of other rays than a given one, whose noisy copies are corrected.
+    """Corrections by each method from as many renders of other rays as those whose mean's noisy copies are corrected.
 
     Parameters
     ----------
-    beside : ndarray, shape (height, width)
-        The noise-free image that is measured.
+    measured : tuple of ndarray, shape (height, width)
+        Those (`steadied`).
     propagated : tuple of PropagatedValues
-        What `measure.propagate` says of it, by method.
+        What `measure.propagate` says of their mean, by method.
     """
-    other = how.image(picture, 1)
-    images = _completed(picture, (other,), (beside,), how)
+    others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
+    images = _completed(picture, others, measured, how)
     return tuple(
         measure.correction(images, picture, each.locator, each.threshold, told)
         for each, told in zip(methods, propagated, strict=True)

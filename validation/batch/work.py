@@ -221,15 +221,18 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     numbers |= measurands.texture(predicted["calibrated"].measurands[0].texture_variance_image)
     numbers["measurands"] = measurands.predicted(predicted, biased)
     clock.lap("predict")
+    renders: tuple[np.ndarray, ...] = ()
+    used, way = methods(scene), simulation.How(how.quality, variant, how.effects, how.tolerance)
     photographed = image is not None
     if not photographed:
         image = render.image(
             picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance
         )
+        renders = simulation.steadied(picture, image, used[0], way)
+        image = simulation.mean_of(picture, renders)
         clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
     spread = planner.pose_scatter(shaken, np.array([list(picture.sensor)]))
-    used = methods(scene)
     found = [
         measure.propagate(image, picture, estimator=m.locator, threshold=m.threshold, photographed=photographed)
         for m in used
@@ -237,8 +240,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     clock.lap("propagate")
     off: tuple[Correction, ...] = ()
     if not photographed:
-        way = simulation.How(how.quality, variant, how.effects, how.tolerance)
-        off = simulation.independent(picture, used, image, tuple(each.measurands for each in found), way)
+        off = simulation.independent(picture, used, renders, tuple(each.measurands for each in found), way)
         _note_corrections(numbers, used, off)
         clock.lap("correct")
     return Clean(Packed.of(image), _propagated(used, found, off, spread), numbers, clock.seconds)
