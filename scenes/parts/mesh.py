@@ -107,6 +107,10 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
         raise InvalidInput(
             f"object.file must be of at most {MOST_TRIANGLES} triangles, got {path} with {len(mesh.faces)}"
         )
+    if mesh.vertices.shape[1] != 3:
+        raise InvalidInput(
+            f"object.file must have places of three coordinates, got {path} with {mesh.vertices.shape[1]} of each"
+        )
     if len(mesh.vertices) and not (np.isfinite(mesh.vertices).all() and np.abs(mesh.vertices).max() <= _FARTHEST):
         raise InvalidInput(f"object.file must have coordinates up to {_FARTHEST:g}, got others in {path}")
 

@@ -206,3 +206,10 @@ def test_triangles_know_which_of_the_file_they_are_pieces_of():
     middle = found.triangles.mean(1)
     low, high = of_file.min(1), of_file.max(1)
     assert ((middle >= low - 1e-9) & (middle <= high + 1e-9)).all()
+
+
+def test_a_mesh_in_a_plane_is_refused_in_one_line(tmp_path):
+    """An OBJ file whose places have two coordinates."""
+    (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 0 1\nv 1 1\nf 1 2 3\nf 2 4 3\n")
+    with pytest.raises(InvalidInput, match=r"must have places of three coordinates, got .*flat\.obj with 2 of each"):
+        mesh.read(tmp_path / "flat.obj")
