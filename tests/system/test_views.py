@@ -50,24 +50,25 @@ def test_combined_values_scatter_as_predicted(checked):
 
 @pytest.mark.render
 def test_least_squares_scatters_as_predicted():
-    """Two settings of the plate, whose values are correlated: 3 to 8 % less variance, which 300 images bear out.
+    """Two settings of the plate, whose values are correlated: 2 to 6 % less variance, which 300 images bear out.
 
-    Negative control: that of one picture alone, about twice as large, is outside every interval.
+    Negative control: that of the worse picture alone, about twice as large, is outside every interval.
     """
     plate = scenes.load("plate")
-    poses = [(setting.sensor, setting.light) for setting in plate.settings[:2]]
+    poses = [(setting.sensor, setting.light) for setting in plate.settings[1:3]]
     views = tuple(planner.View(*pair, planner.predict(plate, *pair)) for pair in poses)
     both = planner.combine([view.prediction for view in views])
     chosen = planner.ViewSet(views, both, 1.0, (), None, None, None, None)
     found = planner.Views(plate, "minimax", "calibrated", None, (chosen,), 0, 0, "", None)
     gain = np.diag(both.covariance_least_squares) / both.variances
     rows = check_views(found, 300, seed=2, quality=QUICK).rows
-    assert (gain[:2] < 0.97).all()  # margin: the claim, 3 % at least
-    for row, single in zip(rows, views[0].prediction.measurands, strict=True):
+    assert gain[:2] == pytest.approx([0.94, 0.98], abs=0.01)  # margin: 6 and 2 %, as they are said
+    for row, *single in zip(rows, *(view.prediction.measurands for view in views), strict=True):
         low, high = statistics.ratio_interval(row.ratio_least_squares, row.n, 0.998)  # 1 % for all five
         assert low < 1 < high  # margin: chance: an interval of 300 seeded pictures, 99.8 %
         if row.name != "hole from front":  # which is taken from one picture alone
-            assert high < single.variance_object / row.predicted  # margin: twice as large is what is said
+            # margin: twice as large is what is said
+            assert high < max(each.variance_object for each in single) / row.predicted
 
 
 @pytest.mark.render

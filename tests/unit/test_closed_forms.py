@@ -142,7 +142,7 @@ def test_the_last_line_of_the_kernel_says_why(tmp_path, monkeypatch):
     script.write_text(f"import sys\nsys.stderr.write({said!r})\nsys.exit(2)\n")
     monkeypatch.setattr(step_kernel, "__file__", str(script))
     with pytest.raises(InvalidInput, match=r"object\.file must be of a solid body, got none: part\.step"):
-        step._asked(step.Path("part.step"), b"")
+        step._asked(step.Path("part.step"), b"", None)
 
 
 def test_a_bore_is_as_long_as_its_plate_and_as_wide_as_its_polygon():

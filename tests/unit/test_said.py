@@ -281,7 +281,7 @@ def test_edges_that_cannot_be_relied_on_are_told_of():
     plate = scenes.load("plate")
     found = planner.predict(plate, (15, 85), (40, 265))
     (edge,) = (each for each in found.edges if each.status != "ok")
-    (line,) = predict_cli.doubtful_edges([found, planner.predict(plate, (30, 80), (35, 335))])
+    (line,) = predict_cli.doubtful_edges([found, planner.predict(plate, (20, 55), (30, 205))])
     assert line == (
         f"sensor (15.0, 85.0), light (40.0, 265.0): {edge.name} clutter, {edge.length_px:.3g} px long, "
         f"contrast {edge.contrast:.3g} grey levels."
