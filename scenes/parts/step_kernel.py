@@ -47,12 +47,16 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
         raise Unusable("of a solid body, got none")
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
+    outcomes: list[bool] = []
     for done, divisor in (*_WAYS, _WAYS[0]):
+        if done == "splines" and outcomes and not any(outcomes):
+            continue  # broken numbers, of which splines may be made for ever
         body, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
             found = _divided(reader, body, _splined(shape) if done == "splines" else body, wanted)
         except Unusable as error:
             found, broken = [], error
+        outcomes.append(bool(found))
         if found and _is_closed(found):
             break
     if not found:
