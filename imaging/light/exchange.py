@@ -251,6 +251,9 @@ def room(bodies: Solid, floor: Floor | None) -> Solid:
     low, high = (end(bodies.vertices[:, :2], axis=0) for end in (np.min, np.max))
     away = _FLOOR * bodies.extent
     (left, near), (right, far) = (np.clip(v, -floor.half_side, floor.half_side) for v in (low - away, high + away))
+    if right <= left or far <= near:  # it lies beside them
+        left = near = -floor.half_side
+        right = far = floor.half_side
     corners = np.array([(left, near), (right, near), (right, far), (left, far)])
     square = np.column_stack([corners, np.full(4, floor.height)])
     return assembled(bodies, Solid(("a", "b", "c", "d"), square, ((0, 1, 2, 3),), ()))

@@ -10,7 +10,7 @@ import scenes
 from imaging.light.between import light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged
+from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged, room
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -233,3 +233,15 @@ def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
     assert len(sheet.met) == sheet.u.size * sheet.v.size
     assert np.ptp(sheet.u) == pytest.approx(sheet.frame.size[0])
     assert np.ptp(sheet.v) == pytest.approx(sheet.frame.size[1])
+
+
+def test_a_floor_that_lies_beside_the_part_is_a_square_still(task1):
+    """Of half a side of 2 about an origin that the block does not stand on: no face without area."""
+    solid = scenes.load("task1").solid
+    moved = scenes.Obstacle(corner=(60.0, 60.0, 0.0), size=(4.0, 4.0, 4.0)).solid
+    for bodies in (solid, moved):
+        made = room(bodies, scenes.Floor(reflectance=0.4, half_side=2.0))
+        assert np.isfinite(made.normals).all()
+        assert made.normals[-1] == pytest.approx([0, 0, 1])
+        square = made.triangles[made.triangle_faces == len(bodies.faces)].reshape(-1, 3)
+        assert np.abs(square[:, :2]).max() == pytest.approx(2.0)
