@@ -218,6 +218,11 @@ class Scene(Model):
         return _bodies(self.solid, self.obstacles)
 
     @property
+    def bright_floor(self) -> Floor | None:
+        """The floor, where it sends light back."""
+        return None if self.floor is None or self.floor.reflectance == 0 else self.floor
+
+    @property
     def surfaces(self) -> Surfaces:
         """What each face of `bodies` is made of."""
         return surfaces(self.material, self.materials, self.solid, len(self.bodies.faces))

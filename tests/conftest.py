@@ -35,6 +35,13 @@ def task1():
     return scenes.load("task1")
 
 
+@pytest.fixture(scope="session")
+def small_task1(task1):
+    """At 96 x 90 px, where nearly every edge has a neighbour."""
+    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
+    return task1.model_copy(update={"camera": camera})
+
+
 @pytest.fixture
 def rng():
     return np.random.default_rng(20261121)

@@ -164,15 +164,15 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     def of(images: Images, told: PropagatedValues | None = None) -> Correction:
         return measure.correction(images, picture, *asked, told)
 
-    few: tuple[np.ndarray, ...] = ()
+    images: Images | None = None
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_LEAST))
-        roughly = _completed(picture, few, (), how, few[0])
-        found = of(roughly)
+        images = _completed(picture, few, (), how, few[0])
+        found = of(images)
         if _is_quiet(found):
             return found
     renders = tuple(how.image(picture, seed) for seed in range(_LEAST))
-    images = _rebased(roughly, renders) if few else _completed(picture, renders, (), how)
+    images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
@@ -244,8 +244,8 @@ def _of_other_surfaces(picture: Picture) -> Iterator[Picture]:
     dimmed = scene.material.dimmed(part)
     if dimmed is not None:
         yield picture.with_scene(scene.tried(material=dimmed))
-    if scene.floor is not None and scene.floor.reflectance > 0:
-        floor = scene.floor.tried(reflectance=(1 - part) * scene.floor.reflectance)
+    if scene.bright_floor is not None:
+        floor = scene.bright_floor.tried(reflectance=(1 - part) * scene.bright_floor.reflectance)
         yield picture.with_scene(scene.tried(floor=floor))
     for i, each in enumerate(scene.materials):
         dimmed = each.dimmed(part) if isinstance(each, Brdf) else None

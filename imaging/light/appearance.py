@@ -46,7 +46,7 @@ def is_plain(scene: Scene) -> bool:
 
 def has_background(scene: Scene) -> bool:
     """Whether anything but darkness may be seen behind the bodies."""
-    return (scene.floor is not None and scene.floor.reflectance > 0) or bool(backlights(scene))
+    return scene.bright_floor is not None or bool(backlights(scene))
 
 
 def is_separable(scene: Scene) -> bool:
@@ -335,8 +335,8 @@ def behind(
     lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
     found = face_signal(pictures, hit, face, 1, lit, fall_off=fall_off)
     found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
-    if scene.floor is not None and scene.floor.reflectance > 0:
-        place, ahead = _on_floor(scene.floor, points, vectors, t)
+    if scene.bright_floor is not None:
+        place, ahead = _on_floor(scene.bright_floor, points, vectors, t)
         place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found, t = np.where(ahead, on_floor, found), np.where(ahead, 0.0, t)

@@ -9,7 +9,7 @@ import numpy as np
 
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters
-from imaging.light.exchange import Exchanged, exchanged, floor_of
+from imaging.light.exchange import Exchanged, exchanged
 from imaging.pictures import Pictures
 from scenes import Scene
 from scenes.lights import GLANCE
@@ -42,7 +42,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
 
 def is_exchanged(scene: Scene) -> bool:
     """Whether any two surfaces see each other."""
-    return not scene.bodies.is_convex or floor_of(scene) is not None
+    return not scene.bodies.is_convex or scene.bright_floor is not None
 
 
 def _plain(emitter: Emitter) -> Emitter:

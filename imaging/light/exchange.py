@@ -238,11 +238,6 @@ def _told(light: Exchanged, face: int) -> Told:
     return Told(sheet.frame, RectBivariateSpline(sheet.u, sheet.v, values, kx=along, ky=across))
 
 
-def floor_of(scene: Scene) -> Floor | None:
-    """The floor where it sends light back."""
-    return None if scene.floor is None or scene.floor.reflectance == 0 else scene.floor
-
-
 @lru_cache(maxsize=4)
 def room(bodies: Solid, floor: Floor | None) -> Solid:
     """The bodies, and as one more face the floor about them."""
@@ -383,7 +378,7 @@ def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=8)
 def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...]) -> Exchanged | None:
     """What the faces of a scene's bodies and its floor send to each other under some emitters."""
-    exchange = exchange_of(scene.bodies, without, floor_of(scene))
+    exchange = exchange_of(scene.bodies, without, scene.bright_floor)
     if exchange is None:
         return None
     places, white = exchange.places, _white(scene, exchange.places.faces)
@@ -396,8 +391,7 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
 def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
     """Diffuse reflectance of faces (n,)."""
     white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
-    floor = floor_of(scene)
-    return np.append(white, 0.0 if floor is None else floor.reflectance)[faces]
+    return np.append(white, 0.0 if scene.floor is None else scene.floor.reflectance)[faces]
 
 
 def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

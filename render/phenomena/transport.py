@@ -95,7 +95,7 @@ class Interreflection(Effect):
 
 def _alone(scene: Scene) -> bool:
     """Whether the object is one convex body before darkness."""
-    return not _bodies(scene) and (scene.floor is None or scene.floor.reflectance == 0)
+    return not _bodies(scene) and scene.bright_floor is None
 
 
 def _bodies(scene: Scene) -> list[Solid]:

@@ -51,9 +51,9 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
     for done, divisor in (*_WAYS, _WAYS[0]):
         if done == "splines" and outcomes and not any(outcomes):
             continue  # broken numbers, of which splines may be made for ever
-        body, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
+        solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
-            found = _divided(reader, body, _splined(shape) if done == "splines" else body, wanted)
+            found = _divided(reader, solid, _splined(shape) if done == "splines" else solid, wanted)
         except Unusable as error:
             found, broken = [], error
         outcomes.append(bool(found))
@@ -61,7 +61,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
             break
     if not found:
         raise broken
-    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(body))}
+    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(solid))}
 
 
 def _faces(shape: Any) -> list[Any]:

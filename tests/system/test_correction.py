@@ -20,20 +20,13 @@ ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 
 
 @pytest.fixture(scope="module")
-def small(task1):
-    """Task1 at 96 x 90 px, where nearly every edge has a neighbour."""
-    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
-    return task1.model_copy(update={"camera": camera})
-
-
-@pytest.fixture(scope="module")
-def crowded(small):
+def crowded(small_task1):
     """(picture, exact image, other render) at random poses at which the classic locator is off by 0.5 sigma or more."""
     rng, found = np.random.default_rng(7), []
     while len(found) < 3:
         sensor, light = (Pose(*rng.uniform((low, 0), (60, 360))) for low in (5, 2))
-        picture = Picture.of(small, sensor, light)
-        exact = block_image(small, sensor, light)
+        picture = Picture.of(small_task1, sensor, light)
+        exact = block_image(small_task1, sensor, light)
         told = measure.propagate(exact, picture).measurands
         if np.isfinite(told.value[0]) and abs(told.bias[0]) > 0.5 * np.sqrt(told.covariance[0, 0]):
             renders = tuple(render.image(picture, quality=render.Quality(seed=seed)) for seed in (1, 2))
@@ -91,13 +84,13 @@ def test_a_value_is_decided_only_once_its_bias_is_off(crowded):
 
 
 @pytest.mark.render
-def test_each_source_counts_by_what_it_moves(small, crowded):
+def test_each_source_counts_by_what_it_moves(small_task1, crowded):
     """Two images of other parts' poses as changed inputs: the root sum square of what they move the value by."""
     picture, exact, renders = crowded[0]
     moved = []
     for polar in (0.02, -0.05):
         sensor = Pose(picture.sensor.polar_deg + polar, picture.sensor.azimuth_deg)
-        moved.append(block_image(small, sensor, picture.lights[0]))
+        moved.append(block_image(small_task1, sensor, picture.lights[0]))
     values = [measure.measure(image, picture, estimator="gradient").value[0] for image in (exact, *moved)]
     off = measure.correction(Images((exact, renders[1]), {"pose": tuple(moved)}), picture)
     expected = np.sqrt((values[1] - values[0]) ** 2 + (values[2] - values[0]) ** 2)
@@ -118,8 +111,8 @@ def test_one_rule_for_statuses():
     assert corrected("not_visible", "ok", 0.0, 1.0) == "not_visible"
 
 
-def test_bad_input_is_one_line(small):
-    known, unknown = Picture.of(small, (30, 90), (15, 270)), Picture.of(small, (30, 90))
+def test_bad_input_is_one_line(small_task1):
+    known, unknown = Picture.of(small_task1, (30, 90), (15, 270)), Picture.of(small_task1, (30, 90))
     image = np.zeros((90, 96))
     with pytest.raises(InvalidInput, match="renders must be at least one noise-free image, got none"):
         measure.correction(Images(()), known)
@@ -136,10 +129,10 @@ def test_a_correction_must_be_of_what_is_measured(crowded):
 
 
 @pytest.mark.render
-def test_the_simulation_is_kept(small, tmp_path, monkeypatch):
+def test_the_simulation_is_kept(small_task1, tmp_path, monkeypatch):
     """The second time it is read; a file that is damaged, or of another scene, is not."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    picture, method, made = Picture.of(small, (30, 90), (15, 270)), Method("gradient"), []
+    picture, method, made = Picture.of(small_task1, (30, 90), (15, 270)), Method("gradient"), []
     simulate = simulation.simulated
     monkeypatch.setattr(simulation, "simulated", lambda *given: made.append(given) or simulate(*given))
     first, second = (kept.correction(picture, method) for _ in range(2))
@@ -153,7 +146,7 @@ def test_the_simulation_is_kept(small, tmp_path, monkeypatch):
         file.write_text(text)
         kept.correction(picture, method)
     assert len(made) == 5
-    brighter = picture.with_scene(small.model_copy(update={"noise": small.noise.tried(sigma=9.0)}))
+    brighter = picture.with_scene(small_task1.model_copy(update={"noise": small_task1.noise.tried(sigma=9.0)}))
     kept.correction(brighter, method)
     assert len(made) == 6
     assert len(list(tmp_path.rglob("*.json"))) == 2
@@ -171,9 +164,9 @@ def test_a_picture_on_the_part_that_has_changed_is_another_scene(task1, tmp_path
     assert named[0] == named[1] != named[2]
 
 
-def test_what_is_not_signed_says_how_large_the_bias_may_be(small):
+def test_what_is_not_signed_says_how_large_the_bias_may_be(small_task1):
     """Two of 0.03 and 0.04 cm make 0.05, twice that is 0.1; without them, or with one of any size, it is unknown."""
-    picture = Picture.of(small, (30, 90), (15, 270))
+    picture = Picture.of(small_task1, (30, 90), (15, 270))
     doubts = {"reflectance": np.array([0.03]), "light_place": np.array([0.04])}
     found = planner.budget(picture, variances=np.array([1e-8]), doubts=doubts, statuses=("clutter",))
     assert found.u_bias == (pytest.approx(0.05),)
@@ -206,15 +199,15 @@ def _unit(pose):
     return np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
 
 
-def test_the_renders_noise_is_told_by_all_lines(small):
+def test_the_renders_noise_is_told_by_all_lines(small_task1):
     """Images that are noisier copies of one: r times the camera's noise on each pixel is r sigma of each value."""
-    picture = Picture.of(small, (30, 90), (15, 270))
+    picture = Picture.of(small_task1, (30, 90), (15, 270))
     exact, rng, share = (
-        block_image(small, *map(list, (picture.sensor, picture.lights[0]))),
+        block_image(small_task1, *map(list, (picture.sensor, picture.lights[0]))),
         np.random.default_rng(3),
         0.25,
     )
-    sigma = share * small.noise.sigma
+    sigma = share * small_task1.noise.sigma
     told = []
     for _ in range(20):
         renders = tuple(exact + sigma * rng.normal(size=exact.shape) for _ in range(3))
@@ -241,17 +234,17 @@ def test_light_from_the_floor_is_part_of_the_contrast():
     [(0.02, 0.0, None, 2, 2, 0), (3.0, 0.02, None, 2, 2, 2), (3.0, 3.0, None, 6, 2, 6), (3.0, 3.0, 3.0, 2, 2, 0)],
 )
 def test_rays_are_added_until_their_noise_does_not_matter(
-    small, monkeypatch, rough, fine, tolerance, renders, few, all_
+    small_task1, monkeypatch, rough, fine, tolerance, renders, few, all_
 ):
     """Exact images with noise in the place of the renderer's: two of few rays do, or two of all, or six at most.
 
     A tolerance of which the noise is less than a hundredth needs no more.
     """
-    ends = [corner.model_dump(mode="json") for corner in (small.task.start, small.task.end)]
+    ends = [corner.model_dump(mode="json") for corner in (small_task1.task.start, small_task1.task.end)]
     length = {"name": "length", "kind": "distance", "features": ends, "tolerance": tolerance}
-    scene = small.with_(task=None, measurands=[length], floor=Floor(reflectance=0.2, height=-3.0))
+    scene = small_task1.with_(task=None, measurands=[length], floor=Floor(reflectance=0.2, height=-3.0))
     picture, asked = Picture.of(scene, (30, 90), (15, 270)), []
-    exact = block_image(small, Pose(30, 90), Pose(15, 270))
+    exact = block_image(small_task1, Pose(30, 90), Pose(15, 270))
 
     def made(how, of, effects, seed):
         is_rough = how.quality.random_samples is not None

@@ -22,19 +22,13 @@ POSES = (30, 90), (15, 270)
 
 
 @pytest.fixture(scope="module")
-def small(task1):
-    camera = task1.camera.model_copy(update={"width": 96, "height": 90, "focal_px": 300.0})
-    return task1.model_copy(update={"camera": camera})
+def picture(small_task1):
+    return Picture.of(small_task1, *POSES)
 
 
 @pytest.fixture(scope="module")
-def picture(small):
-    return Picture.of(small, *POSES)
-
-
-@pytest.fixture(scope="module")
-def exact(small):
-    return block_image(small, *POSES)
+def exact(small_task1):
+    return block_image(small_task1, *POSES)
 
 
 def _made(picture, **more):
@@ -54,9 +48,9 @@ def test_what_needs_no_image_counts_in_the_object_and_in_the_image_as_it_is_told
     assert off.sources_image["light_place"].tolist() == [0.5]
 
 
-def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small, picture, exact):
+def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small_task1, picture, exact):
     """Of a sensor that stands 0.05 degrees aside the other image is: the bias stays that of the first alone."""
-    other = block_image(small, (30.05, 90), (15, 270))
+    other = block_image(small_task1, (30.05, 90), (15, 270))
     alone, beside, both = (
         measure.correction(images, picture)
         for images in (Images((exact,)), Images((exact,), beside=(other,)), Images((exact, other)))
@@ -98,15 +92,15 @@ def test_textures_that_a_closed_form_tells_are_no_reason_to_doubt(picture, textu
     assert _made(picture, sources=other).status == ("clutter",)
 
 
-def test_all_that_the_numbers_depend_on_names_the_file(small, picture, tmp_path, monkeypatch):
+def test_all_that_the_numbers_depend_on_names_the_file(small_task1, picture, tmp_path, monkeypatch):
     """Each of these changed alone is another correction; the same said again is the same."""
     method, how = Method("canny", 12.0), How()
-    lens = small.model_copy(update={"camera": small.camera.model_copy(update={"blur_px": 0.7})})
+    lens = small_task1.model_copy(update={"camera": small_task1.camera.model_copy(update={"blur_px": 0.7})})
     others = [
-        (Picture.of(small, (30, 91), (15, 270)), method, how),
-        (Picture.of(small, (31, 90), (15, 270)), method, how),
-        (Picture.of(small, (30, 90), (15, 271)), method, how),
-        (Picture.of(small, (30, 90), (16, 270)), method, how),
+        (Picture.of(small_task1, (30, 91), (15, 270)), method, how),
+        (Picture.of(small_task1, (31, 90), (15, 270)), method, how),
+        (Picture.of(small_task1, (30, 90), (15, 271)), method, how),
+        (Picture.of(small_task1, (30, 90), (16, 270)), method, how),
         (picture.with_scene(lens), method, how),
         (picture, Method("canny", 10.0), how),
         (picture, Method("gradient"), how),
@@ -118,7 +112,7 @@ def test_all_that_the_numbers_depend_on_names_the_file(small, picture, tmp_path,
     ]
     named = [kept._digest(*each) for each in [(picture, method, how), *others]]
     assert len(set(named)) == len(named)
-    assert kept._digest(Picture.of(small, *POSES), Method("canny", 12.0), How()) == named[0]
+    assert kept._digest(Picture.of(small_task1, *POSES), Method("canny", 12.0), How()) == named[0]
     monkeypatch.setattr(kept, "_code", lambda: b"other code")
     assert kept._digest(picture, method, how) not in named
 
