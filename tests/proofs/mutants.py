@@ -3,7 +3,7 @@
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
 examples of its own module, the tests that read the code and, where it may have records, those of their fields; then the
-unit tests and the stored numbers that call the changed function and others of the module, the quickest first
+tests and the stored numbers that call the changed function and others of the module, the quickest first
 (``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
 the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
 run, too, after some of its file that came before it (stored numbers are each by itself). What survives is printed with
@@ -280,7 +280,8 @@ def main() -> None:
     asked = parser.parse_args()
     every, began = mutants(within=tuple(asked.only)), time.perf_counter()
     asked.log.parent.mkdir(parents=True, exist_ok=True)
-    asked_first = [*sorted((ROOT / UNIT).glob("test_*.py")), *(ROOT / name for name in STORED)]
+    asked_first = [*(ROOT / name for name in STORED)]
+    asked_first += [path for name in (UNIT, *OTHERS) for path in sorted((ROOT / name).glob("test_*.py"))]
     tests = reached(asked.log.with_name("reach.jsonl"), asked_first)
     chosen = sorted(every, key=lambda mutant: _drawn(mutant, asked.seed))[: asked.count]
     known = _known(asked.log)

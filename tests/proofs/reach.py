@@ -1,7 +1,8 @@
 """Which functions of the packages each test calls, and what it costs: whom ``make mutants`` asks about a slip.
 
 A map file holds a line for each test file, with its hash, so that only what changed is run again: all of it in one
-process, by this module as a pytest plugin. What does not pass on clean code is noted, too: nobody asks it.
+process a core, by this module as a pytest plugin. What a fixture of a module or of all tests calls counts for each test
+that takes it. What does not pass on clean code is noted, too: nobody asks it.
 """
 
 from __future__ import annotations
@@ -21,8 +22,11 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
+_WORKERS = os.cpu_count() or 1
 _RESULT = "REACHED"  # names the map file that the plugin adds to
 _found: dict[str, dict[str, dict[str, Any]]] = {}  # by test file and test
+_fixtures: dict[str, set[Any]] = {}  # what was called to make each
+_now: list[set[Any]] = []  # what is called by the test that runs
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -35,11 +39,14 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
             add(frame.f_code)
 
     began = time.process_time()
+    _now.append(codes)
     threading.setprofile(note)
     sys.setprofile(note)
     yield
     sys.setprofile(None)
     threading.setprofile(None)  # type: ignore[arg-type]
+    _now.pop()
+    codes = codes.union(*(_fixtures.get(name, ()) for name in getattr(item, "fixturenames", ())))
     places = ((Path(code.co_filename), code.co_qualname.replace(".<locals>", "")) for code in codes)
     names = {f"{path.relative_to(ROOT)}:{name}" for path, name in places if path.is_relative_to(ROOT)}
     ours = sorted(name for name in names if not name.startswith("tests") and "<module>" not in name)
@@ -47,6 +54,15 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
     kept |= {"seconds": round(time.process_time() - began, 2), "calls": ours}
     if nextitem is None or nextitem.path != item.path:
         _write(item.path)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_fixture_setup(fixturedef: Any) -> Iterator[None]:
+    """Note what is called to make a fixture: the tests after the first that take it do not call it again."""
+    before = set(_now[-1]) if _now else set()
+    yield
+    if _now and fixturedef.scope != "function":
+        _fixtures.setdefault(fixturedef.argname, set()).update(_now[-1] - before)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
@@ -57,8 +73,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 def _write(path: Path) -> None:
     name = str(path.relative_to(ROOT))
-    with Path(os.environ[_RESULT]).open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"file": name, "hash": _mark(path), "tests": _found[name]}) + "\n")
+    line = json.dumps({"file": name, "hash": _mark(path), "tests": _found[name]}) + "\n"
+    with Path(os.environ[_RESULT]).open("ab", buffering=0) as file:  # at once: others add lines, too
+        file.write(line.encode())
 
 
 def _mark(path: Path) -> str:
@@ -77,7 +94,15 @@ def reached(kept: Path, files: list[Path]) -> dict[str, dict[str, Any]]:
     if missing:
         environment = {**os.environ, _RESULT: str(kept.absolute()), "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.proofs.reach"]
-        subprocess.run([*command, "-m", "not long", *map(str, missing)], cwd=ROOT, env=environment, capture_output=True)
+        workers = [
+            subprocess.Popen(
+                [*command, "-m", "not long", *map(str, missing[first::_WORKERS])], cwd=ROOT, env=environment,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )
+            for first in range(min(_WORKERS, len(missing)))
+        ]  # fmt: skip
+        for worker in workers:
+            worker.wait()
     known = _known(kept)
     every: dict[str, dict[str, Any]] = {}
     for path in files:
