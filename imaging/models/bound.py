@@ -208,21 +208,17 @@ def _one(
     object, in one picture."""
     pick = [np.broadcast_to(poses, (*lead, 2))[index] for poses in (pictures.sensors, *pictures.lights)]
     one = Pictures(pictures.scene, pick[0], tuple(pick[1:]))
-    known = measurands(one)
-    edges, count = len(known.view.names), len(known.quantities)
-    nothing = np.full((edges, 2, 2), np.inf), np.full(count, np.inf), np.full(count, np.inf)
-    if not known.view.visible.all():
-        return nothing
-    told = information(one)
-    required = told.model.arrangement.required
-    if (required < 0).any():
-        return nothing
+    known, told = measurands(one), information(one)
+    edges, required = len(known.view.names), told.model.arrangement.required
+    seen = known.view.visible & (required >= 0).all(-1)
     rows = line_rows(known, required, len(told.model.arrangement.vertices))
     covariance = told.vertices()
     lines = np.einsum("eki,ij,elj->ekl", rows, covariance, rows)
     joint = rows.reshape(2 * edges, -1) @ covariance @ rows.reshape(2 * edges, -1).T
-    image, plane = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, known.gradient_object))
-    return lines, image, plane
+    hidden = np.logical_or(*(part[:, ~seen].any(-1) for part in known.of_lines(known.gradient)))
+    variances = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, known.gradient_object))
+    image, plane = (np.where(hidden, np.inf, each) for each in variances)
+    return np.where(seen[:, None, None], lines, np.inf), image, plane
 
 
 def line_rows(known: Measurands, required: np.ndarray, count: int) -> np.ndarray:
