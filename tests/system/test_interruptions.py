@@ -28,8 +28,10 @@ from tests.commands import ice
 from tests.proofs.kill import same
 from validation.batch import cluster as clusters
 from validation.batch import pool, store
+from validation.batch.stopped import Interrupted
 from validation.batch.store import RunFile
 from validation.batch.work import CHUNK
+from validation.cli.common import continued
 
 pytestmark = pytest.mark.render
 
@@ -266,6 +268,24 @@ def test_interrupted_while_workers_start(small_toml, tmp_path):
             process.kill()
     assert errors == "stopped: interrupted; what is finished is kept; the same command continues the run\n"
     assert process.returncode == 130
+
+
+@pytest.mark.parametrize("cause", [True, False])
+def test_an_interruption_that_a_library_hides_says_that_the_run_continues(cause):
+    """An executor that is broken by it raises an error of its own, while that of the signal is dealt with."""
+    with pytest.raises(Interrupted) as stopped, continued(False):
+        _broken(Interrupted("terminated", 143), cause)
+    assert str(stopped.value) == "stopped: terminated; what is finished is kept; the same command continues the run"
+    assert stopped.value.status == 143
+    with pytest.raises(RuntimeError, match="broken"), continued(False):
+        _broken(ValueError(), cause)
+
+
+def _broken(by, cause):
+    try:
+        raise by
+    except BaseException as error:
+        raise RuntimeError("the executor is broken") from (error if cause else None)
 
 
 def _children(process):

@@ -18,3 +18,10 @@ class Interrupted(BaseException):
     def __init__(self, word: str, status: int) -> None:
         super().__init__(f"stopped: {word}")
         self.word, self.status = word, status
+
+
+def interruption(error: BaseException | None) -> Interrupted | None:
+    """The interruption that an error is, or that a library which met it made another error of; None if neither."""
+    while error is not None and not isinstance(error, Interrupted):
+        error = error.__cause__ or error.__context__
+    return error

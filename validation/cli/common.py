@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenes import InvalidInput, Pose
-from validation.batch.stopped import CONTINUE, Interrupted
+from validation.batch.stopped import CONTINUE, Interrupted, interruption
 from validation.cli import verbosity
 from validation.report.terminal import console
 from validation.strict_json import dumps
@@ -167,8 +167,10 @@ def continued(log_json: bool) -> Iterator[None]:
         log.setLevel(logging.INFO)
     try:
         yield
-    except Interrupted as error:
-        raise Interrupted(f"{error.word}; {CONTINUE}", error.status) from None
+    except BaseException as error:
+        if stop := interruption(error):
+            raise Interrupted(f"{stop.word}; {CONTINUE}", stop.status) from None
+        raise
     finally:
         log.removeHandler(shown)
 

@@ -7,13 +7,12 @@ import os
 import re
 import tempfile
 import traceback
-from collections.abc import Iterator
 from typing import Any
 
 import typer
 
 from scenes.errors import InvalidInput, one_line
-from validation.batch.stopped import Interrupted, Stopped
+from validation.batch.stopped import Interrupted, Stopped, interruption
 
 _UsageError = typer.BadParameter.__base__  # typer does not export it
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -28,7 +27,7 @@ def ending(error: BaseException) -> tuple[str, int]:
 
     An interruption counts as one also where a library that it met made another error of it.
     """
-    error = next((each for each in _chain(error) if isinstance(each, Interrupted)), error)
+    error = interruption(error) or error
     if isinstance(error, SystemExit):
         return "", error.code if isinstance(error.code, int) else 0
     if isinstance(error, InvalidInput):
@@ -47,13 +46,6 @@ def ending(error: BaseException) -> tuple[str, int]:
     if isinstance(error, KeyboardInterrupt | typer.Abort):
         return "stopped: interrupted", 130
     return _internal(error), 3
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """The error, what caused it, what caused that."""
-    while error is not None:
-        yield error
-        error = error.__cause__ or error.__context__
 
 
 def _internal(error: BaseException) -> str:
