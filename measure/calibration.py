@@ -32,7 +32,7 @@ _SMALL = 0.1  # noise over contrast up to which the law is fitted
 _LINEAR = 0.15  # relative departure of a variance from kappa^2 (s_n / C)^2 at which linearity has ended
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """One locator.
 

@@ -16,7 +16,7 @@ from scenes import InvalidInput, Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Measurements(Shown):
     """M quantities measured in images of leading shape (...); one image has the shape ().
 

@@ -21,7 +21,7 @@ DEFAULT_ESTIMATOR = "gradient"
 _DARK = 1e-30  # squared grey levels
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Measurement(Shown):
     """Distances measured in images of leading shape (...); one image has the shape ().
 

@@ -22,7 +22,7 @@ from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PropagatedValues:
     """Predicted errors of all M quantities of one setting.
 
@@ -52,7 +52,7 @@ class PropagatedValues:
     texture_variance_image: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Propagated:
     """Predicted errors of one setting: of its first measurand, and of all.
 

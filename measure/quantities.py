@@ -20,7 +20,7 @@ from measure.features.shape import find_shape
 from scenes import Corner, Picture, Quantity, status
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Values:
     """Values (n, M), derivatives (n, M, q) by lines and circles (`Seen`), and joint covariance (n, M, M)."""
 
@@ -29,7 +29,7 @@ class Values:
     covariance: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """What is found in n images.
 

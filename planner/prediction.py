@@ -49,7 +49,7 @@ class EdgePrediction:
     bias_px: tuple[float, float]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Prediction(Shown):
     """How precisely one setting will let the scene's quantities be measured.
 

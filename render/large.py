@@ -24,7 +24,7 @@ LARGE_RANDOM = 1 << 17  # the same where a single ray is random, and each fine p
 _BESIDE = 16  # rays of a fine pixel that an edge crosses which nothing is measured by
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Renders:
     """How parts of a crop of ``supersample`` x finer pixels are rendered.
 

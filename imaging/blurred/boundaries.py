@@ -23,7 +23,7 @@ _STEP = 0.01  # px; levels are differentiated forwards
 _SUPPORT = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2  # fractions of an edge's image at which levels are computed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Places (N, E, n) on the images of E edges in N pictures.
 
@@ -45,7 +45,7 @@ class Places:
     lens: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boundaries:
     """P segments near places.
 

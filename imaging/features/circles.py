@@ -31,7 +31,7 @@ LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of i
 LEAST_SEEN = 0.1  # part of the rim that must have contrast
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rim:
     """Points on the image of a circle, for settings of leading shape (...).
 

@@ -99,7 +99,7 @@ class Measurands:
         return np.array([[name in quantity.edges for name in names] for quantity in self.quantities])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurand:
     """One of them: that which the task is about, or the first.
 

@@ -20,7 +20,7 @@ from scenes import Centre, Corner, Edge, Scene, Solid, Wall
 from scenes.measurands.features import place_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProjectedEdges:
     """Images of E straight edges for sensor poses of leading shape (...).
 

@@ -37,7 +37,7 @@ _SPACING = 0.7  # smoothing scales between places, while there are not so many
 _AT_ONCE = 1 << 17  # rays
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RimLook:
     """At equal angles of a circle in one picture.
 

@@ -21,7 +21,7 @@ from scenes.measurands.evaluated import Line, Moves, Point
 from scenes.measurands.features import place_of, point_of
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """What is seen from sensors of leading shape (...) or found in as many images.
 

@@ -19,7 +19,7 @@ from scenes import Edge
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Nodes:
     """Gauss-Legendre nodes along the used part of the image of each edge: (first end, nodes, last end).
 
@@ -46,7 +46,7 @@ class Nodes:
     along: np.ndarray | float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Along:
     """Nodes, and the squared contrast and the noise's variance there, (..., E, n) each."""
 

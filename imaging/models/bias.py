@@ -45,7 +45,7 @@ _JUMP = 0.2  # of the contrast, that neighbouring places on an edge may differ b
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bias:
     """What is added to the result without noise, for pictures of leading shape (...).
 

@@ -21,7 +21,7 @@ from scenes import Circle, Curved
 LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Errors:
     """Predicted errors for pictures of leading shape (...).
 

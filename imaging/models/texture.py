@@ -32,7 +32,7 @@ _MOST_ALONG, _ACROSS = 2000, (16, 64)  # places
 _FARTHEST, _STEEPER = 0.25, 0.1  # px that a print may move a crossing, part by which it may change its slope
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TextureErrors:
     """What textures add to displacement and rotation (d, theta) of E lines, in turn, in one picture; ideal px and rad.
 
@@ -82,7 +82,7 @@ class TextureErrors:
         return tuple(np.where(lost, np.nan, gradient[:, : len(self.part)]) for gradient in known)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Places:
     """Places beside the used part of one edge, ideal px.
 
@@ -174,7 +174,7 @@ def _around(solid: Solid, circle: str) -> set[int]:
     return {face for name in solid.circle(circle).edges for face in solid.edge(name).faces}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _OfEdge:
     """Mean and slope (2,) of a line by prints and by fields; and weights (2, k) of its field at places (k, 2)."""
 

@@ -18,7 +18,7 @@ _HELD = cv2.CALIB_USE_INTRINSIC_GUESS + cv2.CALIB_FIX_FOCAL_LENGTH + cv2.CALIB_F
 _SHORTEST = 1e-2  # of the focal length where the search begins: boards that tell none let it go anywhere
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Adjusted:
     """The least whitened residuals.
 
@@ -108,7 +108,7 @@ def _inverse(jacobian: np.ndarray) -> np.ndarray:
     return root @ root.T
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _View:
     """One board's measured corners: places on it, images, and the whitening (m, 2, 2) of each."""
 

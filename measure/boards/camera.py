@@ -24,7 +24,7 @@ _VAGUE = 0.1  # of the focal length: a standard deviation that determines nothin
 DEFAULT_MODEL = "k1,k2,p1,p2,k3"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CameraCalibration:
     """What boards tell of a camera.
 

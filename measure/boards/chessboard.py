@@ -29,7 +29,7 @@ _FULL = [2.0**bits - 1 for bits in range(8, 17)]  # ends of sensors' scales
 _MOST = 200  # corners along a side
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Board:
     """A chessboard's inner corners in one image.
 

@@ -17,7 +17,7 @@ _BLURS = np.log([0.35, 6.0])  # px; below, three points a pixel are too few, and
 _TOGETHER = 64  # corners at a time: some 100 MB
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crossings:
     """Fitted crossings.
 

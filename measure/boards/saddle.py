@@ -21,7 +21,7 @@ _SHARE = np.outer(_WEIGHTS, _WEIGHTS).ravel() / 4
 _PLACES, _PARTS = np.polynomial.legendre.leggauss(6)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response:
     """What pixels make of a crossing.
 

@@ -13,7 +13,7 @@ FEWEST = 40  # pixels of a window that can be fitted
 _NARROWEST = 3.0  # px: half a square
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     """Pixels of n corners, padded to the same number.
 

@@ -20,7 +20,7 @@ STEP = 0.5  # px between the places across the edge
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CrossingLocator:
     """Zero-crossing locator for one edge, straight or curved.
 

@@ -21,7 +21,7 @@ _ALLOWED = 1.1  # times the noise's variance, which may itself be an estimate
 _RARE = 1e-6  # chance that noise alone leaves a residual as large as one that is refused
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EllipseFit:
     """One blurred ellipse.
 
@@ -49,7 +49,7 @@ class EllipseFit:
     left: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """Where on the outline edge points were sought: its parameters t (m,), and whether they were found, bool (m,)."""
 
@@ -140,7 +140,7 @@ def _known(derivative: np.ndarray) -> np.ndarray:
     return np.nan_to_num(derivative, posinf=0.0, neginf=0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Linear:
     """The picture near an ellipse as a linear function of what is unknown.
 

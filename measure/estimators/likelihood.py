@@ -20,7 +20,7 @@ from scenes import status
 MIN_CONTRAST_SIGMAS = 4.0  # contrast over its own standard error below which there is no edge to be seen
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Columns:
     """Columns of the linear model on P pixels.
 
@@ -43,7 +43,7 @@ class Columns:
     blurs: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LikelihoodEstimator:
     """Least squares in the linear model of a few edges at once.
 

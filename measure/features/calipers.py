@@ -15,7 +15,7 @@ from scenes import status
 MIN_POSITIONS = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Caliper:
     """Coordinates along and across one expected edge.
 

@@ -15,7 +15,7 @@ UNITS = np.array([1, 1, 1, 1, np.degrees(1.0)])  # inside, angles are rad
 _FARTHEST = 1e9  # px; of a point
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ellipse:
     """Ellipses in n images, or one with the leading shape ().
 

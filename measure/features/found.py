@@ -12,7 +12,7 @@ _TEXTS = ("status", "whole", "edge_status", "counted")
 MIN_SINE = 0.02  # of the angle between the lines of a corner: about a degree
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """Lines and corners in n images.
 

@@ -36,7 +36,7 @@ _PASSES = 6
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Circles:
     """One circle in n images.
 

@@ -24,7 +24,7 @@ _UNTOLD = (*(np.nan,) * 5, UNTOLD)
 _ALIKE = 1e-3  # probability of sides so different if they are alike
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SideBlur:
     """Blur of each of E sides.
 

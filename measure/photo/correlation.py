@@ -19,7 +19,7 @@ _TAPS = 2 * REACH + 1
 _SURFACE = polynomials()[:, :3]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Correlation:
     """Covariance of pixels so many rows and columns apart, over the variance that the noise curve tells.
 

@@ -87,7 +87,7 @@ def load_lens(path: Path) -> Lens:
         raise InvalidInput(f"{path}: {describe(error)}") from None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Straightened:
     """Corners of a polygon freed from distortion: (x, y) px (k, 2), joint covariance (2 k, 2 k) px^2, points used."""
 

@@ -26,7 +26,7 @@ _FEWEST = 24  # px of a side that tell it
 _FREQUENCIES = np.arange(0, 1.0001, 0.01)  # cycles/px
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EdgeResponse:
     """What one side tells of the sharpness across it.
 

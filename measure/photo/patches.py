@@ -15,7 +15,7 @@ _ROUNDED = 0.35  # of a squared step: variance that rounding may make of next to
 _TAIL = 1e-3  # of smooth patches that are left out at each of the two sieves
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Patches:
     """P smooth patches of SIDE x SIDE pixels.
 

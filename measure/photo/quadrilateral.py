@@ -37,7 +37,7 @@ class MeasuredValue:
     unit: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quadrilateral:
     """What a photograph tells.
 
@@ -125,7 +125,7 @@ def measure_quadrilateral(
     return _reported(found, there, seen)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Found:
     """Corners, their covariance, and how they were found; ``alike`` where correlation hardly changes them."""
 

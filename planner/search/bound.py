@@ -30,7 +30,7 @@ _DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9
 _MARGIN = 3e-6  # relative; single precision in sums of about 30 terms of like size
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Separable:
     """Lower bound of what is minimised: the most, or the sum, over the quantities m of the sums over k of
     sensor_part[s, m, k] light_part[l, k] strength[class of s, l, kind of k].

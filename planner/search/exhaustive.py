@@ -18,7 +18,7 @@ _ROWS = 256  # sensors at a time
 _PAIRS = 1 << 16  # pairs evaluated exactly at a time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BestPair:
     """The best pair of a search.
 

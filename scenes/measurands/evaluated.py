@@ -23,7 +23,7 @@ class Evaluated(NamedTuple):
     gradient: Moves
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
     """A point in the image (k = 2) or in space (k = 3), shape (..., k), with its derivatives (..., k)."""
 

@@ -13,7 +13,7 @@ SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a pl
 _MOST = np.radians(10.0)  # that a bend may be off: or an edge with a sliver beside it would be none
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chains:
     """C pieces: their ends (C, 2), the faces (C, 2) that meet in each, whether these look away from each other (C,).
 

@@ -31,7 +31,7 @@ _LAST = 1.5  # widths of the facet before
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Facets:
     """What is no sharp edge.
 

@@ -1,6 +1,6 @@
 """Values do not change once they are made: every dataclass is frozen, but for those that collect.
 
-Records of arrays that are looked up by what they are say ``eq=False``: arrays are neither compared nor hashed.
+Records of arrays say ``eq=False``: arrays are neither compared nor hashed, so such a record is itself alone.
 """
 
 import ast
@@ -12,16 +12,28 @@ ROOT = Path(__file__).parents[2]
 COLLECTING = {"validation/batch/job.py", "validation/cost/goal.py"}
 
 
-def thawed(text):
-    """Names of the dataclasses that are not frozen."""
-    found = []
+def dataclasses(text):
+    """Each dataclass of a module with what its decorator is told."""
     for node in ast.walk(ast.parse(text)):
         for made in getattr(node, "decorator_list", ()):
             called = made.func if isinstance(made, ast.Call) else made
-            keywords = {k.arg: ast.unparse(k.value) for k in getattr(made, "keywords", ())}
-            if ast.unparse(called).endswith("dataclass") and keywords.get("frozen") != "True":
-                found.append(node.name)
-    return found
+            if ast.unparse(called).endswith("dataclass"):
+                yield node, {k.arg: ast.unparse(k.value) for k in getattr(made, "keywords", ())}
+
+
+def thawed(text):
+    """Names of the dataclasses that are not frozen."""
+    return [node.name for node, told in dataclasses(text) if told.get("frozen") != "True"]
+
+
+def compared(text):
+    """Names of the dataclasses of arrays that would be compared, or hashed, by them: both end in an error."""
+    return [
+        node.name
+        for node, told in dataclasses(text)
+        if told.get("eq") != "False"
+        and any("ndarray" in ast.unparse(field.annotation) for field in node.body if isinstance(field, ast.AnnAssign))
+    ]
 
 
 @pytest.mark.parametrize("package", ["scenes", "imaging", "planner", "render", "measure", "validation"])
@@ -36,6 +48,17 @@ def test_what_is_said_of_equality_is_that_there_is_none(package):
     """``eq=True`` is what a dataclass has anyway: who says something means the other."""
     for path in (ROOT / package).rglob("*.py"):
         assert "eq=True" not in path.read_text(encoding="utf-8").replace(" ", ""), path
+
+
+@pytest.mark.parametrize("package", ["scenes", "imaging", "planner", "render", "measure", "validation"])
+def test_records_of_arrays_are_not_compared(package):
+    for path in (ROOT / package).rglob("*.py"):
+        assert compared(path.read_text(encoding="utf-8")) == [], path
+
+
+def test_a_record_of_arrays_that_is_compared_would_be_seen():
+    text = "@dataclass(frozen=True{})\nclass A:\n    a: np.ndarray | None\n"
+    assert compared(text.format("") + text.format(", eq=False") + text.replace("np.ndarray", "int").format("")) == ["A"]
 
 
 def test_it_would_be_seen():

@@ -14,7 +14,7 @@ from validation.remeasured import Sample
 STATUSES = tuple(sorted(statuses.ALL))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """What one method measured in one setting.
 

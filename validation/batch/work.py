@@ -108,7 +108,7 @@ class Clean:
     seconds: dict[str, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chunk:
     """Values of one chunk of images; statuses of the images that failed.
 

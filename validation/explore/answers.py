@@ -18,7 +18,7 @@ from scenes.status import MEANINGS, REMEDIES
 from validation.explore.state import State
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Answer:
     """What is predicted at a state.
 

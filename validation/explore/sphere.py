@@ -18,7 +18,7 @@ STEP_DEG = 7.5
 _AT_ONCE = 32  # poses between looks at whether the sphere is still wanted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cells:
     """Patches of the upper hemisphere: the pose of each one's middle, and its four borders, degrees.
 

@@ -53,7 +53,7 @@ def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
     return save(figure, path)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Name:
     """A name beside what it names.
 

@@ -31,7 +31,7 @@ _CHORDS = 72
 _TIED = np.array([0.5, 0.35, 0.65, 0.2, 0.8])  # of what lies between two features: where a balloon may be tied
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mark:
     """What is drawn of a requirement, px in the image: lines (n, 2) each, and the points (k, 2) to one of which its
     balloon may be tied."""
