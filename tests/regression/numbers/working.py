@@ -8,7 +8,10 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.quiver import Quiver
 from pydantic import BaseModel
 
 import measure
@@ -49,11 +52,12 @@ _HARD = ("reflectance", "limb", "fit")
 
 
 def shown(draw):
-    """What figures hold that are drawn: numbers of lines, marks, pictures and areas, words, ends of axes."""
+    """What figures hold that are drawn: numbers of lines, marks, pictures and areas, words, colours, ends of axes."""
     found = []
 
     def keep(figure, file, **_):
-        found.append([axis(each) for each in figure.axes] + [[text.get_text() for text in figure.texts]])
+        words = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+        found.append([axis(each) for each in figure.axes] + [[text.get_text() for text in words]])
         if isinstance(file, io.StringIO):
             file.write("<svg></svg>")
 
@@ -73,8 +77,18 @@ def axis(axis):
         "words": [text.get_text() for text in texts], "scales": [axis.get_xscale(), axis.get_yscale()],
         "ends": [*axis.get_xlim(), *axis.get_ylim()] if axis.name == "rectilinear" else [],
         "ticks": [label.get_text() for label in (*axis.get_xticklabels(), *axis.get_yticklabels())],
+        "legend": [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else [],
+        "colours": [*map(_colours, (*axis.lines, *axis.collections, *axis.patches))],
+        "arrows": [[*each.U, *each.V] for each in axis.collections if isinstance(each, Quiver)],
         **({"view": [axis.elev, axis.azim, axis.roll]} if hasattr(axis, "elev") else {}),
     }  # fmt: skip
+
+
+def _colours(drawn):
+    """Of a line, of marks or of an area, as "#rrggbbaa"; how a line is dashed."""
+    if isinstance(drawn, Line2D):
+        return [to_hex(drawn.get_color(), keep_alpha=True), drawn.get_linestyle(), drawn.get_marker()]
+    return sorted({to_hex(each, keep_alpha=True) for each in np.atleast_2d(drawn.get_facecolor())})
 
 
 @cache
