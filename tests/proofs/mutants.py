@@ -4,10 +4,10 @@ A mutant is one place of the code changed by one of cosmic-ray's operators (a si
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
 examples of its own module, the tests that read the code and, where it may have records, those of their fields; then the
 tests and the stored numbers that call the changed function and others of the module, the quickest first
-(``tests.proofs.reach``), then the other test files that speak most of the names that the module defines, and at last
-the slower tests that call the function. Killed is what makes one of them fail that passes on clean code, where it is
-run, too, after some of its file that came before it (stored numbers are each by itself). What survives is printed with
-its line: a test is missing, or the mutant is equivalent.
+(``tests.proofs.reach``), then those of the files of whole commands that speak most of the names that the module
+defines, and at last the slower tests that call the function. Killed is what makes one of them fail that passes on clean
+code, where it is run, too, after some of its file that came before it (stored numbers are each by itself). What
+survives is printed with its line: a test is missing, or the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -202,7 +202,9 @@ def judged(
         code, by = _tested(near, runner, _LIMIT_S)
         if code in _ENDED:
             return "too slow", ""  # a loop that no longer ends, or slow tests: neither killed nor survived
-        others = [] if is_first or code not in _PASSED else nearest(mutant.file, root)
+        if not is_first and code in _PASSED:
+            others = [test for file in nearest(mutant.file, root) for test in tests if _file(test) == file]
+            others = [test for test in others if test not in near]
         if others:
             code, by = _tested(others, runner, _OTHERS_S)
         rest = [] if is_first or code not in (*_PASSED, *_ENDED) else _rest(mutant, number, tests, root, near)
