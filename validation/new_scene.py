@@ -22,9 +22,9 @@ from scenes.units import in_unit
 from validation.first_look import FirstLook, first_look
 
 _SENSOR = {"width": 1280, "height": 1024, "pixel_pitch_um": 4.8}
-_FOCAL_MM = (4, 6, 8, 12, 16, 25, 35, 50, 75, 100)
+_SHORT_MM, _LONG_MM = 12.0, 100.0  # focal lengths
 _FILLS = 0.7  # of the field of view's height, by the part's diagonal
-_NEAR = 8.0  # focal lengths between lens and part, at least
+_NEAR = 8.0  # focal lengths between the short lens and the part, at least
 
 _TEXT = """\
 # Lengths in {units}, image lengths in px, angles in degrees (polar, azimuth), brightness in grey levels.
@@ -179,11 +179,11 @@ def _quoted(text: str) -> str:
 
 
 def _lens(diagonal: float) -> tuple[float, float]:
-    """Focal length and distance, mm: the shortest that keeps its distance from a part of this size."""
+    """Focal length and distance, mm, at which a part of this size fills its share of the picture.
+
+    The long lens keeps its distance from what is so small that the short one would stand nearer than lenses focus.
+    """
     height = _SENSOR["height"] * _SENSOR["pixel_pitch_um"] / 1000
-    enlarged = _FILLS * height / diagonal
-    for focal in _FOCAL_MM:
-        distance = focal * (1 + 1 / enlarged)
-        if distance >= max(3 * diagonal, _NEAR * focal):
-            break
-    return float(focal), max(distance, 2 * diagonal)
+    lengths = 1 + diagonal / (_FILLS * height)
+    focal = _SHORT_MM if lengths >= _NEAR else _LONG_MM
+    return focal, focal * lengths

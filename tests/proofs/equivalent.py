@@ -90,11 +90,14 @@ EQUIVALENT: dict[str, str] = {
     "validation/batch/work.py: cv2.setNumThreads( 0)  # workers share the cores among themselves":
         "no threads beside the one, as with 1",
     "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
+    "validation/report/page_tables.py: main, others, printed = rows[-1].main.method, other_methods(found.rows), "
+    "is_printed(found)": "all rows of a run are of one method",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
 EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:le|ge|lt|gt)= ?-?\d{12,}\.0\b"): "a limit so far off by one more or less",
+    ("core/NumberReplacer", r"\b(?:ls|linestyle)=\( ?-?\d, \("): "where along a line its dashes begin",
     (
         "core/NumberReplacer",
         r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
