@@ -135,15 +135,14 @@ class PointEstimator:
     def _response(self, clean: np.ndarray) -> sparse.csr_array:
         """Derivative of (level, slope) by an image's pixels, (2, H W)."""
         points, response = self.locator.linear_response(clean)
-        count = response.shape[0]
-        keep = points.valid[0, :count]
+        keep = points.valid[0]
         if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
             pixels = np.tile(self.pixels, 2)
             return sparse.csr_array(
                 (np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)), (2, clean.size)
             )
-        weights = np.broadcast_to(points.weights, points.along.shape)[0, :count][keep]
-        lines = _level_and_slope(points.along[0, :count][keep], weights)
+        weights = np.broadcast_to(points.weights, points.along.shape)[0, keep]
+        lines = _level_and_slope(points.along[0, keep], weights)
         return sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
 
 

@@ -14,6 +14,7 @@ import planner
 import scenes
 from scenes import Picture, Tolerance
 from scenes.status import MEANINGS, MEASURED, REMEDIES, legend
+from validation.explore import preview
 from validation.report import (
     budget_figure,
     canvas,
@@ -155,6 +156,25 @@ def test_balloons_keep_apart_and_their_leaders_do_not_cross(count, rng):
     assert apart > (0.25 if count < 40 else 0.1)  # margin: the order is said: balloons do not touch
     leaders = list(zip(tied, spots, strict=True))
     assert not any(crossing(a, b) for a, b in combinations(leaders, 2))
+
+
+def test_marks_are_drawn_where_they_lie_in_the_image(plate, monkeypatch):
+    """The image's extent on the figure tells where a px is; the window begins beyond the image's first row and column."""
+    figures = []
+    monkeypatch.setattr(station_view, "inline", lambda figure, key, label: figures.append(figure))
+    found = [required(n, name=quantity.name) for n, quantity in enumerate(plate.scene.quantities, 1)]
+    station_view.draw(plate, found, None, "the plate")
+    (axis,) = figures[0].axes
+    part, (left, right, low, high) = preview.window(plate.scene, plate), axis.images[0].get_extent()
+    assert min(part.left, part.top) > 0
+    drawn = np.concatenate([line.get_xydata() for line in axis.lines])
+    for mark in station_view.marks(plate):
+        for points in mark.lines:
+            x = left + (points[:, 0] + 0.5 - part.left) / part.width * (right - left)
+            y = high + (points[:, 1] + 0.5 - part.top) / part.height * (low - high)
+            away = np.abs(np.stack([x, y], 1)[:, None] - drawn).max(-1).min(1)
+            assert away.max() < 1e-9
+    plt.close(figures[0])
 
 
 def test_marks_lie_on_what_is_measured(plate):
