@@ -90,6 +90,7 @@ EQUIVALENT: dict[str, str] = {
     "validation/batch/work.py: cv2.setNumThreads( 0)  # workers share the cores among themselves":
         "no threads beside the one, as with 1",
     "imaging/blurred/quadrature.py: _PANEL = 129  # nodes of one rule at most": "one node more of what is exact",
+    "measure/photo/profiles.py: steep = np.clip(rise / np.sign(rise.sum()), 0, None) ** 2": "a sign is 1 or -1",
     "validation/report/page_tables.py: main, others, printed = rows[-1].main.method, other_methods(found.rows), "
     "is_printed(found)": "all rows of a run are of one method",
 }  # fmt: skip

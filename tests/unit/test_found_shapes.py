@@ -10,7 +10,7 @@ from measure.find.candidate import CHESSBOARD, ELLIPSE, QUADRILATERAL, TAG, Cand
 from measure.find.chessboard import _alternation, find_chessboard
 from measure.find.coarse import Coarse
 from measure.find.distinct import outside, same
-from measure.find.four_sides import _sides, deviation, near, polygon, shaped
+from measure.find.four_sides import _goes_on, _sides, deviation, near, polygon, shaped
 from measure.find.support import Steepest, contrast, sign_of, steepest
 from tests.boards import SMALL
 
@@ -193,6 +193,18 @@ def test_edges_stand_out_by_four_standard_deviations(noise, counted):
     seen = steepest(coarse, places, normals, np.array([1, 1, 1, -1, -1, -1]), 1.5, np.array([0, 0, 0, 1, 1, 1]))
     assert seen.slopes == pytest.approx([2.8] * 3 + [-2.8] * 3, rel=1e-5)
     assert seen.counts.tolist() == [counted] * 3 + [False] * 3
+
+
+@pytest.mark.parametrize(("right", "told"), [(84.5, False), (83.5, True), (60.5, True)])
+def test_a_side_goes_on_where_three_places_beyond_its_corner_say_so(right, told):
+    """Levels that rise downwards everywhere: upper and lower sides never end. Fewer places lie in the image: unknown."""
+    corners = np.array([[3.5, 20], [right, 20], [right, 40], [3.5, 40]])
+    assert _goes_on(ramp(5.0, 0.0, 0.5), corners, np.array([-1.0, 1, 1, 1]), np.full(4, 5.0)) is told
+
+
+def test_a_side_does_not_go_on_where_there_is_no_slope():
+    corners = np.array([[30.5, 20], [60, 20], [60, 40], [30.5, 40]])
+    assert not _goes_on(ramp(0.0, 0.0, 0.5), corners, np.ones(4), np.full(4, 5.0))
 
 
 def test_the_steepest_place_is_found_in_its_direction():

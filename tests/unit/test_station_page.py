@@ -159,7 +159,7 @@ def test_balloons_keep_apart_and_their_leaders_do_not_cross(count, rng):
 
 
 def test_marks_are_drawn_where_they_lie_in_the_image(plate, monkeypatch):
-    """The image's extent on the figure tells where a px is; the window begins beyond the image's first row and column."""
+    """The image's extent on the figure tells where a px is; its window does not begin at the first px."""
     figures = []
     monkeypatch.setattr(station_view, "inline", lambda figure, key, label: figures.append(figure))
     found = [required(n, name=quantity.name) for n, quantity in enumerate(plate.scene.quantities, 1)]
