@@ -197,7 +197,7 @@ def test_edges_stand_out_by_four_standard_deviations(noise, counted):
 
 @pytest.mark.parametrize(("right", "told"), [(84.5, False), (83.5, True), (60.5, True)])
 def test_a_side_goes_on_where_three_places_beyond_its_corner_say_so(right, told):
-    """Levels that rise downwards everywhere: upper and lower sides never end. Fewer places lie in the image: unknown."""
+    """Levels that rise downwards everywhere: upper and lower sides never end. Of fewer nothing is told."""
     corners = np.array([[3.5, 20], [right, 20], [right, 40], [3.5, 40]])
     assert _goes_on(ramp(5.0, 0.0, 0.5), corners, np.array([-1.0, 1, 1, 1]), np.full(4, 5.0)) is told
 
