@@ -28,7 +28,7 @@ from validation.report import (
 )
 from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
-from validation.report.requirements import next_step, sentence
+from validation.report.requirements import next_step, sentence, what, wrong
 from validation.report.station import Station, halves_of
 
 
@@ -101,7 +101,9 @@ def first_screen(station: Station) -> dict[str, Any]:
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
+        "what": f"{what(found)} on this part, numbered in the picture, from one picture of one camera",
         "sentence": sentence(found),
+        "wrong": wrong(found),
         "next": next_step(found),
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
