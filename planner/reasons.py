@@ -45,7 +45,9 @@ def _hidden(evaluated: Errors, edges: list[int]) -> str:
     view = evaluated.measurands.view
     away = [view.names[e] for e in edges if not view.visible[e]]
     if away:
-        return f"the camera does not see {_joined(away)}, which {'is' if len(away) == 1 else 'are'} turned away or hidden"
+        return (
+            f"the camera does not see {_joined(away)}, which {'is' if len(away) == 1 else 'are'} turned away or hidden"
+        )
     worst = min(edges, key=lambda e: round(float(view.usable[e]), 6))
     left = max(float(view.usable[worst]), 0.0)
     return f"{left:.2g} px of edge {view.names[worst]} lie well within the image; at least {MIN_USABLE:g} are needed"
@@ -69,8 +71,8 @@ def _faint(evaluated: Errors, edges: list[int]) -> str:
     if not evaluated.contrast[worst] > 0:
         return f"no light reaches edge {evaluated.measurands.view.names[worst]}, or both sides of it are alike"
     return (
-        f"the contrast at edge {evaluated.measurands.view.names[worst]} is {evaluated.contrast[worst]:.2g} grey levels; "
-        f"at least {least[worst]:.2g} are needed, {MIN_CONTRAST:g} times the noise"
+        f"the contrast at edge {evaluated.measurands.view.names[worst]} is {evaluated.contrast[worst]:.2g} grey levels;"
+        f" at least {least[worst]:.2g} are needed, {MIN_CONTRAST:g} times the noise"
     )
 
 

@@ -132,7 +132,9 @@ def unsure(u_bias: float, sigma: float, tolerance: float, unit: str) -> str:
     """
     if not math.isfinite(u_bias):
         return "how large its bias is cannot be told"
-    which = "the sigma of noise" if OF_SIGMA * sigma >= OF_TOLERANCE * tolerance else "a fifth of half the tolerance zone"
+    which = (
+        "the sigma of noise" if OF_SIGMA * sigma >= OF_TOLERANCE * tolerance else "a fifth of half the tolerance zone"
+    )
     most = f"at most {allowed(sigma, tolerance):.2g} {unit} is allowed, {which}"
     return f"its bias is known to {u_bias:.2g} {unit} (1 sigma); {most}"
 
@@ -177,7 +179,8 @@ def legend(statuses: Iterable[str], reasons: Iterable[str] = ()) -> list[str]:
         if name and not is_trusted(name):
             told[name] = told.get(name) or reason
     return [
-        f"{name}: {MEANINGS[name]}{f' ({reason})' if reason else ''}; {REMEDIES[name]}." for name, reason in told.items()
+        f"{name}: {MEANINGS[name]}{f' ({reason})' if reason else ''}; {REMEDIES[name]}."
+        for name, reason in told.items()
     ]
 
 

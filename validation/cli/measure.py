@@ -122,7 +122,7 @@ def _corrected(
         return plain
     from validation import kept
 
-    with progress("simulating the picture for its bias", "renders"):
+    with progress("simulating the picture for its bias", "renders", at_once=True):
         return measure.corrected(plain, kept.correction(picture, method))
 
 
@@ -144,7 +144,11 @@ def _shapes_wanted(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _say_measurands(
-    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool, picture: scenes.Picture
+    file: Path,
+    found: measure.Measurements,
+    distance: measure.Measurement | None,
+    as_json: bool,
+    picture: scenes.Picture,
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)

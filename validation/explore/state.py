@@ -80,7 +80,9 @@ class State:
             "measurand": self.measurand,
             "shown": self.shown,
             "moving": self.moving,
-            "views": [{"sensor": list(each.sensor), "lights": [list(pose) for pose in each.lights]} for each in self.views],
+            "views": [
+                {"sensor": list(each.sensor), "lights": [list(pose) for pose in each.lights]} for each in self.views
+            ],
         }
 
     @property

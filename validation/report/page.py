@@ -70,7 +70,13 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
 
 def write_station(station: Station, title: str, path: Path) -> Path:
     """Write the page of a station that was not rendered: its first screen, and its budget."""
-    context = _context(station, title, _budget(station.budget)) | {"agrees": True}
+    sections = _budget(station.budget)
+    return write_page(first_screen(station), station.picture.scene.name, title, sections, path)
+
+
+def write_page(first: dict[str, Any], name: str, title: str, sections: list[Section], path: Path) -> Path:
+    """Write a page with a first screen and sections of one's own."""
+    context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": True}
     path.write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     return path
 
@@ -107,7 +113,7 @@ def first_screen(station: Station) -> dict[str, Any]:
         "next": next_step(found),
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
-        "told": told,
+        "sketched": f"Camera and lamp to scale: {told}.",
         "caption": f"{number}What is measured, as the camera sees it.{how}",
         "key": [(grade, LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,

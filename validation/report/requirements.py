@@ -15,7 +15,7 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from scenes import InvalidInput, Picture, Tolerance
 from scenes.results import finite
-from scenes.status import MEANINGS, OK, REMEDIES, WORST_FIRST, is_trusted
+from scenes.status import MEANINGS, REMEDIES, WORST_FIRST, is_trusted
 
 _WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
 _UNSURE = "what is not exactly known"  # of a bias that is taken off
@@ -124,10 +124,10 @@ def requirements(
     statuses = [each.status for each in told] if statuses is None else statuses
     return tuple(
         Requirement(
-            number=m + 1, kind=each.kind, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
+            number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
             sigma=sigmas[m], bias=biases[m], u_bias=u_biases[m] if u_biases else None,
             U=known[each.name].U if each.name in known and math.isfinite(sigmas[m]) else None,
-            status=statuses[m],
+            status=statuses[m], kind=each.kind,
             reason=each.why(statuses[m], u_biases[m] if u_biases else None, sigmas[m]),
             limits=_limits(known[each.name]) if each.name in known else "",
         )
