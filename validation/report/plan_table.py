@@ -59,11 +59,12 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
 
 def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
     p = found.prediction
+    state = _state(p) if is_trusted(p.status) else p.status  # what it means is told below
     how = "largest ratio" if found.over == "minimax" else "weighted sum of the squared ratios"
     lines = [
         found.scene.title or found.scene.name,
         "The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:",
-        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {p.status}",
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {state}",
         f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from {edges}.",
         f"  Limited by {found.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance.",
     ]
