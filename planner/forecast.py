@@ -10,9 +10,10 @@ import numpy as np
 
 from imaging.models.errors import Errors
 from planner.ranks import quantity_ranks
+from planner.reasons import reason
 from scenes import Scene, Tolerance
 from scenes.results import finite, value
-from scenes.status import WORST_FIRST
+from scenes.status import CLUTTER, WORST_FIRST, unsure
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Forecast:
     status: str
     texture_variance_image: float | None = None
     texture_variance_object: float | None = None
+    reason: str = ""
 
     @property
     def ratio(self) -> float | None:
@@ -65,6 +67,16 @@ class Forecast:
     def told(self) -> str:
         """The quantity in one line: name, value +- one sigma, status."""
         return f"{self.name} {value(self.value_object, np.sqrt(self.variance_object), self.unit)}, {self.status}"
+
+    def why(self, status: str, u_bias: float | None = None, sigma: float | None = None) -> str:
+        """What decided a status that may be another than predicted, with its number; empty where that is not known.
+
+        ``u_bias``, ``sigma``: standard uncertainties, in the object, of a bias that was taken off and by noise.
+        """
+        if status == CLUTTER and u_bias is not None:
+            half = 0.0 if self.tolerance is None else self.tolerance.half
+            return unsure(u_bias, np.sqrt(self.variance_object) if sigma is None else sigma, half, self.unit)
+        return self.reason if status == self.status else ""
 
     def as_row(self) -> dict[str, Any]:
         """A record: value, standard deviations (not variances) in object and image; None where not known."""
@@ -117,6 +129,7 @@ def forecasts(
                 status=WORST_FIRST[ranks[m]],
                 texture_variance_image=None if textures is None else float(textures[0][m]),
                 texture_variance_object=None if textures is None else float(textures[1][m]),
+                reason=reason(evaluated, clutter, float(biases[0][m]), m, WORST_FIRST[ranks[m]]),
             )
         )
     return tuple(found)

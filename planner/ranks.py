@@ -14,7 +14,7 @@ _NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = map(
     WORST_FIRST.index,
     (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.CLUTTER, status.OK),
 )
-_MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
+MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 
 def edge_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
@@ -31,8 +31,13 @@ def edge_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         hidden = ~view.visible | ~np.isfinite(view.usable) | ((view.usable < MIN_USABLE) & (whole >= MIN_USABLE))
         short = view.usable < MIN_USABLE  # before contrast: where nothing is left there is none either
-        weak = ~(evaluated.contrast > MIN_CONTRAST * np.sqrt(evaluated.noise_variance))
+        weak = ~(evaluated.contrast > least_contrast(evaluated))
     return np.select([hidden, short, weak, clutter], [_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _CLUTTER], _OK)
+
+
+def least_contrast(evaluated: Errors) -> np.ndarray:
+    """The contrast at which an edge is ``low_contrast``, grey levels, shape (..., E)."""
+    return MIN_CONTRAST * np.sqrt(evaluated.noise_variance)
 
 
 def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
@@ -42,17 +47,22 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     rims += [np.array(_OK)] * (len(known.circles) - len(rims))
     lead = evaluated.variances.shape[:-1]
     single = np.stack([np.broadcast_to(each, lead) for each in (*np.moveaxis(edges, -1, 0), *rims)], -1)
-    normals = unit_normals(known.view.along)
     ranks = []
     for m, (quantity, needs) in enumerate(zip(known.quantities, known.depends(), strict=True)):
         rank = np.where(needs, single, _OK).min(-1)
-        corners = [feature for feature in quantity.features if isinstance(feature, Corner)]
-        meeting = [normals[..., [known.view.names.index(name) for name in corner.edges], :] for corner in corners]
         flat = np.zeros(rank.shape, bool)
-        for pair in meeting:
-            (a, b), (c, d) = np.moveaxis(pair, (-2, -1), (0, 1))  # NaN where an edge is seen end-on
-            flat = flat | (np.abs(a * d - b * c) < _MIN_SINE)
+        for corner in quantity.features:
+            if isinstance(corner, Corner):
+                flat = flat | (sine(evaluated, corner) < MIN_SINE)
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
     return np.stack(ranks, -1)
+
+
+def sine(evaluated: Errors, corner: Corner) -> np.ndarray:
+    """Of the angle at which a corner's two edges meet in the image, shape (...); NaN where one is seen end-on."""
+    view = evaluated.measurands.view
+    pair = unit_normals(view.along)[..., [view.names.index(name) for name in corner.edges], :]
+    (a, b), (c, d) = np.moveaxis(pair, (-2, -1), (0, 1))
+    return np.abs(a * d - b * c)

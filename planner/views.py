@@ -178,7 +178,7 @@ def _trace(pool: Pool, groups: np.ndarray | None, count: int, report: Report) ->
             return
         for row in fresh[: most - len(pool.traced)]:
             pool.trace(row)
-            report("close looks", len(pool.traced), most)
+            report("looking closely", len(pool.traced), most)
 
 
 def _refine(pool: Pool, count: int, step: float, report: Report) -> None:
@@ -192,7 +192,7 @@ def _refine(pool: Pool, count: int, step: float, report: Report) -> None:
             if row not in done:
                 others = list(members[:position] + members[position + 1 :])
                 done |= {row, pool.refine(row, known.together(others), step)}
-        report("descents", size, count)
+        report("descending", size, count)
 
 
 def _bounds(aim: Aim, told: np.ndarray, count: int) -> tuple[list[float | None], float | None]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
+from itertools import zip_longest
 from typing import Any
 
 OK = "ok"
@@ -39,16 +40,17 @@ MEANINGS = {
     OK: "value and sigma can be relied on",
 }
 REMEDIES = {
-    NOT_VISIBLE: "turn the sensor until the camera sees all of it, or choose another feature",
-    SHORT: "come nearer or turn the sensor, so that its image becomes longer",
+    NOT_VISIBLE: "turn the camera until it sees all of it, take pictures from several sides (`ice plan --views 2`), "
+    "or choose another feature",
+    SHORT: "come nearer or turn the camera, so that its image becomes longer",
     SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
     LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
-    ILL_CONDITIONED: "turn the sensor, or choose edges that meet at a larger angle",
+    ILL_CONDITIONED: "turn the camera, or choose edges that meet at a larger angle",
     AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
-    CLUTTER: "move lamp or sensor (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
+    CLUTTER: "move lamp or camera (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
     OK: "",
 }
@@ -114,8 +116,27 @@ def corrected(
         return worst(found, simulated) if simulated not in MEASURED else found
     if found == MISFIT and not (modelled and simulated == MISFIT):
         return MISFIT
-    small = math.isfinite(u_bias) and u_bias <= max(OF_SIGMA * sigma, OF_TOLERANCE * tolerance)
-    return OK if small else CLUTTER
+    return OK if math.isfinite(u_bias) and u_bias <= allowed(sigma, tolerance) else CLUTTER
+
+
+def allowed(sigma: float, tolerance: float = 0.0) -> float:
+    """The largest standard uncertainty of a bias that is taken off beside which a value is `ok`; as of `corrected`."""
+    return max(OF_SIGMA * sigma, OF_TOLERANCE * tolerance)
+
+
+def unsure(u_bias: float, sigma: float, tolerance: float, unit: str) -> str:
+    """Why a value is `clutter` although its bias is taken off, with the numbers; arguments as of `corrected`.
+
+    >>> unsure(0.031, 0.0021, 0.02, "mm")
+    'its bias is known to 0.031 mm (1 sigma); at most 0.004 mm is allowed, a fifth of half the tolerance zone'
+    """
+    if not math.isfinite(u_bias):
+        return "how large its bias is cannot be told"
+    which = (
+        "the sigma of noise" if OF_SIGMA * sigma >= OF_TOLERANCE * tolerance else "a fifth of half the tolerance zone"
+    )
+    most = f"at most {allowed(sigma, tolerance):.2g} {unit} is allowed, {which}"
+    return f"its bias is known to {u_bias:.2g} {unit} (1 sigma); {most}"
 
 
 def doubt(status: str, bias: str = "") -> str:
@@ -137,13 +158,30 @@ def doubt(status: str, bias: str = "") -> str:
     return f"{status}, bias up to {bias}" if bias and status == CLUTTER else f"{status}, bias unknown"
 
 
-def legend(statuses: Iterable[str]) -> list[str]:
+def legend(statuses: Iterable[str], reasons: Iterable[str] = ()) -> list[str]:
     """What each status that is not trusted means, and what to do about it, one line each.
 
+    Parameters
+    ----------
+    statuses : iterable of str
+    reasons : iterable of str
+        For each of them what decided it, with its number; empty where that is not known. The first of a status is told.
+
+    Examples
+    --------
     >>> legend(["ok", "compressed"])[0].split("; ")[1]
     'save pictures without compression (PNG, TIFF).'
+    >>> legend(["short"], ["bore: edge e4 is 3 px long"])[0].split("; ")[0]
+    'short: too little of an edge is left in the image (bore: edge e4 is 3 px long)'
     """
-    return [f"{name}: {MEANINGS[name]}; {REMEDIES[name]}." for name in dict.fromkeys(statuses) if not is_trusted(name)]
+    told: dict[str, str] = {}
+    for name, reason in zip_longest(statuses, reasons, fillvalue=""):
+        if name and not is_trusted(name):
+            told[name] = told.get(name) or reason
+    return [
+        f"{name}: {MEANINGS[name]}{f' ({reason})' if reason else ''}; {REMEDIES[name]}."
+        for name, reason in told.items()
+    ]
 
 
 def counted(statuses: Iterable[str]) -> str:

@@ -37,12 +37,15 @@ class FirstLook:
     statuses : tuple of str
         What is predicted of each; those that are not ``ok`` are there only where none is.
     sensor, light : Pose
+    reasons : tuple of str
+        What decided each status, with its number; empty for ``ok``.
     """
 
     measurands: tuple[Measurand, ...]
     statuses: tuple[str, ...]
     sensor: Pose
     light: Pose
+    reasons: tuple[str, ...] = ()
 
     @property
     def facts(self) -> list[dict[str, str]]:
@@ -73,11 +76,12 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
         some = _varied([candidates[m] for m in seen], _ASKED) or candidates[:_MOST]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
         forecasts = planner.predict(scene.with_(measurands=some), sensor, light).measurands
-        told = {m: forecast.status for m, forecast in zip(some, forecasts, strict=True)}
-        good = [m for m in some if is_trusted(told[m])]
+        told = dict(zip(some, forecasts, strict=True))
+        good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:
             shown = tuple(_varied(good or some, _MOST))
-            best = len(good), FirstLook(shown, tuple(told[m] for m in shown), sensor, light)
+            statuses, reasons = (tuple(getattr(told[m], each) for m in shown) for each in ("status", "reason"))
+            best = len(good), FirstLook(shown, statuses, sensor, light, reasons)
         if len(good) >= _ENOUGH:
             break
     return best[1]

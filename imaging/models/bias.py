@@ -37,7 +37,7 @@ _STEPS = 5  # of Newton's method
 _LONGEST = 0.5  # px a step
 _SETTLED = 1e-4  # px: the next step would be its square
 MOST = 0.3  # standard deviations of the measurand: the largest bias of what is `ok`
-_NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
+NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves out stays below `MOST`
 _FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length: where it is asked where its light comes from
 _MOSTLY, _FELT, _CHANGES = 0.5, 0.05, 0.1  # parts of a side's light, and of the contrast, twice
@@ -91,7 +91,7 @@ def cluttered(pictures: Pictures) -> np.ndarray:
     and the edge's share in it is no less than an equal one.
     """
     found = bias(pictures)
-    limit = _NEGLIGIBLE * np.sqrt(calibrated(pictures).variances)
+    limit = NEGLIGIBLE * np.sqrt(calibrated(pictures).variances)
     equal = np.maximum(measurands(pictures).depends()[:, : found.shares.shape[-1]].sum(-1), 1)
     with np.errstate(invalid="ignore"):
         biased = np.abs(found.values) > limit

@@ -107,7 +107,7 @@ def plan_capability(
     moved = np.zeros((len(grid.sensors), len(scene.quantities)))
     for k, pose in enumerate(grid.sensors):
         moved[k] = systematic(scene, pose, given)
-        report("sensitivities", k + 1, 2 * len(grid.sensors))
+        report("finding sensitivities", k + 1, 2 * len(grid.sensors))
     whole, quiet = _searched(problem, grid, moved, report)
     found = []
     for (i, j), beside in ((whole, given), (quiet, ())):

@@ -87,7 +87,7 @@ def _by_bound(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
         least[table.sensors[rows]] = bound[np.arange(len(rows)), lowest]
         column[table.sensors[rows]] = which[lowest]
         done += len(rows)
-        report("bounds", done, whole)
+        report("bounding all pairs", done, whole)
     column[~np.isfinite(least)] = -1
     order = np.argsort(least)[: max(256, len(least) // 64)]
     order = order[np.isfinite(least[order])]
@@ -101,7 +101,7 @@ def _by_bound(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
             best = _better(best, s, k, problem.values(sensors[s], lights[k]))
         evaluated += len(hit)
         done += len(rows)
-        report("exact", done, whole)
+        report("evaluating what is left", done, whole)
     variance, *pair = best
     return BestPair(*pair, variance, len(sensors) * len(lights), evaluated, column, least, guaranteed=True)
 

@@ -120,7 +120,7 @@ def search_shared(
     order = np.argsort(bounds)
     best, chosen, alone = np.inf, shares[0], None
     for done, s in enumerate(order.tolist()):
-        report("lights", done + 1, 2 * len(sensors))
+        report("weighing lights", done + 1, 2 * len(sensors))
         if not bounds[s] <= best:
             break
         known = seen.of_sensor(sensors[s])
@@ -132,7 +132,7 @@ def search_shared(
                 best, chosen = value, share
     lights, least = np.zeros((len(sensors), 2 * len(problem.scene.free))), np.full(len(sensors), np.inf)
     for done, s in enumerate(order.tolist()):
-        report("lights", len(sensors) + done + 1, 2 * len(sensors))
+        report("weighing lights", len(sensors) + done + 1, 2 * len(sensors))
         if not np.isfinite(bounds[s]):
             break
         if bounds[s] <= 16 * best:  # beyond there is no candidate
@@ -285,9 +285,9 @@ def by_turns(problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, sh
     turns = _Turns(problem, sensors, places if problem.scene.free else np.zeros((1, 0)), shares)
     ends = []
     for done, share in enumerate(starts):
-        report("turns", done, len(starts))
+        report("turning poses", done, len(starts))
         ends.append(turns.run(share))
-    report("turns", len(starts), len(starts))
+    report("turning poses", len(starts), len(starts))
     best = min(ends, key=_value)
     alone = [end for end in turns.alone if np.isfinite(end.value)]
     lights, mixed = np.tile(best.lights, (len(sensors), 1)), turns.mixed(best.shares)

@@ -145,7 +145,7 @@ class SearchProblem:
             part = slice(at, at + size)
             both = sensors[part, None], lights[None]
             yield part, self.errors(*both), self.feasible(*both)
-            report("pairs", min(at + size, len(sensors)), len(sensors))
+            report("evaluating pairs", min(at + size, len(sensors)), len(sensors))
 
     def value_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], float]:
         """What a local search from a setting minimises: infinite where not feasible, or where levels are cut off.

@@ -109,7 +109,7 @@ class Variation:
             for choice in choices:
                 found += self._best_of(choice, sensors, lights)
                 count += len(sensors)
-                report("choices", count, whole)
+                report("trying choices", count, whole)
             return found
 
         bands = min(_BANDS_WITH, len(angles)) * (len(bands_of(self.scene)) - 1) if "band" in self.vary else 0

@@ -123,6 +123,56 @@ def test_no_label_lies_on_another(tmp_path):
     asyncio.run(visit())
 
 
+SAID = "document.getElementById('said').textContent"
+
+
+@in_a_browser
+def test_undo_and_an_address_that_restores(tmp_path):
+    """Back and forth through where it rested; the address opens the same in another browser, or says why not."""
+
+    async def visit():
+        async with served("task1", tmp_path) as url, chromium() as page:
+            await first_answer(page, url)
+            first = await state(page)
+            await page.press("ArrowDown", shift=True)
+            await settled(page)
+            await page.press("v")
+            await page.press("ArrowDown")
+            await settled(page)
+            last, told = await state(page), await page.value("location.href")
+            assert [view["lights"] for view in last["views"]] == [[[20, 270]]]
+            assert last["lights"] == [[21, 270]]
+            await page.until("document.getElementById('budget').textContent.includes('pixel noise')", 30)
+            for key in "uuu":
+                await page.press(key)
+                await settled(page)
+            assert await state(page) == first
+            assert await page.value("document.getElementById('undo').disabled")
+            for key in "yyy":
+                await page.press(key)
+                await settled(page)
+            assert await state(page) == last
+            async with chromium() as other:
+                await first_answer(other, told)
+                assert await state(other) == last
+                for bad, why in HOSTILE:
+                    await other.value(f"location.hash = {json.dumps(bad)}")
+                    await other.until(f"{SAID}.includes({json.dumps(why)})")
+                    assert await state(other) == last
+                assert not other.errors
+            assert not page.errors
+
+    asyncio.run(visit())
+
+
+HOSTILE = (
+    ("camera=north&lamp=15,270", "pose must be a pair (polar, azimuth) in degrees"),
+    ("camera=30,90&lamp=15,270&measurand=1e99", "measurand must be a whole number from 0 to 0"),
+    ("camera=30,90&lamp=15,270&view=1,2;3", "pose must be a pair"),
+    ("x" * 3000, "address must have at most 2000 characters"),
+)
+
+
 def test_from_the_command_line(tmp_path):
     """It tells its address, lets in who has the token, and ends by Ctrl-C in a second or so."""
     command = [sys.executable, "-m", "validation.cli", "explore", "task1", "--host", "0.0.0.0", "--json"]

@@ -17,10 +17,10 @@ import planner
 import scenes
 from imaging.models import variance_model
 from imaging.pictures import Pictures
-from scenes import InvalidInput, Pose
+from scenes import InvalidInput, Pose, Setting
 from scenes.status import MEANINGS, REMEDIES
 from validation.batch.work import Chunk, Clean, Found, Packed
-from validation.explore import answers, best, effects, preview, prove, save, session, sphere
+from validation.explore import answers, best, budgets, effects, preview, prove, save, session, sphere
 from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
 from validation.explore.server import serve
@@ -51,6 +51,11 @@ def test_states_of_messages(plate):
         ("measurand", True, "measurand must be a whole number"),
         ("shown", "colour", "shown must be one of sigma, ratio, worst, got 'colour'"),
         ("moving", 1, "moving must be a whole number from -1 to 0, got 1"),
+        ("views", 3, "views must be a list of at most 4, got 3"),
+        ("views", [{}] * 5, "views must be a list of at most 4, got"),
+        ("views", [3], "view must be an object, got 3"),
+        ("views", [{"sensor": [1, 2], "lights": []}], r"lights must be 1 pose\(s\), got \[\]"),
+        ("views", [{"sensor": [500, 2], "lights": [[1, 2]]}], "polar_deg must be between 0 and 180"),
     ],
 )
 def test_messages_that_are_none(plate, key, value, message):
@@ -96,6 +101,33 @@ def test_answer_is_the_planners(plate):
     message = answers.to_message(told)
     assert message["measurands"][1]["sigma"] == math.sqrt(expected.measurands[1].variance_object)
     assert set(told.shares) == set(plate.quantities[1].edges)
+
+
+def test_views_that_are_kept_count_by_inverse_variance(task1):
+    """1 / variance adds up over the pictures in which the measurand is ok; a dark one adds nothing."""
+    state = State.first(task1)
+    other, dark = (Setting(sensor=Pose(30, 135), light=Pose(*light)) for light in ((60, 255), (90, 90)))
+    told = answers.answer(task1, replace(state, views=(other, dark)))
+    alone = [planner.predict(task1, each.sensor, each.light).variance_object for each in (state.setting, other)]
+    row = answers.to_message(told)["measurands"][0]
+    assert row["together"]["sigma"] == pytest.approx((1 / (1 / alone[0] + 1 / alone[1])) ** 0.5)
+    assert (row["together"]["views"], row["together"]["status"]) == (2, "ok")
+    assert row["sigma"] == pytest.approx(alone[0] ** 0.5)
+    assert "together" not in answers.to_message(answers.answer(task1, state))["measurands"][0]
+    within = replace(state, views=(Setting(sensor=Pose(30, 135), light=Pose(60, 255)),))
+    assert State.of_message(task1, json.loads(json.dumps(within.to_message()))) == within
+
+
+def test_a_budgets_bars_are_parts_of_u(plate):
+    """U over half the zone, and shares of its square that add up to 1; what cannot be measured has neither."""
+    rows, state = budgets.rows(plate, State.first(plate)), State.first(plate)
+    for row, quantity, each in zip(rows, plate.quantities, planner.budget(state.picture(plate)), strict=True):
+        largest = max(each.contributions, key=lambda c: c.contribution)
+        assert row["ratio"] == pytest.approx(each.U / quantity.tolerance.half)
+        assert row["parts"][0] == [largest.source, pytest.approx((largest.contribution / each.u) ** 2)]
+        assert sum(share for _, share in row["parts"]) == pytest.approx(1, abs=0.01)  # margin: the least is left out
+    (dark,) = budgets.rows(scenes.load("task1"), moved(State.first(scenes.load("task1")), (90, 90)))
+    assert dark == {"name": "distance", "U": None, "ratio": None, "parts": []}
 
 
 def test_shares_are_of_the_variance(plate):
@@ -247,6 +279,9 @@ def test_save(name, tmp_path):
     assert path.read_text() == before
     other = save.save(name, replace(state, sensor=Pose(22, 3)), tmp_path, replace=True)
     assert scenes.load(other).settings[-1].sensor == Pose(22, 3)
+    kept = replace(state, views=(Setting(sensor=Pose(23, 4), light=state.setting.light),))
+    *_, view, last = scenes.load(save.save(name, kept, tmp_path, replace=True)).settings
+    assert (view.sensor, view.lights, last.sensor) == (Pose(23, 4), state.lights, state.sensor)
 
 
 @pytest.mark.parametrize("there", [True, False], ids=["a file", "nothing"])
@@ -377,7 +412,7 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
     assert answered[-1] == 30
     assert len(answered) <= 2
     assert sent[0]["type"] == "scene"
-    assert any("type must be one of 'state', 'best'" in message.get("text", "") for message in sent)
+    assert any("type must be one of 'state', 'restore', 'best'" in message.get("text", "") for message in sent)
 
 
 def test_work_can_be_stopped(task1):

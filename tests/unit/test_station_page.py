@@ -1,5 +1,6 @@
 """The page of a station: grades, sentences, balloons, the sketch and the budget's chart, each by its own arithmetic."""
 
+import dataclasses
 import math
 import re
 from itertools import combinations
@@ -67,15 +68,32 @@ def test_grades_are_of_half_the_zone(u, status, tolerance, grade):
 
 def test_the_sentence_counts_all_and_names_what_is_wrong():
     several = [required(k, name=f"r{k}") for k in range(1, 9)]
-    several += [required(9, u=0.01, name="step"), required(10, status="clutter", name="square")]
+    several += [required(9, u=0.03, name="step"), required(10, status="clutter", name="square")]
     text = requirements.sentence(several)
-    assert text.startswith("8 of 10 requirements are measured well within tolerance: U is at most 25 % of it. Step is ")
-    assert text.endswith(f"Square is not proven, for {MEANINGS['clutter']} (clutter).")
-    assert requirements.next_step(several) == f"For square: {REMEDIES['clutter']}."
+    assert text.startswith("8 of 10 requirements are measured well within tolerance: the expanded uncertainty U (95 %)")
+    assert "Step is measured with an uncertainty U that is larger than the tolerance. " in text
+    assert text.endswith("Square is not proven: its value must not be relied on.")
+    square, step = requirements.wrong(several)
+    assert square == f"Square (clutter): {MEANINGS['clutter']}."
+    assert step == "Step: U is 1.5 times what the tolerance allows; most of it comes from pixel noise."
+    assert requirements.next_step(several) == f"Requirement 10: {REMEDIES['clutter']}."
     assert requirements.next_step(several[:9]) == "Improve step first; most of it comes from pixel noise."
-    assert requirements.next_step(several[:8]) == ""
+    assert requirements.next_step(several[:8]).startswith("Nothing has to be changed")
+    assert requirements.wrong(several[:8]) == []
     assert requirements.sentence(several[:8]).startswith("All 8 requirements are measured well within tolerance")
     assert requirements.sentence(several[:1]).startswith("The requirement is measured well within tolerance")
+
+
+def test_what_is_wrong_is_told_with_its_number():
+    """Of several with one status the first that has a number; each status has its line and its remedy, the worst
+    first."""
+    faint = dataclasses.replace(required(2, status="low_contrast", name="b"), reason="edge e1 is dark")
+    several = [required(1, status="clutter", name="a"), required(3, status="low_contrast", name="c"), faint]
+    told = requirements.wrong(several)
+    assert told == ["C and b (low_contrast): of b, edge e1 is dark.", f"A (clutter): {MEANINGS['clutter']}."]
+    assert requirements.next_step(several) == (
+        f"Requirements 3 and 2: {REMEDIES['low_contrast']}. Requirement 1: {REMEDIES['clutter']}."
+    )
 
 
 def test_the_worst_is_improved_first():

@@ -123,7 +123,7 @@ def test_gains(name, poses, vary, hold, least):
     found = planner.plan(
         scenes.load(name), sensor=poses[0], light=poses[1], vary=vary, hold=hold, report=lambda *told: said.append(told)
     ).varied
-    choices = [told[1:] for told in said if told[0] == "choices"]
+    choices = [told[1:] for told in said if told[0] == "trying choices"]
     assert choices == sorted(choices)
     assert choices[-1] == (found.evaluated, found.evaluated)  # all that is to be tried, from the first one on
     assert {whole for _, whole in choices} == {found.evaluated}

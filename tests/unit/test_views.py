@@ -115,7 +115,7 @@ def test_each_chosen_picture_is_refined_once_beside_the_others_of_its_set(monkey
     monkeypatch.setattr(views, "_chosen", lambda known, rows, groups, size: ("smaller ones", sets[size]))
     views._refine(pool, 3, 5.0, lambda *told: said.append(told))
     assert asked == [(4, (), 5.0), (6, (0,), 5.0), (9, (3, 0), 5.0)]
-    assert said == [("descents", size, 3) for size in (1, 2, 3)]
+    assert said == [("descending", size, 3) for size in (1, 2, 3)]
 
 
 def test_the_others_of_a_set_are_all_but_the_one(monkeypatch):

@@ -13,8 +13,8 @@ from validation.cli.common import Report
 
 
 @contextmanager
-def bar(errors: Console, title: str, unit: str) -> Iterator[Report]:
-    """A bar with rate and time left; it goes when the work is done."""
+def bar(errors: Console, title: str, unit: str, at_once: bool = False) -> Iterator[Report]:
+    """A bar with rate and time left, ``at_once`` with what is done; it goes when the work is done."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -26,10 +26,10 @@ def bar(errors: Console, title: str, unit: str) -> Iterator[Report]:
     with Progress(*columns, console=errors, transient=True) as shown:
         task = shown.add_task(title, total=None)
 
-        def report(_what: str, done: int, total: int) -> None:
+        def report(what: str, done: int, total: int) -> None:
             if shown.tasks[0].total is None:  # what an earlier session has done says nothing about the rate
                 shown.reset(task, completed=done, total=total)
-            shown.update(task, completed=done, total=total)
+            shown.update(task, completed=done, total=total, description=f"{title}: {what}" if at_once else title)
 
         yield report
 

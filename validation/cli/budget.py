@@ -81,7 +81,7 @@ def budget_command(
     picture = _picture(loaded, *poses)
     if stations and not is_plain(loaded):
         raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
-    with progress("simulating the picture for its bias", "renders"):
+    with progress("simulating the picture for its bias", "renders", at_once=True):
         found = budgets.budget_of(picture, p, rendered=render)
     drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
     shown = budgets.pictured(found, stations, seed) if stations else None

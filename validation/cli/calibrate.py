@@ -33,7 +33,7 @@ def calibrate_command(
     from measure.calibration import calibrate
     from validation.report import calibration_table
 
-    with progress(f"{loaded.name}: locators", unit="levels") as shown:
+    with progress(f"{loaded.name}: locators", unit="levels", at_once=True) as shown:
         found = calibrate(loaded, images, seed, shown)
     if output is not None:
         from validation.report import calibration_figure  # matplotlib takes half a second to load

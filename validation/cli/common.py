@@ -140,7 +140,7 @@ def progress(title: str, unit: str = "images", at_once: bool = False) -> Iterato
         return
     from validation.cli.bar import bar
 
-    with bar(errors, title, unit) as report:
+    with bar(errors, title, unit, at_once) as report:
         yield report
 
 

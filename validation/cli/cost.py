@@ -38,7 +38,8 @@ def cost_command(
     from validation.cost.goal import seconds
 
     limit = seconds(budget)
-    with progress(f"{loaded.name}: cost", "parameters", at_once=True) as shown:
+    title = f"{loaded.name}: measuring what each parameter costs and gives, about {budget}"
+    with progress(title, "parameters", at_once=True) as shown:
         from validation.cost.sweep import sweep
 
         found = sweep(loaded, seed, shown, limit)

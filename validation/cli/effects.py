@@ -44,7 +44,7 @@ def effects_command(
     decisions = effects(loaded, limits, which)
     rows = []
     if check_them:
-        with progress(f"{loaded.name}: effects") as shown:
+        with progress(f"{loaded.name}: rendering with and without each effect", at_once=True) as shown:
             rows = check(loaded, limits, progress=shown)
     facts = {
         "scene": loaded.name,

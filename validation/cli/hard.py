@@ -33,7 +33,7 @@ def hard_command(
         raise InvalidInput(f"--area must be one of {', '.join(areas)}, got {area!r}")
     wanted = [case for case in cases if area in (None, case.area)]
     rows = []
-    with progress("hard cases", "cases") as report:
+    with progress("hard cases", "cases", at_once=True) as report:
         for case in wanted:
             rows.append(hard.run(case))
             report("cases", len(rows), len(wanted))

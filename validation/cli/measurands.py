@@ -15,6 +15,7 @@ from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
+    from scenes import Picture
 
 
 def facts(found: measure.Measurements) -> list[dict[str, Any]]:
@@ -43,6 +44,17 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
             "status": state,
         })  # fmt: skip
     return plain(rows)
+
+
+def reasons(rows: list[dict[str, Any]], picture: Picture) -> list[str]:
+    """What decided each record's status, with its number; empty where it is ``ok``, or nothing more is known."""
+    if not picture.lights or all(is_trusted(row["status"]) for row in rows):
+        return [""] * len(rows)
+    import planner
+
+    told = planner.predict(picture).measurands
+    why = (each.why(row["status"], row["u_bias"], row["sigma"]) for each, row in zip(told, rows, strict=True))
+    return [f"{row['name']}: {text}" if text else "" for row, text in zip(rows, why, strict=True)]
 
 
 def covariance(found: measure.Measurements) -> list[list[float | None]]:

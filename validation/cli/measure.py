@@ -106,7 +106,7 @@ def measure_command(
         found = measure.measure(picture, shown, estimator=estimator, threshold=threshold)
     else:
         found = _corrected(picture, shown, estimator, threshold)
-    _say_measurands(file, found, found.first if known.task is not None else None, as_json)
+    _say_measurands(file, found, found.first if known.task is not None else None, as_json, shown)
 
 
 def _corrected(
@@ -122,7 +122,7 @@ def _corrected(
         return plain
     from validation import kept
 
-    with progress("simulating the picture for its bias", "renders"):
+    with progress("simulating the picture for its bias", "renders", at_once=True):
         return measure.corrected(plain, kept.correction(picture, method))
 
 
@@ -144,7 +144,11 @@ def _shapes_wanted(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _say_measurands(
-    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool
+    file: Path,
+    found: measure.Measurements,
+    distance: measure.Measurement | None,
+    as_json: bool,
+    picture: scenes.Picture,
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)
@@ -156,7 +160,7 @@ def _say_measurands(
     else:
         shown = console()
         shown.print(measurands.table(rows))
-        for line in legend(row["status"] for row in rows):
+        for line in legend([row["status"] for row in rows], measurands.reasons(rows, picture)):
             shown.print(f" {line}", highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)

@@ -251,7 +251,8 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
     import planner
 
     began = time.perf_counter()
-    with progress(f"{scene.name}: searching", "sensors") as shown:
+    also = f", {', '.join(how['vary'])}" if how.get("vary") else ""
+    with progress(f"{scene.name}: searching places of sensor and light{also}", "steps", at_once=True) as shown:
         found = planner.plan(scene, objective, **how, report=shown)
     return found, time.perf_counter() - began
 
@@ -259,14 +260,16 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
 def _check(found: planner.Plan, count: int) -> PlanCheck:
     from validation.plan_check import check_plan
 
-    with progress(f"{found.scene.name}: rendering the best", "settings") as shown:
+    with progress(f"{found.scene.name}: rendering and measuring the best {count}", "settings", at_once=True) as shown:
         return check_plan(found, count, report=shown)
 
 
 def _check_varied(found: planner.Plan) -> VaryCheck:
     from validation.vary_check import check_varied
 
-    with progress(f"{found.scene.name}: measuring both choices", "plans") as shown:
+    with progress(
+        f"{found.scene.name}: rendering and measuring with and without what was varied", "plans", at_once=True
+    ) as shown:
         return check_varied(found, report=shown)
 
 

@@ -20,7 +20,7 @@ def run(scene: scenes.Scene, how: dict, as_json: bool) -> None:
 
     began = time.perf_counter()
     step = how.pop("step_deg") or STEP_DEG
-    with progress(f"{scene.name}: searching", "steps") as shown:
+    with progress(f"{scene.name}: searching the pose that a tolerance wants", "steps", at_once=True) as shown:
         found = plan_capability(scene, step_deg=step, **how, report=shown)
     seconds = time.perf_counter() - began
     if as_json:

@@ -38,7 +38,9 @@ def run(
     import planner
 
     began = time.perf_counter()
-    with progress(f"{scene.name}: searching", "steps") as shown:
+    with progress(
+        f"{scene.name}: searching 1 to {count} pictures that measure best together", "steps", at_once=True
+    ) as shown:
         found = planner.plan_views(scene, count, objective, **how, report=shown)
     seconds = time.perf_counter() - began
     check = _check(found) if checked else None
@@ -59,14 +61,19 @@ def run(
 def _check(found: planner.Views) -> ViewsCheck:
     from validation.views_check import check_views
 
-    with progress(f"{found.scene.name}: rendering", "pictures") as shown:
+    with progress(
+        f"{found.scene.name}: rendering and measuring all pictures together", "pictures", at_once=True
+    ) as shown:
         return check_views(found, report=shown)
 
 
 def _pictures(found: planner.Views, out: Path) -> list[Path]:
-    from validation.report import views_figure  # matplotlib takes half a second to load
+    from validation.report import (
+        views_figure,  # matplotlib takes half a second to load
+        views_page,
+    )
 
-    return views_figure.draw(found, out)
+    return [*views_figure.draw(found, out), views_page.write(found, out / "plan.html")]
 
 
 def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], seconds: float) -> dict:

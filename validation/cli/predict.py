@@ -42,7 +42,8 @@ def predict_command(
         say({"scene": loaded.name, "model": model, "settings": rows}, True, "")
     else:
         console().print(_table(loaded, model, rows))
-        for line in legend(each["status"] for row in rows for each in row["measurands"]):
+        every = [each for row in rows for each in row["measurands"]]
+        for line in legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every]):
             console().print(f" {line}", highlight=False)
         for line in doubtful_edges(found):
             console().print(f" {line}", highlight=False)
@@ -86,6 +87,7 @@ def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
                 "name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object,
                 "variance": each.variance_object, "bias": each.bias_object, "value_image": each.value_image,
                 "variance_image": each.variance_image, "bias_image": each.bias_image, "status": each.status,
+                "reason": each.reason,
             }
             for each in found.measurands
         ],

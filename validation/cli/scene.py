@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,9 @@ from scenes.status import legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
+
+if TYPE_CHECKING:
+    from validation.first_look import FirstLook
 
 commands = commands()
 
@@ -57,12 +60,20 @@ def new_command(
             f"{path}: {facts['edges']} edges, {facts['circles']} circles",
             *(["What could be measured, as seen from the setting that is proposed:"] if asked else []),
             *(f"  {each['name']}: {each['status']}" for each in asked),
-            *(f"  {line}" for line in legend(each["status"] for each in asked)),
+            *(f"  {line}" for line in _legend(look)),
             f"ice show {path} lists what can be named; "
             + (f"ice plan {path} finds better poses" if asked else "nothing to measure was found"),
         ]
     )
     say(facts, as_json, text)
+
+
+def _legend(look: FirstLook | None) -> list[str]:
+    """What is wrong with what could be measured, and what to do."""
+    if look is None:
+        return []
+    named = zip(look.measurands, look.reasons, strict=True)
+    return legend(look.statuses, [f"{each.name}: {reason}" if reason else "" for each, reason in named])
 
 
 @commands.command("show")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,9 @@ from imaging.features.measurand import measurand
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import feature_covariances, glanced
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput, Picture, Scene
 from scenes.status import MEANINGS, REMEDIES
-from validation.explore.state import State
+from validation.explore.state import MOST_VIEWS, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class Answer:
         Their covariances, px^2; NaN of an edge.
     closely : bool
         Whether rims of circles were looked at closely.
+    together : Combination or None
+        What the pictures of the state's views and its own tell together; None without views.
     """
 
     refused: str = ""
@@ -44,6 +47,7 @@ class Answer:
     corners: np.ndarray | None = None
     covariances: np.ndarray | None = None
     closely: bool = True
+    together: planner.Combination | None = None
 
     @property
     def limiting(self) -> str | None:
@@ -63,8 +67,9 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
     ('ok', 'e9')
     """
     try:
-        picture = state.picture(scene)
+        *others, picture = state.pictures(scene)
         predicted = planner.predict(picture, closely=closely)
+        together = planner.combine([*(_kept(each, closely) for each in others), predicted]) if others else None
     except InvalidInput as error:
         return Answer(refused=str(error))
     pictures = Pictures.of(picture) if closely else glanced(picture)
@@ -76,7 +81,14 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
         corners=known.points,
         covariances=feature_covariances(pictures, errors, state.measurand),
         closely=closely,
+        together=together,
     )
+
+
+@lru_cache(maxsize=4 * MOST_VIEWS)
+def _kept(picture: Picture, closely: bool) -> planner.Prediction:
+    """Of a view that stays while another is moved."""
+    return planner.predict(picture, closely=closely)
 
 
 def _shares(parts: dict[str, np.ndarray]) -> dict[str, float]:
@@ -93,7 +105,7 @@ def to_message(told: Answer) -> dict[str, Any]:
     return {
         "refused": "",
         "closely": told.closely,
-        "measurands": [_forecast(each) for each in told.prediction.measurands],
+        "measurands": [_forecast(each, told.together, m) for m, each in enumerate(told.prediction.measurands)],
         "shares": told.shares,
         "limiting": told.limiting,
         "edges": [
@@ -103,8 +115,12 @@ def to_message(told: Answer) -> dict[str, Any]:
     }
 
 
-def _forecast(each: planner.Forecast) -> dict[str, Any]:
-    return {
+def _forecast(each: planner.Forecast, together: planner.Combination | None, m: int) -> dict[str, Any]:
+    more = {}
+    if together is not None:
+        sigma = finite(math.sqrt(together.variances[m]))
+        more = {"together": {"sigma": sigma, "status": together.status[m], "views": int(together.used[:, m].sum())}}
+    return more | {
         "name": each.name,
         "kind": each.kind,
         "unit": each.unit,
@@ -117,6 +133,7 @@ def _forecast(each: planner.Forecast) -> dict[str, Any]:
         "bias": finite(each.bias_object),
         "status": each.status,
         "why": MEANINGS[each.status],
+        "reason": each.reason,
         "remedy": REMEDIES[each.status],
     }
 

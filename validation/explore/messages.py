@@ -18,9 +18,9 @@ class Message(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
-    type: Literal["state", "best", "prove", "render", "cancel", "save"]
+    type: Literal["state", "restore", "best", "prove", "render", "cancel", "save"]
     state: Any = None
-    """Of ``state``: checked by `State.of_message`, which knows the scene."""
+    """Of ``state`` and ``restore``: checked by `State.of_message`, which knows the scene."""
     rest: bool = False
     """Whether nothing moves any more."""
     number: Annotated[int, Field(ge=0, le=_MOST_NUMBER)] = 0

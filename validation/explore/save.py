@@ -1,4 +1,4 @@
-"""A state is saved as one more setting of a copy of the scene's file."""
+"""A state is saved as more settings of a copy of the scene's file: one for each view that is kept, and its own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Pose, Scene, Setting
 from scenes.load import find, from_document
 from validation.explore.state import State
 
@@ -43,7 +43,7 @@ def save(source: str, state: State, directory: Path, *, replace: bool = False) -
     origin = find(source)
     target = directory / f"{origin.stem.removesuffix('-explored')}-explored.toml"
     text = _moved(origin.read_text(encoding="utf-8"), origin.parent, directory)
-    text = f"{text.rstrip()}\n\n{setting(state)}"
+    text = f"{text.rstrip()}\n\n{settings(state)}"
     _check(target, text)
     _write(target, text, os.O_TRUNC if replace else os.O_EXCL)
     return target
@@ -62,20 +62,24 @@ def _write(target: Path, text: str, how: int) -> None:
         raise InvalidInput(f"{target} must be a file that can be written, got {reason}") from None
 
 
-def setting(state: State) -> str:
-    """The setting as TOML.
+def settings(state: State) -> str:
+    """The settings as TOML.
 
-    >>> print(setting(State(Pose(30, 90), (Pose(15, 270.25),))))
+    >>> print(settings(State(Pose(30, 90), (Pose(15, 270.25),))))
     [[settings]] # of ice explore
     sensor = [30, 90]
     light = [15, 270.25]
     <BLANKLINE>
     """
-    lines = ["[[settings]] # of ice explore", f"sensor = {_pair(state.sensor)}"]
-    if len(state.lights) == 1:
-        lines.append(f"light = {_pair(state.lights[0])}")
-    elif state.lights:
-        lines.append(f"light = [{', '.join(map(_pair, state.lights))}]")
+    return "\n".join(map(_setting, (*state.views, state.setting)))
+
+
+def _setting(each: Setting) -> str:
+    lines = ["[[settings]] # of ice explore", f"sensor = {_pair(each.sensor)}"]
+    if len(each.lights) == 1:
+        lines.append(f"light = {_pair(each.lights[0])}")
+    elif each.lights:
+        lines.append(f"light = [{', '.join(map(_pair, each.lights))}]")
     return "\n".join(lines) + "\n"
 
 

@@ -19,7 +19,8 @@ from validation.explore.tools import Tools, open_tools
 
 PAGE = Path(__file__).parent / "page"
 _FILES = {"/": "index.html"} | {
-    f"/{name}": name for name in ("page.css", "page.js", "view.js", "picture.js", "panel.js", "labels.js")
+    f"/{name}": name
+    for name in ("page.css", "page.js", "view.js", "picture.js", "panel.js", "labels.js", "history.js", "address.js")
 }
 _MOST = 1 << 16  # bytes of a visitor's message
 _MOST_VISITORS = 16

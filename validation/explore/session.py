@@ -15,9 +15,9 @@ import numpy as np
 from scenes import InvalidInput, Scene
 from validation.batch import pool
 from validation.batch.work import Found, Task
-from validation.explore import answers, best, effects, preview, prove, save, sphere
+from validation.explore import answers, best, budgets, effects, preview, prove, save, sphere
 from validation.explore.messages import Message
-from validation.explore.state import State
+from validation.explore.state import MOST_VIEWS, State
 from validation.explore.tools import Tools
 
 Send = Callable[[dict[str, Any]], Awaitable[None]]
@@ -87,6 +87,9 @@ class Session:
         if message.type == "state":
             self.state = State.of_message(self._scene, message.state).tolerable(self._scene)
             self._ask(message.rest, message.number)
+        elif message.type == "restore":
+            self.state = State.of_message(self._scene, message.state).tolerable(self._scene)
+            await self._moved("What the address says is shown.")
         elif message.type == "cancel":
             if self._job is not None:
                 self._job.cancel()
@@ -125,6 +128,7 @@ class Session:
         await self._colour(state)
         if self._refused:
             return
+        await self._send({"type": "budget", "rows": await self._tools.slowly(budgets.rows, self._scene, state)})
         await self._send({"type": "effects", "rows": await self._tools.slowly(effects.effects, self._scene, state)})
         if self._scene.camera.width * self._scene.camera.height <= _QUICK_PIXELS:
             await self._show(state)
@@ -174,7 +178,10 @@ class Session:
     async def _best(self, state: State) -> None:
         found = await self._tools.slowly(best.best_from, self._scene, state)
         self.state = replace(self.state, sensor=found.sensor, lights=found.lights)
-        await self._send({"type": "moved", "state": self.state.to_message()})
+        await self._moved("Moved to the next place from which this measurand is known best.")
+
+    async def _moved(self, text: str) -> None:
+        await self._send({"type": "moved", "state": self.state.to_message(), "text": text})
 
     async def _prove(self, state: State) -> None:
         state.picture(self._scene)
@@ -251,6 +258,7 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
             {"name": quantity.name, "kind": quantity.kind, "tolerance": quantity.tolerance is not None}
             for quantity in scene.quantities
         ],
+        "views": MOST_VIEWS,
         "renders": prove.RENDERS,
         "asks": scene.camera.width * scene.camera.height > _QUICK_PIXELS,
         "state": state.to_message(),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from imaging.features.projected_edges import circles
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Scene
@@ -92,7 +93,10 @@ def _stands(scene: Scene, role: str, pose: np.ndarray, which: int) -> bool:
 
 
 def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]:
-    """Patches and values (N, M) as the page takes them: what `State.shown` says of the chosen measurand."""
+    """Patches and values (N, M) as the page takes them: what `State.shown` says of the chosen measurand.
+
+    ``about``: whether there are rims, of which the sphere takes as little as is certain at a glance.
+    """
     quantity, chosen, ratio = scene.quantities[state.measurand], sigmas[:, state.measurand], state.shown != "sigma"
     if state.shown == "ratio":
         chosen = 2 * chosen / quantity.tolerance.half
@@ -106,4 +110,5 @@ def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]
         "unit": "" if ratio else "degrees" if quantity.is_angle else scene.units,
         "shown": state.shown,
         "moving": state.moving,
+        "about": bool(circles(scene)),
     }

@@ -9,6 +9,7 @@ from scenes import InvalidInput, Picture, Pose, Scene, Setting
 
 SENSOR = -1  # number of the thing that is moved; free lights count from 0
 SHOWN = ("sigma", "ratio", "worst")
+MOST_VIEWS = 4  # that are kept beside the one that is moved
 _FIRST = Pose(35.0, 300.0), Pose(30.0, 225.0)  # where a scene has no settings
 
 
@@ -28,6 +29,8 @@ class State:
         of all measurands that have a tolerance.
     moving : int
         What is moved, and for which the sphere is coloured: `SENSOR`, or the number of a free light.
+    views : tuple of Setting
+        Pictures that are taken, too: all values are combined with theirs.
     """
 
     sensor: Pose
@@ -35,6 +38,7 @@ class State:
     measurand: int = 0
     shown: str = "sigma"
     moving: int = SENSOR
+    views: tuple[Setting, ...] = ()
 
     @classmethod
     def first(cls, scene: Scene) -> State:
@@ -57,15 +61,15 @@ class State:
         """
         if not isinstance(told, dict):
             raise InvalidInput(f"state must be an object, got {told!r}")
-        lights = told.get("lights")
-        if not isinstance(lights, list) or len(lights) != len(scene.free):
-            raise InvalidInput(f"lights must be {len(scene.free)} pose(s), got {lights!r}")
+        views = told.get("views", [])
+        if not isinstance(views, list) or len(views) > MOST_VIEWS:
+            raise InvalidInput(f"views must be a list of at most {MOST_VIEWS}, got {str(views)[:80]}")
         return cls(
-            Pose.of(told.get("sensor")),
-            tuple(map(Pose.of, lights)),
+            *_poses(scene, told),
             _number("measurand", told.get("measurand"), 0, len(scene.quantities) - 1),
             _choice("shown", told.get("shown"), SHOWN),
             _number("moving", told.get("moving"), SENSOR, len(scene.free) - 1),
+            tuple(_setting(*_poses(scene, each)) for each in views),
         )
 
     def to_message(self) -> dict[str, Any]:
@@ -76,12 +80,19 @@ class State:
             "measurand": self.measurand,
             "shown": self.shown,
             "moving": self.moving,
+            "views": [
+                {"sensor": list(each.sensor), "lights": [list(pose) for pose in each.lights]} for each in self.views
+            ],
         }
 
     @property
     def setting(self) -> Setting:
         """Its poses as a scene has them."""
-        return Setting(sensor=self.sensor, light=self.lights[0] if len(self.lights) == 1 else self.lights)
+        return _setting(self.sensor, self.lights)
+
+    def pictures(self, scene: Scene) -> list[Picture]:
+        """Those of `views`, then its own; raises InvalidInput where a pose is refused."""
+        return [Picture.of(scene, each.sensor, each.lights) for each in (*self.views, self.setting)]
 
     def picture(self, scene: Scene) -> Picture:
         """What the sensor takes there; raises InvalidInput where a pose is refused."""
@@ -92,6 +103,20 @@ class State:
         zones = [quantity.tolerance for quantity in scene.quantities]
         known = {"sigma": True, "ratio": zones[self.measurand] is not None, "worst": any(zones)}
         return self if known[self.shown] else replace(self, shown="sigma")
+
+
+def _poses(scene: Scene, told: Any) -> tuple[Pose, tuple[Pose, ...]]:
+    """Sensor and free lights of a message's part."""
+    if not isinstance(told, dict):
+        raise InvalidInput(f"view must be an object, got {str(told)[:80]}")
+    lights = told.get("lights")
+    if not isinstance(lights, list) or len(lights) != len(scene.free):
+        raise InvalidInput(f"lights must be {len(scene.free)} pose(s), got {str(lights)[:80]}")
+    return Pose.of(told.get("sensor")), tuple(map(Pose.of, lights))
+
+
+def _setting(sensor: Pose, lights: tuple[Pose, ...]) -> Setting:
+    return Setting(sensor=sensor, light=lights[0] if len(lights) == 1 else lights)
 
 
 def _number(name: str, value: Any, least: int, most: int) -> int:

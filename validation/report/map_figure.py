@@ -93,8 +93,8 @@ def draw_map(figure, axis, below, chart: Chart) -> None:
         interpolation="nearest",
     )  # fmt: skip
     handles = _reasons(axis, status, ~np.isfinite(sigma), extent)
-    _rings(axis, chart.reach)
-    x, y = _place(*chart.best)
+    rings(axis, chart.reach)
+    x, y = place(*chart.best)
     axis.plot(x, y, "o", mfc="w", mec="k", ms=10, mew=1.4)
     axis.plot(x, y, "+", color="#c00000", ms=9, mew=2.2)
     label = f"best: polar angle {chart.best.polar_deg:.0f}, azimuth {chart.best.azimuth_deg:.0f} degrees"
@@ -156,22 +156,21 @@ def _area(axis, some: np.ndarray, extent: list[float], colour: str, hatch: str) 
     drawn.set_linewidth(0)
 
 
-def _place(polar: float, azimuth: float) -> tuple[float, float]:
+def place(polar: float, azimuth: float) -> tuple[float, float]:
     """Where a pose lies in a map."""
     return polar * np.cos(np.radians(azimuth)), polar * np.sin(np.radians(azimuth))
 
 
-def _rings(axis, reach: float) -> None:
+def rings(axis, reach: float) -> None:
     """Rings of equal polar angle and rays of equal azimuth, all numbered."""
     halo = {"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7}
-    rings = (30, 60, 90) if reach <= 90 else (45, 90, 135, 180)
-    for polar in rings:
+    for polar in (30, 60, 90) if reach <= 90 else (45, 90, 135, 180):
         axis.add_patch(Circle((0, 0), polar, fill=False, ec="0.2", lw=0.7))
         if polar < reach:
-            axis.text(*_place(polar, 22.5), f"{polar}", fontsize=10, ha="center", va="center", bbox=halo)
-    axis.text(*_place(1.06 * reach, 22.5), f"{reach:g}", fontsize=10, ha="center", va="center", bbox=halo)
+            axis.text(*place(polar, 22.5), f"{polar}", fontsize=10, ha="center", va="center", bbox=halo)
+    axis.text(*place(1.06 * reach, 22.5), f"{reach:g}", fontsize=10, ha="center", va="center", bbox=halo)
     for azimuth in range(0, 360, 45):
-        x, y = _place(reach, azimuth)
+        x, y = place(reach, azimuth)
         axis.plot([0, x], [0, y], color="0.2", lw=0.5)
         name = {0: "0 (x)", 90: "90 (y)"}.get(azimuth, f"{azimuth}")
         axis.text(1.04 * x, 1.04 * y, name, fontsize=10, ha=_side(x, "left", "right"), va=_side(y, "bottom", "top"))

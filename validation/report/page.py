@@ -28,7 +28,7 @@ from validation.report import (
 )
 from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
-from validation.report.requirements import next_step, sentence
+from validation.report.requirements import next_step, sentence, what, wrong
 from validation.report.station import Station, halves_of
 
 
@@ -70,7 +70,13 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
 
 def write_station(station: Station, title: str, path: Path) -> Path:
     """Write the page of a station that was not rendered: its first screen, and its budget."""
-    context = _context(station, title, _budget(station.budget)) | {"agrees": True}
+    sections = _budget(station.budget)
+    return write_page(first_screen(station), station.picture.scene.name, title, sections, path)
+
+
+def write_page(first: dict[str, Any], name: str, title: str, sections: list[Section], path: Path) -> Path:
+    """Write a page with a first screen and sections of one's own."""
+    context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": True}
     path.write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     return path
 
@@ -101,11 +107,13 @@ def first_screen(station: Station) -> dict[str, Any]:
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
+        "what": f"{what(found)} on this part, numbered in the picture, from one picture of one camera",
         "sentence": sentence(found),
+        "wrong": wrong(found),
         "next": next_step(found),
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
-        "told": told,
+        "sketched": f"Camera and lamp to scale: {told}.",
         "caption": f"{number}What is measured, as the camera sees it.{how}",
         "key": [(grade, LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,

@@ -48,7 +48,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
     return (
         f"{found.scene.title or found.scene.name}\n"
         f"The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:\n"
-        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}\n"
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p)}\n"
         f"  One picture's sigma is {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]};"
         f" in the image {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]}.\n"
         f"  Least variance {_WHERE[found.objective]}, by {_MODELS[found.model]}; measured from {edges}.\n"
@@ -59,11 +59,12 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
 
 def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
     p = found.prediction
+    state = _state(p) if is_trusted(p.status) else p.status  # what it means is told below
     how = "largest ratio" if found.over == "minimax" else "weighted sum of the squared ratios"
     lines = [
         found.scene.title or found.scene.name,
         "The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:",
-        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p.status)}",
+        f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {state}",
         f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from {edges}.",
         f"  Limited by {found.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance.",
     ]
@@ -71,7 +72,7 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
         part = "" if each.ratio is None else f", {100 * each.ratio:.3g} % of +-{each.tolerance.half:g}"
         sigma = f"{each.variance_object**0.5:.3g} {each.unit}"
         lines.append(f"    {each.name:<20} {each.value_object:.6g} {each.unit}: sigma {sigma}{part}, {each.status}")
-    lines += [f"  {line}" for line in legend(each.status for each in p.measurands)]
+    lines += [f"  {line}" for line in _legend(p)]
     return "\n".join([*lines, *_textures(p), _searched(found, seconds)])
 
 
@@ -126,9 +127,14 @@ def _ruled_out(found: planner.Plan) -> str:
     return f"; a lower bound ruled out all but {found.evaluated}" if found.evaluated < found.pairs else ""
 
 
-def _state(status: str) -> str:
-    """A status with what it means, and what to do."""
-    return f"ok, {MEANINGS[status]}" if is_trusted(status) else legend([status])[0].removesuffix(".")
+def _state(p: planner.Prediction) -> str:
+    """The status with what it means, and what to do."""
+    return f"ok, {MEANINGS[p.status]}" if is_trusted(p.status) else _legend(p)[0].removesuffix(".")
+
+
+def _legend(p: planner.Prediction) -> list[str]:
+    reasons = [f"{each.name}: {each.reason}" if each.reason else "" for each in p.measurands]
+    return legend([each.status for each in p.measurands], reasons)
 
 
 def _alone(found: planner.Plan) -> str:

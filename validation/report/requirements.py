@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,7 +15,7 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from scenes import InvalidInput, Picture, Tolerance
 from scenes.results import finite
-from scenes.status import MEANINGS, OK, REMEDIES, WORST_FIRST, is_trusted
+from scenes.status import MEANINGS, REMEDIES, WORST_FIRST, is_trusted
 
 _WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
 _UNSURE = "what is not exactly known"  # of a bias that is taken off
@@ -53,6 +54,10 @@ class Requirement:
     status : str
     limits : str
         The source with the largest share of the variance, and that share; empty where there is no budget.
+    kind : str
+        Of the measurand: distance, width, ...
+    reason : str
+        What decided a status that is not ``ok``, with its number; empty where no more is known than the status says.
     """
 
     number: int
@@ -66,6 +71,8 @@ class Requirement:
     U: float | None
     status: str
     limits: str
+    kind: str = "requirement"
+    reason: str = ""
 
     @property
     def ratio(self) -> float | None:
@@ -114,12 +121,14 @@ def requirements(
         Of those that can be measured.
     """
     told, known = planner.predict(picture).measurands, {} if found is None else {each.name: each for each in found}
+    statuses = [each.status for each in told] if statuses is None else statuses
     return tuple(
         Requirement(
             number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
             sigma=sigmas[m], bias=biases[m], u_bias=u_biases[m] if u_biases else None,
             U=known[each.name].U if each.name in known and math.isfinite(sigmas[m]) else None,
-            status=each.status if statuses is None else statuses[m],
+            status=statuses[m], kind=each.kind,
+            reason=each.why(statuses[m], u_biases[m] if u_biases else None, sigmas[m]),
             limits=_limits(known[each.name]) if each.name in known else "",
         )
         for m, each in enumerate(told)
@@ -170,25 +179,51 @@ def _limits(found: Budget) -> str:
     return "" if worst is None or not worst.share > 0 else f"{worst.source}, {100 * worst.share:.0f} %"
 
 
+def what(found: Sequence[Requirement]) -> str:
+    """What is measured, in plain words.
+
+    >>> what([])
+    'Nothing'
+    """
+    kinds = Counter(each.kind for each in found)
+    parts = [f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items()]
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts) or "Nothing"
+
+
 def sentence(found: Sequence[Requirement]) -> str:
     """How well all of them are measured, in plain words."""
     grades = [each.grade for each in found]
     parts = []
     if good := grades.count(Grade.WELL):
         parts.append(
-            f"{_count(good, len(found))} measured well within tolerance: U is at most {100 * _WELL:.0f} % of it"
+            f"{_count(good, len(found))} measured well within tolerance: the expanded uncertainty U (95 %) is at most "
+            f"{100 * _WELL:.0f} % of it"
         )
     for grade, words in (
-        (Grade.WITHIN, f"measured within tolerance, with a U above {100 * _WELL:.0f} % of it"),
-        (Grade.OVER, "measured with a U that is larger than the tolerance"),
+        (Grade.WITHIN, f"measured within tolerance, with an uncertainty U above {100 * _WELL:.0f} % of it"),
+        (Grade.OVER, "measured with an uncertainty U that is larger than the tolerance"),
         (Grade.OPEN, "measured; no tolerance is given to compare with"),
+        (Grade.DOUBT, "not proven: its value must not be relied on"),
     ):
         if some := [each for each in found if each.grade == grade]:
+            words = words if len(some) == 1 else words.replace("its value", "their values")
             parts.append(f"{_which(some, len(found))} {words}")
-    for status in WORST_FIRST:
-        if status != OK and (some := [each for each in found if each.status == status]):
-            parts.append(f"{_which(some, len(found))} not proven, for {MEANINGS[status]} ({status})")
     return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
+
+
+def wrong(found: Sequence[Requirement]) -> list[str]:
+    """What is wrong, a line for each status that is not ``ok`` and each U that is too large; empty where nothing is."""
+    lines = []
+    for status in WORST_FIRST:
+        some = [each for each in found if each.status == status and not is_trusted(status)]
+        if some:
+            told = next((each for each in some if each.reason), None)
+            about = f"{f'of {told.name}, ' if len(some) > 1 else ''}{told.reason}" if told else MEANINGS[status]
+            lines.append(f"{_joined([each.name for each in some])} ({status}): {about}.")
+    for each in found:
+        if each.grade == Grade.OVER and each.ratio is not None:
+            lines.append(f"{each.name}: U is {each.ratio:.2g} times what the tolerance allows{_mostly(each)}.")
+    return [line[0].upper() + line[1:] for line in lines]
 
 
 def _count(some: int, every: int) -> str:
@@ -205,22 +240,31 @@ def _which(some: Sequence[Requirement], every: int) -> str:
     """By name where they are few."""
     if len(some) > _NAMED or len(some) == every:
         return _count(len(some), every) if every > 1 else f"{some[0].name} is"
-    names = [each.name for each in some]
-    joined = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    return f"{joined} {_are(len(names))}"
+    return f"{_joined([each.name for each in some])} {_are(len(some))}"
+
+
+def _joined(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _numbers(numbers: Sequence[int]) -> str:
+    return f"Requirement{'s' * (len(numbers) > 1)} {_joined([str(each) for each in numbers])}"
+
+
+def _mostly(each: Requirement) -> str:
+    return f"; most of it comes from {each.limits.rsplit(',', 1)[0]}" if each.limits else ""
 
 
 def next_step(found: Sequence[Requirement]) -> str:
-    """What to do about the worst of them; empty where nothing is asked for."""
-    worst = next((status for status in WORST_FIRST if status != OK and any(r.status == status for r in found)), None)
-    if worst:
-        names = ", ".join(each.name for each in found if each.status == worst)
-        return f"For {names}: {REMEDIES[worst]}."
+    """What to do about what is wrong, the worst first; then about the largest uncertainty."""
+    doubtful = [status for status in WORST_FIRST if any(r.status == status for r in found) and not is_trusted(status)]
+    if doubtful:
+        steps = [(_numbers([each.number for each in found if each.status == s]), REMEDIES[s]) for s in doubtful]
+        return " ".join(f"{numbers}: {remedy}." for numbers, remedy in steps)
     over = [each for each in found if each.grade in (Grade.OVER, Grade.WITHIN)]
     if over:
         worst = max(over, key=lambda each: (round(each.ratio or math.inf, 9), -each.number))
-        limit = f"; most of it comes from {worst.limits.rsplit(',', 1)[0]}" if worst.limits else ""
-        return f"Improve {worst.name} first{limit}."
-    if all(each.grade == Grade.OPEN for each in found):
+        return f"Improve {worst.name} first{_mostly(worst)}."
+    if found and all(each.grade == Grade.OPEN for each in found):
         return "Give each requirement its tolerance in the scene, then U can be compared with it."
-    return ""
+    return "Nothing has to be changed: set camera and lamp up as they are drawn here."

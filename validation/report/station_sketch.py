@@ -40,7 +40,7 @@ def told(picture: Picture) -> str:
 
 def _where(what: str, distance: float, pose, units: str) -> str:
     azimuth = f", azimuth {pose.azimuth_deg:.1f}°" if pose.polar_deg % 180 else ""
-    return f"{what} {distance:g} {units} away, {pose.polar_deg:.1f}° from the vertical{azimuth}"
+    return f"{what} {distance:.4g} {units} away, {pose.polar_deg:.1f}° from the vertical{azimuth}"
 
 
 def draw(picture: Picture) -> Markup:

@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from validation.report import cells, station_table
-from validation.report.requirements import Grade, Requirement, next_step, sentence
+from validation.report.requirements import Grade, Requirement, next_step, sentence, wrong
 
 _WORDS = ("requirement", "result", "limited by")
 _SHORT = ((str(Grade.WELL), "well within"), (str(Grade.WITHIN), "within"), (str(Grade.OPEN), "no tolerance"))
@@ -20,8 +20,8 @@ def report(found: Sequence[Requirement], title: str) -> Group:
     rows = ((str(line.number), line.cells[0], *map(_plain, line.cells[1:])) for line in station_table.lines(found))
     table = cells.table(title, *columns, rows=rows, words=_WORDS, wrap=True)
     lines = [Text(f" {_plain(station_table.NOTE)}"), Text(f"\n{sentence(found)}", style="bold")]
-    if step := next_step(found):
-        lines.append(Text(f"What to do next. {step}"))
+    lines += [Text(f"What is wrong: {line}") for line in wrong(found)]
+    lines.append(Text(f"What to do next: {next_step(found)}"))
     return Group(table, *lines)
 
 

@@ -126,12 +126,14 @@ def _seen(picture: Picture, points: np.ndarray) -> np.ndarray:
 
 
 def draw(
-    picture: Picture, found: Sequence[Requirement], image: np.ndarray | None, label: str, key: str = "view"
+    picture: Picture, found: Sequence[Requirement | None], image: np.ndarray | None, label: str, key: str = "view"
 ) -> Markup:
     """The picture as SVG, a balloon for each requirement around it.
 
     Parameters
     ----------
+    found : sequence of Requirement or None
+        Of each quantity of the picture's scene, in its order; None: not drawn. Empty: none is.
     image : ndarray, shape (height, width), or None
         Grey levels of the whole image; None: drawn from the model, without shadows.
     label, key : str
@@ -152,7 +154,8 @@ def draw(
         """Inches in the figure of px in the image."""
         return (points + 0.5 - [part.left, part.top]) * scale + [left, _BAND]
 
-    drawn = marks(picture) if found else []
+    both = [(each, mark) for each, mark in zip(found, marks(picture), strict=True) if each] if found else []
+    found, drawn = [each for each, _ in both], [mark for _, mark in both]
     spots, anchors = balloons([placed(mark.anchors) for mark in drawn], size, np.array([left, _BAND]))
     for each, mark, anchor, spot in zip(found, drawn, anchors, spots, strict=True):
         _requirement(axis, each, [placed(line) for line in mark.lines], anchor, spot)

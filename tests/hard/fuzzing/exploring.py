@@ -32,7 +32,7 @@ def message(rng: np.random.Generator, folder: Path) -> str:
     if rng.random() < 0.2:
         return _request(rng)
     told = Message.of(_text(rng))
-    if told.type != "state":
+    if told.type not in ("state", "restore"):
         return told.type
     name = str(rng.choice(["task1", "ball", "two_lights"]))
     scene = _scene(name)
@@ -52,6 +52,8 @@ def _scene(name: str) -> scenes.Scene:
 def _text(rng: np.random.Generator) -> str:
     state = {"sensor": [30, 135], "lights": [[15, 315]], "measurand": 0, "shown": "sigma", "moving": -1}
     whole: Any = {"type": "state", "state": state, "rest": True, "number": 3}
+    if rng.random() < 0.3:
+        whole["type"], state["views"] = "restore", [{"sensor": [20, 10], "lights": [[3, 270]]}]
     what = rng.integers(4)
     if what == 0:
         whole = changed(rng, whole)

@@ -212,7 +212,7 @@ def _explored(name):
     moved = [np.concatenate(list(sphere.values(scene, replace(state, moving=moving), cells.poses)))
              for moving in range(-1, len(state.lights))]  # fmt: skip
     return {"window": part, "drawn": preview.drawn(scene, picture, part).astype(float), "cells": cells, "moved": moved,
-            "key": sphere.key(state), "setting": save.setting(state)}  # fmt: skip
+            "key": sphere.key(state), "setting": save.settings(state)}  # fmt: skip
 
 
 def _without_seconds(found):

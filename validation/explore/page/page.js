@@ -3,10 +3,14 @@
 import { View, colour, range } from "./view.js";
 import { Picture } from "./picture.js";
 import * as panel from "./panel.js";
+import { History } from "./history.js";
+import * as address from "./address.js";
 
 const $ = (id) => document.getElementById(id);
 const REST_MS = 250; // without a movement before the long work begins
 let scene = null, state = null, latest = null, number = 0, frame = 0, timer = 0, socket = null;
+let wanted = address.read(location.hash); // what the address asks for, until it is sent
+const past = new History(() => { $("undo").disabled = !past.before; $("redo").disabled = !past.after; });
 const view = new View($("sphere"), moved, choose), picture = new Picture($("picture"), $("caption"));
 window.explore = { view, picture, get state() { return state; }, get number() { return number; }, answered: 0 };
 
@@ -30,6 +34,7 @@ function send(message) {
 function ask(rest) {
   view.draw();
   poses();
+  if (rest) views();
   clearTimeout(timer);
   if (rest) {
     cancelAnimationFrame(frame);
@@ -43,6 +48,10 @@ function ask(rest) {
 
 function push(rest) {
   number += 1;
+  if (rest && !wanted) {
+    past.keep(state);
+    address.write(state);
+  }
   send({ type: "state", state, rest, number });
 }
 
@@ -53,6 +62,36 @@ function moved(which, to, rest) {
     else state.lights[which] = rounded;
   }
   ask(rest);
+}
+
+// Another state as a whole; what the page shows of it follows.
+function adopt(next) {
+  if (!next) return;
+  state = next;
+  view.state = state;
+  measurand(state.measurand);
+}
+
+function keep() {
+  if (state.views.length >= scene.views) {
+    $("said").textContent = `views must be at most ${scene.views} beside this one.`;
+    return;
+  }
+  state.views = [...state.views, { sensor: [...state.sensor], lights: state.lights.map((pose) => [...pose]) }];
+  ask(true);
+}
+
+function views() {
+  $("views").hidden = !state.views.length;
+  $("views").lastElementChild.replaceChildren(...state.views.map((each, i) => {
+    const made = panel.element("li", `camera (${each.sensor})${each.lights.map((pose) => `, lamp (${pose})`).join("")}`);
+    const go = panel.element("button", "Go there"), drop = panel.element("button", "Leave out");
+    const others = state.views.filter((_, k) => k !== i);
+    go.onclick = () => adopt({ ...state, sensor: [...each.sensor], lights: each.lights.map((pose) => [...pose]), views: others });
+    drop.onclick = () => adopt({ ...state, views: others });
+    made.append(go, drop);
+    return made;
+  }));
 }
 
 function choose(which) {
@@ -81,6 +120,12 @@ const take = {
     $("prove").firstChild.textContent = `Prove it with ${scene.renders} images `;
     inputs();
     measurand(state.measurand);
+    if (wanted) {
+      const asked = wanted;
+      wanted = null;
+      if (asked.refused) $("said").textContent = asked.refused;
+      else send({ type: "restore", state: asked });
+    }
   },
   answer(message) {
     if (message.number < window.explore.answered) return;
@@ -102,12 +147,11 @@ const take = {
     view.draw();
     legend(message);
   },
+  budget(message) { panel.budget(message.rows); },
   effects(message) { panel.effects(message.rows); },
   moved(message) {
-    state = message.state;
-    view.state = state;
-    $("said").textContent = "Moved to the next place from which this measurand is known best.";
-    ask(true);
+    adopt(message.state);
+    $("said").textContent = message.text;
   },
   job(message) {
     const busy = message.state === "begun", words = { best: "descending", prove: "rendering", render: "rendering" };
@@ -170,7 +214,7 @@ function poses() {
 function legend(map) {
   const limits = range(map.values), bar = $("legend-bar"), who = map.moving < 0 ? "camera" : state.lights.length > 1 ? `lamp ${map.moving + 1}` : "lamp";
   const name = map.shown === "worst" ? "the worst of all requirements" : `"${scene.measurands[state.measurand].name}"`;
-  $("legend-title").textContent = `${map.what} of ${name}${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is`;
+  $("legend-title").textContent = `${map.what} of ${name}${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is${map.about ? "; rims of holes at a glance, so rather too large" : ""}`;
   $("legend-numbers").replaceChildren();
   const pen = bar.getContext("2d");
   pen.clearRect(0, 0, bar.width, bar.height);
@@ -188,6 +232,14 @@ function legend(map) {
 $("measurand").onchange = () => { $("measurand").blur(); measurand(Number($("measurand").value)); };
 $("shown").onchange = () => { $("shown").blur(); state.shown = $("shown").value; ask(true); };
 for (const kind of ["best", "prove", "render", "save"]) $(kind).onclick = () => send({ type: kind });
+$("undo").onclick = () => adopt(past.undo());
+$("redo").onclick = () => adopt(past.redo());
+$("keep").onclick = keep;
+window.addEventListener("hashchange", () => {
+  const asked = address.read(location.hash);
+  if (asked && asked.refused) $("said").textContent = asked.refused;
+  else if (asked) send({ type: "restore", state: asked });
+});
 $("cancel").onclick = () => send({ type: "cancel" });
 window.addEventListener("resize", () => { view.draw(); picture.draw(); if (view.map) legend(view.map); });
 
@@ -195,12 +247,19 @@ const ARROWS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowR
 const KEYS = {
   b: () => $("best").click(), p: () => $("prove").click(), r: () => $("render").click(), s: () => $("save").click(),
   Escape: () => $("cancel").click(), c: () => choose(-1), l: () => { if (state.lights.length) choose((state.moving + 1) % state.lights.length); },
+  u: () => $("undo").click(), y: () => $("redo").click(), v: keep,
   m: () => measurand((state.measurand + 1) % scene.measurands.length),
   "[": () => { view.turn -= 10; view.draw(); }, "]": () => { view.turn += 10; view.draw(); },
 };
 
 document.addEventListener("keydown", (event) => {
   const typing = event.target instanceof HTMLSelectElement || (event.target instanceof HTMLInputElement && event.target.type === "number");
+  const back = (event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z";
+  if (state && back && !typing) {
+    adopt(event.shiftKey ? past.redo() : past.undo());
+    event.preventDefault();
+    return;
+  }
   if (!state || event.ctrlKey || event.metaKey || event.altKey || (typing && event.key !== "Escape")) return;
   if (event.key in ARROWS) {
     const by = event.shiftKey ? 5 : 1, [polar, azimuth] = ARROWS[event.key];

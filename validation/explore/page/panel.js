@@ -47,15 +47,18 @@ export function answer(message, state, choose) {
   status.className = mood(chosen.status);
   const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
   const glance = message.closely ? "" : " Rims of holes are glanced at while it moves; the close look follows.";
-  $("why").textContent = `${chosen.why}${chosen.status !== "ok" && blamed ? ` (${blamed})` : ""}.${glance}`;
+  const about = chosen.reason || (chosen.status !== "ok" ? blamed : "");
+  $("why").textContent = `${chosen.why}${about ? ` (${about})` : ""}.${glance}${together(chosen)}`;
   $("remedy").hidden = !chosen.remedy;
   $("remedy").lastElementChild.textContent = chosen.remedy.replaceAll("`", "");
   $("connection").textContent = `${$("sigma").textContent}, ${chosen.status}`;
   shares(message);
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
-    const made = row([each.name, `${number(each.sigma)} ${each.unit}`, number(each.ratio), number(each.bias, 2),
+    const off = each.tolerance && each.bias !== null ? Math.abs(each.bias) / each.tolerance : null;
+    const sigma = each.together ? `${number(each.sigma)} (${number(each.together.sigma)}) ${each.unit}` : `${number(each.sigma)} ${each.unit}`;
+    const made = row([each.name, sigma, part(each.ratio), off === null ? `${number(each.bias, 2)}` : part(off),
       element("span", each.status, `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
-    made.title = each.remedy ? `${each.why}: ${each.remedy}` : each.why;
+    made.title = `bias ${number(each.bias, 2)} ${each.unit}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
     made.onclick = () => choose(i);
     return made;
   }));
@@ -63,6 +66,45 @@ export function answer(message, state, choose) {
     element("span", edge.status, `status ${mood(edge.status)}`)])));
   const bad = message.edges.filter((edge) => edge.status !== "ok");
   $("worst-edge").textContent = bad.length ? `${bad.length} of ${message.edges.length} not ok` : "all ok";
+}
+
+// What the kept views add.
+function together(each) {
+  if (!each.together) return "";
+  const { sigma, status, views } = each.together;
+  return sigma === null ? " Not even all views together measure it." : ` With all views: σ ${number(sigma)} ${each.unit} from ${views}, ${status}.`;
+}
+
+// A bar of what is 1 at the limit, and its number.
+function part(value) {
+  const made = element("span");
+  if (value !== null) {
+    const bar = element("span", "", "part"), fill = element("b", "", value > 1 ? "over" : "");
+    fill.style.width = `${100 * Math.min(value, 1)}%`;
+    bar.append(fill);
+    made.append(bar);
+  }
+  made.append(number(value, 2));
+  return made;
+}
+
+export function budget(rows) {
+  $("budget").replaceChildren(...rows.map((each) => {
+    const made = element("div", "", "source"), head = element("p"), bar = element("span", "", "part wide");
+    const told = each.U === null ? "cannot be measured" : each.ratio === null ? `U ${number(each.U, 2)}, no tolerance`
+      : `U ${number(each.U, 2)}, ${(100 * each.ratio).toPrecision(2)} % of half the tolerance zone`;
+    head.append(element("span", each.name), element("span", told));
+    const long = each.ratio === null ? 1 : Math.min(each.ratio, 1);
+    each.parts.forEach(([name, share]) => {
+      const fill = element("b");
+      fill.style.width = `${100 * long * share}%`;
+      fill.title = name;
+      bar.append(fill);
+    });
+    made.append(head, bar, element("small", each.parts.map(([name, share]) => `${name} ${(100 * share).toFixed(0)} %`).join(", ")));
+    return made;
+  }));
+  $("budget-small").textContent = "U (95 %), and the parts of its square by source";
 }
 
 function shares(message) {
