@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from imaging.models.bias import MOST
 from imaging.models.texture import TextureErrors, texture_errors
@@ -120,7 +122,7 @@ def propagate(
     for m, gone in enumerate(((found.image.gradient[0] != 0) & lost).any(-1)):
         if gone and state[m] in status.MEASURED:  # an edge was only found far from its place, where another one is
             state[m] = status.ILL_CONDITIONED
-    errors = (noise * rows) @ rows.T
+    errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
     image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
     textures = texture_errors(Pictures.of(picture)) if picture.lights else None
     values = _values(found, image, plane, state, not photographed, textures)
@@ -129,34 +131,40 @@ def propagate(
 
 def _responses(
     clean: np.ndarray, picture: Picture, found: Found, estimator: str, threshold: float | None
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[sparse.csr_array, np.ndarray]:
     """Derivative of lines and circles (`Seen`) by the pixels, (q, pixels), and which of them have none, bool (q,)."""
-    layout, parts = layout_of(picture), [np.zeros((0, clean.size))]
+    layout, parts = layout_of(picture), [sparse.csr_array((0, clean.size))]
     if layout.names:
-        parts.append(_of_lines(clean, picture, layout, found, estimator, threshold))
+        parts.append(sparse.csr_array(_of_lines(clean, picture, layout, found, estimator, threshold)))
     for name, circle in zip(found.known.circles, found.circles, strict=True):
         good = str(circle.state[0]) in status.MEASURED
-        parts.append(
-            circle_response(clean, picture, name) if good else np.full((circle.errors.shape[1], clean.size), np.nan)
-        )
-    rows = np.concatenate(parts)
-    lost = ~np.isfinite(rows).all(1)
-    return np.where(lost[:, None], 0.0, rows), lost
+        told = circle_response(clean, picture, name) if good else _none(circle.errors.shape[1], clean.size)
+        parts.append(sparse.csr_array(told))
+    rows = sparse.vstack(parts, format="csr")  # few of the pixels of a large image
+    lost = np.array([not np.isfinite(rows.data[start:stop]).all() for start, stop in pairwise(rows.indptr)], bool)
+    rows.data[np.repeat(lost, np.diff(rows.indptr))] = 0.0
+    return rows, lost
+
+
+def _none(rows: int, pixels: int) -> sparse.csr_array:
+    """Rows that have no derivative: NaN by the first pixel."""
+    return sparse.csr_array((np.full(rows, np.nan), np.zeros(rows, int), np.arange(rows + 1)), (rows, pixels))
 
 
 def _of_lines(
     clean: np.ndarray, picture: Picture, layout: Layout, found: Found, estimator: str, threshold: float | None
-) -> np.ndarray:
+) -> np.ndarray | sparse.csr_array:
     """Of the lines, (2 E, pixels); NaN where there is none."""
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     if isinstance(tool, ArrangementEstimator):
         if str(found.shape.status[0]) not in status.MEASURED:
-            return np.full((2 * len(layout.names), clean.size), np.nan)
+            return _none(2 * len(layout.names), clean.size)
         return arranged.line_response(tool, layout, clean)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
         rows = tool.respond(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
-    return np.where(np.repeat(measured, 2)[:, None], rows, np.nan)
+    rows[np.repeat(~measured, 2)] = np.nan
+    return rows
 
 
 def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> np.ndarray:
@@ -181,7 +189,7 @@ def _values(
 
 
 def _of_first(
-    found: Found, rows: np.ndarray, errors: np.ndarray, values: PropagatedValues, shape: tuple[int, int]
+    found: Found, rows: sparse.csr_array, errors: np.ndarray, values: PropagatedValues, shape: tuple[int, int]
 ) -> Propagated:
     measured, quantity = values.status[0] in status.MEASURED, found.known.quantities[0]
     covariance = np.full((4, 4), np.inf)

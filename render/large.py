@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import maximum_filter
@@ -21,6 +21,9 @@ from scenes import Picture
 
 LARGE = 1 << 20  # pixels of an image whose fine pixels are not all rendered
 LARGE_RANDOM = 1 << 17  # the same where a single ray is random, and each fine pixel needs many
+_MOVING = 3.0  # standard deviations of scale and blur together: noise of pixels farther from an edge does not move it
+_FEWER = 2  # times fewer rays there, each way
+_PILOT, _AROUND = 4, 2  # rays that tell whether surfaces send light to a pixel, and pixels around of which they tell
 _BESIDE = 16  # rays of a fine pixel that an edge crosses which nothing is measured by
 
 
@@ -39,6 +42,9 @@ class Renders:
         Whether there are such effects.
     everywhere : bool
         Whether pixels that nothing is measured by are rendered with them, and divided.
+    bounced : callable, optional
+        (mask of whole pixels, rays) to the image of whole pixels of what surfaces send to each other, 0 elsewhere:
+        where that alone is random and is to be added to the direct light.
     """
 
     whole: Callable[[bool, int], np.ndarray]
@@ -46,6 +52,13 @@ class Renders:
     supersample: int
     random: bool
     everywhere: bool = True
+    bounced: Callable[[np.ndarray, int], np.ndarray] | None = None
+
+
+def whole_pixels(crop: tuple[slice, slice], supersample: int) -> tuple[slice, slice]:
+    """A crop of fine pixels, in pixels."""
+    rows, columns = (slice(part.start // supersample, part.stop // supersample) for part in crop)
+    return rows, columns
 
 
 def is_large(crop: tuple[slice, slice], supersample: int, random: bool = False) -> bool:
@@ -76,18 +89,39 @@ def fine_pixels(
     """
     k, (ordinary, few, many) = renders.supersample, rays
     near = near_required(picture, crop, k)
+    if renders.bounced is not None:
+        direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, rays)
+        return direct + _fine(_bounced(renders.bounced, near, near_required(picture, crop, k, _MOVING), few), k)
     first = renders.whole(False, ordinary)
     divided = _fine(crossed(first, math.ceil(reach / k)) | near if renders.everywhere else near, k)
     fine = renders.again(False, _fine(first, k), divided, ordinary)
     marked, near = crossed(fine, reach) & divided, _fine(near, k)
     if renders.random:
         fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
-        fine = renders.again(True, fine, near & ~marked, few)
+        even, moving = near & ~marked, True
+        if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
+            moving = _fine(near_required(picture, crop, k, _MOVING), k)
+        fine = _with_random(renders, fine, even & moving, even & ~np.asarray(moving), few)
     if renders.everywhere:
         fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
     fine = renders.again(renders.random, fine, marked & near, many)
-    missed = crossed(fine, step=MISSED) & near & ~marked
+    missed = crossed(fine, step=MISSED) & near & ~marked & maximum_filter(marked, 3)  # elsewhere it is noise
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
+
+
+def _bounced(
+    made: Callable[[np.ndarray, int], np.ndarray], near: np.ndarray, moving: np.ndarray, rays: int
+) -> np.ndarray:
+    """What surfaces send to each other, image of whole pixels: ``rays`` where there is any and it moves an edge."""
+    light = made(near, _PILOT)
+    lit = maximum_filter(light > 0, 2 * _AROUND + 1) & near & moving
+    return np.where(lit, made(lit, rays), light)
+
+
+def _with_random(renders: Renders, fine: np.ndarray, moving: np.ndarray, still: np.ndarray, rays: int) -> np.ndarray:
+    """The image with fine pixels that no edge crosses; fewer rays of those whose noise moves no edge."""
+    fine = renders.again(True, fine, moving, rays)
+    return renders.again(True, fine, still, max(math.isqrt(rays) // _FEWER, 1) ** 2) if still.any() else fine
 
 
 def _fine(pixels: np.ndarray, supersample: int) -> np.ndarray:
@@ -95,8 +129,11 @@ def _fine(pixels: np.ndarray, supersample: int) -> np.ndarray:
     return pixels.astype(kind).repeat(supersample, 0).repeat(supersample, 1)
 
 
-def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
-    """Pixels of the crop that the task's edges and circles are measured from, and their surroundings, as a mask."""
+def near_required(
+    picture: Picture, crop: tuple[slice, slice], supersample: int, within: float | None = None
+) -> np.ndarray:
+    """Pixels of the crop that the task's edges and circles are measured from, and their surroundings, as a mask; or
+    those ``within`` so many standard deviations of scale and blur together of where they are."""
     scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
     circles = {circle.name: circle.edges for circle in scene.solid.circles}
@@ -113,5 +150,6 @@ def near_required(picture: Picture, crop: tuple[slice, slice], supersample: int)
     inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
     found = np.zeros(shape, bool)
     found[row[inside], column[inside]] = True
-    reach = scene.locator.window_px + 4 * math.hypot(scene.locator.scale_px, scene.camera.blur_px) + 1
+    spread = math.hypot(scene.locator.scale_px, scene.camera.blur_px)
+    reach = 1 + (scene.locator.window_px + 4 * spread if within is None else within * spread)
     return maximum_filter(found, 2 * math.ceil(reach) + 1)

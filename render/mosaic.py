@@ -13,7 +13,7 @@ import numpy as np
 
 from render.adaptive import MISSED, crossed
 
-_SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels
+_SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels: each twice the one before
 _SENSOR = {"perspective": 20, "thinlens": 200}  # rays that take as long as making a sensor
 _AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
 
@@ -36,14 +36,14 @@ def refine_tiles(
         With a scalar variant set.
     scene : mitsuba.Scene
     view : dict
-        Description of the sensor.
+        Description of the sensor, its sampler among it.
     start : tuple of int
         Row and column in the sensor's whole frame of the first pixel of ``fine``.
     fine : ndarray
         The image as rendered so far.
     marked : ndarray of bool
     samples : int
-        Multi-jittered rays a fine pixel, a square number.
+        Rays a fine pixel, a square number.
     seed : int
         The same gives the same image, bit by bit, whatever the number of processor cores.
     """
@@ -91,8 +91,11 @@ def _held(marked: np.ndarray, side: int) -> np.ndarray:
 
 def _side(marked: np.ndarray, samples: int, sensor: int, most: int) -> int:
     """Side, at most ``most``, of tiles that take the least time, where making a sensor takes as long as some rays."""
-    sides = [side for side in _SIDES if side <= most]
-    return min(sides, key=lambda side: int(_held(marked, side).sum()) * (sensor + side * side * samples))
+    held, taken = marked, {}
+    for side in _SIDES:
+        held = _held(held, 2) if side > 1 else held
+        taken[side] = int(np.count_nonzero(held)) * (sensor + side * side * samples)
+    return min((side for side in _SIDES if side <= most), key=taken.__getitem__)
 
 
 def _side_by_side(mitsuba: Any, view: dict, corners: list[tuple[int, int]], side: int, samples: int) -> Any:
@@ -101,7 +104,7 @@ def _side_by_side(mitsuba: Any, view: dict, corners: list[tuple[int, int]], side
     film = {key: value for key, value in frame.items() if not key.startswith("crop")}
     row = mitsuba.Properties("batch")
     row["film"] = mitsuba.load_dict({**film, "width": side * len(corners), "height": side})
-    row["sampler"] = mitsuba.load_dict({"type": "multijitter", "sample_count": samples})
+    row["sampler"] = mitsuba.load_dict({**view["sampler"], "sample_count": samples})
     one = mitsuba.Properties(view["type"])
     for key in view.keys() - {"type", "film", "sampler"}:
         one[key] = view[key]

@@ -1,10 +1,11 @@
 """The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
 
 Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
-rays, and subtracted from the same render of the scene as it is, whose paths are the same ones. Lights that stand
-elsewhere change the direct light, which is rendered anew alone; of plain scenes the closed form of the bias tells what
-lights do. All of them are made where something is measured, and with few rays first: where the noise of these is far
-below sigma or the tolerance, more rays would tell nothing.
+rays, and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
+which is rendered anew alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
+compared have the same rays, one by one, or their difference would be noise. All of them are made where something is
+measured, and with few rays first: where the noise of these is far below sigma or the tolerance, more rays would tell
+nothing.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ _BETWEEN = "interreflection"
 _LEAST, _MOST = 2, 6  # renders of other rays
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
-_FEW = {"samples": 1, "edge_samples": 16, "random_samples": 4}  # rays
+_FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
+_ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,11 @@ class How:
     def rough(self) -> How:
         """With few rays."""
         return replace(self, quality=replace(self.quality, **_FEW))
+
+    @property
+    def compared(self) -> How:
+        """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
+        return replace(self, quality=replace(self.quality, **_ALIKE))
 
     def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
         """Where something is measured, with rays of another seed, counted from the quality's."""
@@ -167,7 +174,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     images: Images | None = None
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_LEAST))
-        images = _completed(picture, few, (), how, few[0])
+        images = _completed(picture, few, (), how)
         found = of(images)
         if _is_quiet(found):
             return found
@@ -206,15 +213,14 @@ def _completed(
     renders: tuple[np.ndarray, ...],
     beside: tuple[np.ndarray, ...],
     how: How,
-    rough: np.ndarray | None = None,
 ) -> Images:
-    """With the images, or numbers, of what the scene is not sure of; ``rough`` is the picture's own of few rays."""
-    first, known, few = renders[0], _of_unknown_kinds(picture), how.rough
-    changed = {REFLECTANCE: _steps(first, few.image, picture, _of_other_surfaces(picture), rough)}
+    """With the images, or numbers, of what the scene is not sure of."""
+    first, known, alike = renders[0], _of_unknown_kinds(picture), how.compared
+    changed = {REFLECTANCE: _steps(first, alike.image, picture, _of_other_surfaces(picture))}
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
-        direct = partial(few.direct, active=how.active(picture))
+        direct = partial(alike.direct, active=how.active(picture))
         changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
 
@@ -224,12 +230,10 @@ def _steps(
     made: Callable[[Picture], np.ndarray],
     picture: Picture,
     others: Iterable[Picture],
-    here: np.ndarray | None = None,
 ) -> tuple[np.ndarray, ...]:
-    """The first render with what other pictures differ by from this one, ``here``, both of the same random numbers."""
+    """The first render with what other pictures differ by from this one, both of the same random numbers."""
     changed = [made(other) for other in others]
-    if here is None:
-        here = made(picture) if changed else first
+    here = made(picture) if changed else first
     return tuple(first + (other - here) for other in changed)
 
 

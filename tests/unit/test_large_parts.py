@@ -16,16 +16,19 @@ def test_limits(pixels, random, expected):
     assert is_large((slice(0, 3), slice(3, 3 + 3 * most)), 3, random) is expected
 
 
-@pytest.mark.parametrize("random", [False, True])
-def test_rays_where_they_are_needed(random, monkeypatch):
+@pytest.mark.parametrize(("random", "many"), [(False, True), (True, True), (True, False)])
+def test_rays_where_they_are_needed(random, many, monkeypatch):
     """Edges near required ones get all rays, other edges fewer, smooth places and far ones the least."""
     truth = np.zeros((SIZE[0] * K, SIZE[1] * K))
     truth[:, 31:] = 50.0  # an edge within pixel column 15, and another, far from what is required
     truth[:, 80:] = 90.0
     near = np.zeros(SIZE, bool)
     near[:, 8:24] = True
-    monkeypatch.setattr(large, "near_required", lambda picture, crop, supersample: near)
-    asked = []
+    moving = np.zeros(SIZE, bool)
+    moving[:, 12:24] = True
+    monkeypatch.setattr(large, "near_required", lambda *_: near if len(_) == 3 else moving)
+    monkeypatch.setattr(large, "LARGE_RANDOM", 1000 if many else 10_000)
+    crop, asked = tuple(slice(0, size * K) for size in SIZE), []
 
     def whole(is_random, rays):
         asked.append(("whole", is_random, rays))
@@ -37,12 +40,42 @@ def test_rays_where_they_are_needed(random, monkeypatch):
         return np.where(marked, truth, fine)
 
     counts = np.zeros(truth.shape, int)
-    found = fine_pixels(None, None, Renders(whole, again, K, random), 0, RAYS)
+    found = fine_pixels(None, crop, Renders(whole, again, K, random), 0, RAYS)
     assert found == pytest.approx(truth)
     assert found.shape == truth.shape
     assert (counts[:, 30:32] == 256).all()
     assert (counts[:, 79:81] == min(256, large._BESIDE)).all()
-    assert (counts[:, 18:28] == (16 if random else 4)).all()
+    assert (counts[:, 24:28] == (16 if random else 4)).all()
+    half = 4 if many or not random else 16
+    assert (counts[:, 18:24] == half).all(), "of 16 a half, each way, where noise moves no edge and there are many"
     assert set(counts[:, 90:].ravel()) <= {0, 4}
     assert [each for each in asked if each[0] == "whole"] == [("whole", False, 4)] + [("whole", True, 16)] * random
     assert {each[1] for each in asked[3:]} == {random}
+
+
+def test_bounced_light_is_added_to_direct_light_in_whole_pixels(monkeypatch):
+    """To few rays everywhere that is measured, to many where they find some and its noise moves an edge."""
+    direct, sent = np.full((SIZE[0] * K, SIZE[1] * K), 7.0), np.zeros(SIZE)
+    sent[10:14, 20] = 3.0
+    near, moving = np.zeros(SIZE, bool), np.zeros(SIZE, bool)
+    near[5:30, 10:30], moving[:12] = True, True
+    monkeypatch.setattr(large, "near_required", lambda *_: near if len(_) == 3 else moving)
+    counts, asked = np.zeros(SIZE, int), []
+
+    def bounced(marked, rays):
+        counts[marked] = rays
+        asked.append(rays)
+        return np.where(marked, sent, 0.0)
+
+    def again(is_random, fine, marked, rays):
+        assert not is_random, "direct light alone"
+        return np.where(marked, direct, fine)
+
+    whole = direct.reshape(SIZE[0], K, SIZE[1], K).mean((1, 3))
+    renders = Renders(lambda is_random, rays: whole, again, K, True, False, bounced)
+    found = fine_pixels(None, None, renders, 0, RAYS)
+    assert found == pytest.approx(direct + sent.repeat(K, 0).repeat(K, 1))
+    assert asked == [4, 16]
+    assert (counts[8:12, 18:23] == 16).all()
+    assert (counts[12:, :] <= 4).all()
+    assert not counts[~near].any()

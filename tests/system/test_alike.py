@@ -1,0 +1,71 @@
+"""Differences of two images of few rays: `render.Quality.alike`."""
+
+from dataclasses import replace
+from importlib import import_module
+
+import pytest
+
+import measure
+import render
+import scenes
+from imaging.models.bias import bias
+from imaging.pictures import Pictures
+from render import large
+from scenes import Picture
+
+renderer = import_module("render.renderer")
+SCALAR = "scalar_rgb"
+FEW = render.Quality(supersample=2, samples=1, edge_samples=16, random_samples=16, everywhere=False, alike=True)
+
+
+def picture(name, setting=0):
+    scene = scenes.load(name)
+    return Picture.of(scene, scene.settings[setting].sensor, scene.settings[setting].light)
+
+
+def test_what_a_light_farther_away_does_is_told_without_noise():
+    """A 30 % longer way of the light on `wedge`, gradient locator, against the closed form of its bias: 0.0006 px.
+
+    Measured: 8 % off the closed form, which is of first order. Rays that depend on brightness make it eight times as
+    much.
+    """
+    here = picture("wedge")
+    scene = here.scene.with_(light={"distance": 1.3 * here.scene.light.distance})
+    there = here.with_scene(scene)
+    expected = bias(Pictures.of(there)).values[0] - bias(Pictures.of(here)).values[0]
+
+    def found(quality):
+        images = [render.image(each, quality=quality, variant=SCALAR) for each in (here, there)]
+        values = [measure.measure(image, here, estimator="gradient").value_image[0] for image in images]
+        return values[1] - values[0]
+
+    assert found(FEW) == pytest.approx(expected, rel=0.45)
+    assert abs(found(replace(FEW, alike=False)) - expected) > 2 * expected
+
+
+def test_what_surfaces_send_to_each_other_has_no_noise_of_the_direct_light(monkeypatch):
+    """With it less without it, of the same rays, on `bracket`: nowhere below 0, though levels step by 200 at edges.
+
+    Its sum over what is measured is that of a render as it stands less one of the direct light, of 16 times as many
+    rays: within 5 % (measured: 0.6 %).
+    """
+    here, told = picture("bracket"), []
+
+    def caught(shown, crop, renders, *rest):
+        near = large.near_required(shown, crop, renders.supersample)
+        told.append((near, renders.bounced(near, 64)))
+        return large.fine_pixels(shown, crop, renders, *rest)
+
+    monkeypatch.setattr(renderer, "fine_pixels", caught)
+    render.image(here, quality=FEW, variant=SCALAR)
+    (near, light), rows_columns = told[0], renderer.window(here)
+    assert light.min() >= 0
+    assert light.max() > 10, "levels"
+    monkeypatch.undo()
+    active = render.choose(here.scene, "auto", render.Tolerance(), here).active
+    many = replace(FEW, supersample=4, edge_samples=64, random_samples=64, alike=False, everywhere=True)
+    with_, without = (
+        render.image(here, quality=many, variant=SCALAR, effects=effects)[rows_columns]
+        for effects in (active, active - {"interreflection"})
+    )
+    assert light[near].sum() == pytest.approx((with_ - without)[near].sum(), rel=0.05)
