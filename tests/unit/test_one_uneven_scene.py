@@ -17,6 +17,7 @@ from imaging.geometry.projection import edge_points, project
 from imaging.light.appearance import edge_contrast, side_signals
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
+from render.renderer import _defocus
 from tests.oracle import axes, torrance_sparrow
 
 FULL = 1023  # of ten bits
@@ -228,6 +229,16 @@ def test_defocus_is_that_of_each_edge_s_depth(scene):
     for depth in (101.0, 110.0, 118.0):
         radius = lens.aperture_radius * abs(depth - lens.focus) / depth * camera.focal_px / lens.focus
         assert float(blur_at(camera, np.array(depth))) == pytest.approx(math.hypot(0.7, radius / 2), rel=1e-12)
+
+
+def test_a_render_reaches_as_far_as_the_corner_that_is_least_in_focus(scene, picture):
+    """Its circle of confusion, by the marginal ray; corners lie at both sides of the plane in focus, or beyond it."""
+    lens = scene.camera.lens
+    out, _, _ = axes(SENSOR)
+    depths = scene.camera.distance - (scene.solid.vertices - np.array(scene.camera.look_at)) @ out
+    radii = lens.aperture_radius * np.abs(depths - lens.focus) / depths * scene.camera.focal_px / lens.focus
+    assert _defocus(picture) == pytest.approx(radii.max(), rel=1e-9)
+    assert radii.max() > 1.2 * radii.min()
 
 
 def test_predicted_variances_are_those_of_dense_points(scene, picture):
