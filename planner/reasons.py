@@ -67,7 +67,8 @@ def _short(evaluated: Errors, edges: list[int]) -> str:
 
 def _faint(evaluated: Errors, edges: list[int]) -> str:
     least = least_contrast(evaluated)
-    worst = min(edges, key=lambda e: round(float(np.nan_to_num(evaluated.contrast[e] / least[e])), 6))
+    share = np.nan_to_num(evaluated.contrast) / np.maximum(least, np.finfo(float).tiny)  # no noise at the scale's end
+    worst = min(edges, key=lambda e: round(float(share[e]), 6))
     if not evaluated.contrast[worst] > 0:
         return f"no light reaches edge {evaluated.measurands.view.names[worst]}, or both sides of it are alike"
     return (

@@ -101,7 +101,7 @@ def test_json_and_picture(monkeypatch, capsys, tmp_path):
     assert sorted(m["pictures"] for m in two["measurands"]) == [[1], [2]]
     assert all(m["sigma"] == m["single"][m["pictures"][0] - 1]["sigma"] for m in two["measurands"])
     assert found["check"]["verdict"].startswith("agree")
-    assert found["pictures"] == [str(out / "views.png")]
+    assert found["pictures"] == [str(out / "views.png"), str(out / "plan.html")]
     assert (out / "views.png").read_bytes()[:4] == b"\x89PNG"
 
 

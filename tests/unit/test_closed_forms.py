@@ -200,7 +200,7 @@ def test_records_of_a_plan_are_the_candidates(task1):
     ("pose", "place"), [((30.0, 0.0), (30, 0)), ((40.0, 90.0), (0, 40)), ((60.0, 210.0), (-30 * 3**0.5, -30))]
 )
 def test_a_pose_is_drawn_at_its_polar_angle_and_azimuth(pose, place):
-    assert map_figure._place(*pose) == pytest.approx(place, abs=1e-9)
+    assert map_figure.place(*pose) == pytest.approx(place, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["printed_label", "grey_floor", "two_lights"])

@@ -138,7 +138,7 @@ class _Told:
 
 class _Forecast:
     def __init__(self, status):
-        self.status = status
+        self.status, self.reason = status, ""
 
 
 def test_a_first_look_is_worth_what_is_predicted_there():
