@@ -36,7 +36,7 @@ from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
-_LEAST, _MOST = 2, 6  # renders of other rays
+_ROUGH, _LEAST, _MOST = 4, 3, 6  # renders of other rays: with few rays, with all; two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
@@ -143,7 +143,7 @@ def of_render(
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
-    Where light takes random ways, two renders of few rays do if their noise is below a tenth of sigma or a hundredth of
+    Where light takes random ways, four renders of few rays do if their noise is below a tenth of sigma or a hundredth of
     the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
     """
     return _simulated(picture, method, how)
@@ -173,7 +173,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
 
     images: Images | None = None
     if how.active(picture) & MANY_WAYS:
-        few = tuple(how.rough.image(picture, seed) for seed in range(_LEAST))
+        few = tuple(how.rough.image(picture, seed) for seed in range(_ROUGH))
         images = _completed(picture, few, (), how)
         found = of(images)
         if _is_quiet(found):

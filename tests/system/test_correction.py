@@ -231,12 +231,12 @@ def test_light_from_the_floor_is_part_of_the_contrast():
 
 @pytest.mark.parametrize(
     ("rough", "fine", "tolerance", "renders", "few", "all_"),
-    [(0.02, 0.0, None, 2, 2, 0), (3.0, 0.02, None, 2, 2, 2), (3.0, 3.0, None, 6, 2, 6), (3.0, 3.0, 3.0, 2, 2, 0)],
+    [(0.02, 0.0, None, 4, 4, 0), (3.0, 0.02, None, 3, 4, 3), (3.0, 3.0, None, 6, 4, 6), (3.0, 3.0, 3.0, 4, 4, 0)],
 )
 def test_rays_are_added_until_their_noise_does_not_matter(
     small_task1, monkeypatch, rough, fine, tolerance, renders, few, all_
 ):
-    """Exact images with noise in the place of the renderer's: two of few rays do, or two of all, or six at most.
+    """Exact images with noise in the place of the renderer's: four of few rays do, or three of all, or six at most.
 
     A tolerance of which the noise is less than a hundredth needs no more.
     """
