@@ -143,8 +143,8 @@ def of_render(
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
-    Where light takes random ways, four renders of few rays do if their noise is below a tenth of sigma or a hundredth of
-    the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
+    Where light takes random ways, four renders of few rays do if their noise is below a tenth of sigma or a hundredth
+    of the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
     """
     return _simulated(picture, method, how)
 
