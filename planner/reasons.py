@@ -59,10 +59,17 @@ def _short(evaluated: Errors, edges: list[int]) -> str:
     whole = view.lengths - view.trims.sum(-1)
     worst = min(edges, key=lambda e: round(float(whole[e]), 6))
     free = float(view.lengths[worst] * np.ptp(view.shown[worst]))
-    least = free - float(whole[worst]) + MIN_USABLE
-    seen = "is" if free > 0.999 * view.lengths[worst] else f"of {view.lengths[worst]:.3g} px is hidden but for"
-    length = f"{free:.3g} px long" if seen == "is" else f"{free:.3g} px"
-    return f"edge {view.names[worst]} {seen} {length} in this picture; at least {least:.3g} are needed"
+    lost = free - float(whole[worst])
+    seen = "is" if free > 0.999 * view.lengths[worst] else f"of {_px(view.lengths[worst])} px is hidden but for"
+    length = f"{_px(free)} px long" if seen == "is" else f"{_px(free)} px"
+    ends = f": {_px(lost)} at its ends lie too near to other edges" if lost > free else ""
+    return (
+        f"edge {view.names[worst]} {seen} {length} in this picture; at least {_px(lost + MIN_USABLE)} are needed{ends}"
+    )
+
+
+def _px(length: float) -> str:
+    return f"{length:.0f}" if length >= 100 else f"{length:.3g}"
 
 
 def _faint(evaluated: Errors, edges: list[int]) -> str:

@@ -614,6 +614,14 @@ def test_meshes_have_stated_limits(tmp_path):
         mesh.read(path)
 
 
+@pytest.mark.parametrize("first", ["solid", "solid a box", "  SOLID A BOX", "solid\ta box"])
+def test_a_text_of_triangles_tells_no_number_of_them(first, tmp_path):
+    """STL as text: what stands where other files have their number of triangles is a word."""
+    path, text = tmp_path / "box.stl", trimesh.creation.box((1, 2, 3)).export(file_type="stl_ascii")
+    path.write_text(first + "\n" + text.split("\n", 1)[1])
+    assert len(mesh.read(path).faces) == 6
+
+
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
 def test_sizes_of_1e12_and_empty_meshes_are_one_line(suffix, tmp_path):
     path = tmp_path / f"a.{suffix}"

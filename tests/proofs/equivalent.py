@@ -93,6 +93,13 @@ EQUIVALENT: dict[str, str] = {
     "measure/photo/profiles.py: steep = np.clip(rise / np.sign(rise.sum()), 0, None) ** 2": "a sign is 1 or -1",
     "validation/report/page_tables.py: main, others, printed = rows[-1].main.method, other_methods(found.rows), "
     "is_printed(found)": "all rows of a run are of one method",
+    "imaging/models/bound.py: seen = known.view.visible & (required >= 0).any(-1)":
+        "an edge has both of its ends in the arrangement, or none",
+    "imaging/models/moments.py: lights = pictures.lights[-1]": "a scene whose signal is separable has one light",
+    "scenes/parts/step_kernel.py: kind = str(adaptor.GetType()).rsplit(\"_\", 2)[-1].lower()":
+        "the last part is the same",
+    "validation/hard/fit_cases.py: return Answer(float(fit.tilt[ -1] if place == \"tilt\" else end[0]))":
+        "of one line the first is the last",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds

@@ -67,21 +67,23 @@ def test_third_derivative_is_the_second_one_s(rng):
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.125, 0.3, 0.8])
-def test_sampling_moves_an_edge_along_a_column(phase):
-    """The crossing of the sum over pixels of an exactly averaged step, found by bisection: 0.0075 px sin(phase).
+@pytest.mark.parametrize(("scale", "second_order"), [(1.0, 5e-4), (1.2, 6e-5), (0.8, 1e-2)])
+def test_sampling_moves_an_edge_along_a_column(phase, scale, second_order):
+    """The crossing of the sum over pixels of an exactly averaged step, found by bisection: at a scale of 1 px 0.0075 px
+    sin(phase).
 
-    1e-4 px: its second order.
+    1e-4 px: its second order, which grows and falls with its square.
     """
     image = polygon_image(np.array([[20.0 + phase, -30], [90, -30], [90, 90], [20.0 + phase, 90]]), (1, 41), 0.6)[0]
 
     def second(x):
         away = np.arange(41) - x
-        return image @ ((away**2 - 1) * np.exp(-(away**2) / 2))
+        return image @ ((away**2 - scale**2) * np.exp(-(away**2) / scale**2 / 2))
 
     shift = brentq(second, 19.6 + phase, 20.4 + phase) - 20 - phase
     middle = np.array([20 + phase, 3.7])
-    down, slope = sampled_line(middle, np.array([0.0, 1.0]), np.array(30.0), 0.6, 1.0)  # its normal points to -x
-    assert -down == pytest.approx(shift, abs=5e-4)
+    down, slope = sampled_line(middle, np.array([0.0, 1.0]), np.array(30.0), 0.6, scale)  # its normal points to -x
+    assert -down == pytest.approx(shift, abs=second_order)
     assert slope == pytest.approx(0.0, abs=1e-12)
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import planner
-from measure.fitting import sides, start
+from measure.fitting import fit, sides, start
+from measure.fitting.noise import by_repetition
 from measure.fitting.parameters import Parameters
-from measure.fitting.photograph import Shots
+from measure.fitting.photograph import Pixels, Shots
 from scenes import Picture
 
 
@@ -82,3 +83,38 @@ def test_faces_come_into_sight_within_six_standard_errors(edge, turns, monkeypat
     monkeypatch.setattr(sides, "facing", facing)
     monkeypatch.setattr(sides, "sensor_position", lambda camera, sensor: sensor)
     assert sides._turns_away(SimpleNamespace(parameters=parameters), values, 1, which, white) is turns
+
+
+@pytest.mark.parametrize("chosen", [0, 5, 8])
+def test_the_setting_whose_picture_is_most_alike_is_begun_with(task1, chosen):
+    """A photograph of any, moved, brighter and noisy, tells from where it was taken; a pose that is given is taken."""
+    camera = task1.camera.model_copy(update={"width": 112, "height": 104, "focal_px": 350.0})
+    scene = task1.model_copy(update={"camera": camera, "settings": task1.settings[:12]})
+    setting = scene.settings[chosen]
+    shots = moved(Picture.of(scene, setting.sensor, setting.lights), 3, -2, 1.2, 5.0)
+    noisy = Shots(shots.mean + np.random.default_rng(chosen).normal(0, 1, shots.mean.shape), 1, None, (0,))
+    found = fit._nearest(scene, noisy, None, None, scene.noise)
+    assert found.sensor == setting.sensor
+    told = fit._nearest(scene, noisy, (20, 60), (25, 300), scene.noise)
+    assert (tuple(told.sensor), tuple(told.lights[0])) == ((20, 60), (25, 300))
+
+
+def test_repeated_photographs_tell_each_pixels_noise():
+    """Of the pixels that are looked at the variance over the repetitions, of one less than so many squares."""
+    rng = np.random.default_rng(3)
+    images = [rng.normal(100, 3, (9, 11)) for _ in range(5)]
+    pixels = Pixels(np.array([4, 7]), np.array([2, 8]), (1, 1, 2))
+    signal, variance, freedom = by_repetition(Shots.of(images, (0, 1, 2, 3, 4)), pixels, np.array([50.0, 60.0]))
+    assert signal.tolist() == [50.0, 60.0]
+    expected = [np.var([image[y, x] for image in images], ddof=1) for x, y in ((4, 2), (7, 8))]
+    assert variance == pytest.approx(expected, rel=1e-9)
+    assert freedom == 4
+
+
+def test_what_is_left_is_told_in_noise_and_in_a_percent_of_the_range(monkeypatch):
+    """The mean square over noise's and 0.01 of the range's, both squared, of levels that were made up."""
+    observed, expected = np.array([10.0, 30.0, 50.0, 90.0]), np.array([11.0, 27.0, 50.0, 95.0])
+    problem = SimpleNamespace(observed=lambda: observed, expected=lambda values, noise: expected)
+    monkeypatch.setattr(start, "_problem", lambda parameters, shots, values, share: problem)
+    left = start._left(None, (), np.zeros(2), SimpleNamespace(variance=3.0), 0.1)
+    assert left == pytest.approx((1 + 9 + 25) / 4 / (3.0 + 0.8**2), rel=1e-9)

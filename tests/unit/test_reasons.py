@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planner
+from imaging.features.locator import MIN_USABLE
 from imaging.geometry.projection import project
 from scenes.status import allowed, corrected, unsure
 
@@ -30,7 +31,7 @@ def test_a_short_edge_says_how_long_it_is_and_how_long_it_must_be(task1):
     far = task1.with_(camera={**task1.camera.model_dump(), "distance": task1.camera.distance * 9})
     each = bad(far, (30, 135), (15, 315), "short")
     name = re.search(r"e\d+", each.reason)[0]
-    length, least = numbers(each.reason)
+    length, least = numbers(each.reason)[:2]
     assert length == pytest.approx(length_px(far, name, (30, 135)), rel=0.01)  # margin: three digits are told
     assert length < least
     closer = task1.camera.distance * 9 * 0.9 * length / least
@@ -57,6 +58,31 @@ def test_what_is_not_seen_is_named(task1):
     each = bad(task1, (150, 40), (15, 315), "not_visible")
     assert each.reason.startswith("the camera does not see ")
     assert set(re.findall(r"e\d+", each.reason)) <= set(task1.required)
+
+
+def test_a_flat_corner_says_at_which_angle_its_edges_meet(task1):
+    """Of two corners the flatter one is named, with the angle between its edges' images."""
+    camera = task1.camera.model_dump()
+    large = {key: camera[key] * 20 for key in ("width", "height", "focal_px")}
+    low = task1.with_(object={"kind": "block", "size": [12.5, 7.5, 2.5]}, camera={**camera, **large})
+    sensor = (88.3, 230)
+    each = bad(low, sensor, (30, 200), "ill_conditioned")
+    one, other = re.findall(r"e\d+", each.reason)
+    ways = []
+    for name in (one, other):
+        a, b = project(low.solid.vertices[list(low.solid.edge(name).ends)], np.array(sensor), low.camera)
+        ways.append((b - a) / np.hypot(*(b - a)))
+    angle, least = numbers(each.reason)
+    # margin: two digits are told
+    assert angle == pytest.approx(np.degrees(np.arcsin(abs(np.linalg.det(ways)))), rel=0.06)
+    assert angle < least
+    assert least == pytest.approx(np.degrees(np.arcsin(0.02)), rel=0.06)  # margin: two digits are told
+    flatter = task1.with_(object={"kind": "block", "size": [12.5, 7.5, 2.5]})
+    each = bad(flatter, (88.5, 230), (30, 200), "short")
+    length, least, lost = numbers(each.reason)
+    assert length < lost
+    assert least - lost == pytest.approx(MIN_USABLE, abs=1)
+    assert each.reason.endswith(f"{lost:.0f} at its ends lie too near to other edges")
 
 
 def test_a_doubt_says_what_is_allowed_where_the_status_changes():

@@ -81,6 +81,14 @@ def test_walls_of_holes_are_hollow():
         assert each.residual < 1e-8
 
 
+@pytest.mark.parametrize("far", [(900.0, 0.0, 0.0), (0.0, -900.0, 0.0), (-900.0, 900.0, 0.0)])
+@pytest.mark.parametrize("hollow", [False, True])
+def test_what_is_hollow_is_so_anywhere(hollow, far):
+    """A tube's two walls, far off the origin and off its axis."""
+    found = cylinders(solid(trimesh.creation.annulus(2.0, 3.0, 5.0).apply_translation(far)))
+    assert [each.surface.hollow for each in found if (each.surface.radius < 2.5) == hollow] == [hollow]
+
+
 def test_a_cone_a_box_and_a_ball_are_none():
     for mesh in (
         trimesh.creation.cone(2.0, 3.0, sections=48),

@@ -1,5 +1,7 @@
 """Light and shadow on turned parts: against integrals, conservation and rays."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
@@ -12,6 +14,7 @@ from imaging.light import revolved
 from imaging.light.revolved import light_around, passes, rings_of
 from imaging.pictures import Pictures
 from scenes import Turned
+from scenes.parts.surfaces import axes_beside
 
 STEP = Turned(kind="turned", profile=[(0.0, 6.0), (20.0, 6.0), (20.0, 10.0), (30.0, 10.0)]).solid
 CONES = Turned(kind="turned", profile=[(-9.0, 3.0), (-2.0, 5.0), (-2.0, 6.5), (3.0, 4.0), (8.0, 7.0)]).solid
@@ -79,6 +82,15 @@ def test_shadows_are_those_of_rays(solid):
     traced = np.array(rays) > 1 - 1e-6
     assert (free == traced).mean() > 0.98  # margin: a share, which is 1 at most
     assert not traced.all()
+
+
+@pytest.mark.parametrize(("off", "turned"), [(4e-6, True), (4e-4, False)])
+def test_an_axis_that_rounding_moved_is_the_same(off, turned):
+    """Walls of a part 30 long, one axis off by a ten millionth of it, or by a hundred thousandth."""
+    one, other = STEP.curved
+    surface = dataclasses.replace(other.surface, point=other.surface.point + off * axes_beside(other.surface.axis)[0])
+    moved = dataclasses.replace(STEP, curved=(one, dataclasses.replace(other, surface=surface)))
+    assert revolved._is_turned(moved) == turned
 
 
 def test_other_parts_have_no_rings():

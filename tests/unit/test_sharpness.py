@@ -6,11 +6,12 @@ import cv2
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.stats import chi2
 
 import measure
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
-from measure.photo.blur import side_blur
+from measure.photo.blur import SideBlur, side_blur
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import smooth_patches
 from measure.photo.uneven import orders
@@ -81,6 +82,29 @@ def test_modulation_transfer(side):
     six = np.arange(-2.5, 3)[:, None] * normal[0] * found.frequency[low]
     seen = np.abs(np.cos(2 * np.pi * six).mean(0)) * transfer(found.frequency[low], normal, 0.8)
     assert moved.mtf[low] == pytest.approx(seen, abs=4e-3)
+
+
+def test_an_edge_as_sharp_as_its_samples_has_no_mtf50():
+    """Of two levels alone the transfer stays above a half at all frequencies that are looked at."""
+    found = measure.mtf(np.where(clean() > 92.5, 135.0, 50.0), CORNERS, 0)
+    assert found.mtf.min() > 0.5
+    assert np.isnan([found.mtf50, found.mtf50_error]).all()
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_sides_differ_where_chance_would_seldom_make_them(count):
+    """One in a thousand, by the chi-square of one less than the sides: just above and just below; one side never."""
+    error = np.array([0.01, 0.03, 0.02, 0.05])[:count]
+    away = np.array([1.0, -1.0, 0.5, -0.2])[:count]
+    limit = chi2.isf(1e-3, count - 1)
+    told = []
+    for factor in (1.01, 0.99):
+        weight = error**-2
+        centred = away - (away * weight).sum() / weight.sum()
+        sigma = 0.8 + centred * np.sqrt(factor * limit / ((centred / error) ** 2).sum())
+        told.append(SideBlur(sigma, error, *np.ones((3, count)), None).differs)
+    assert told == [True, False]
+    assert not SideBlur(sigma[:1], error[:1], *np.ones((3, 1)), None).differs
 
 
 def test_standard_error_of_mtf50(rng):
