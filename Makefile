@@ -70,6 +70,7 @@ reference: $(VENV)/.installed
 	$(BIN)/python -m tests.regression.test_documents $$(mktemp -d)
 	$(BIN)/python -m tests.regression.test_numbers
 	$(BIN)/python -m tests.unit.test_fields
+	$(BIN)/python -m tests.unit.test_defaults
 
 # A run killed 20 times ends with the numbers of an unbroken one.
 proof: $(VENV)/.installed

@@ -38,7 +38,8 @@ from tests.proofs.slips import SLIPS, places, slipped
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ("scenes", "imaging", "planner", "measure", "render", "validation")
-READERS = ["tests/unit/test_frozen.py"]  # tests that read the code
+# tests that read the code
+READERS = ["tests/unit/test_frozen.py", "tests/unit/test_defaults.py::test_no_default_changes_unnoticed"]
 FIELDS = ["tests/unit/test_fields.py", "tests/unit/test_reference.py::test_page_and_schema_are_up_to_date"]
 STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py")  # what was said once
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")

@@ -1,12 +1,15 @@
-"""What holds where nobody says otherwise is said once."""
+"""What holds where nobody says otherwise is said once, and no public default changes without a word."""
 
+import ast
 import inspect
+from pathlib import Path
 
 import pytest
 
 from measure.features.optics import Optics
 from planner import plan
 from scenes import Locator, Noise
+from tests.regression.stored import read, write
 from validation import run
 from validation.batch.options import RunOptions
 from validation.cli.batch import validate_command
@@ -16,6 +19,10 @@ from validation.cli.plan import plan_command
 from validation.cost.goal import reach
 from validation.cost.sweep import sweep
 from validation.cost.trial import trial
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = "scenes", "imaging", "planner", "measure", "render", "validation"
+STORED = ROOT / "tests" / "regression" / "defaults.json"
 
 
 @pytest.mark.parametrize("function", [run, RunOptions, sweep, validate_command, cost_command, calibrate_command])
@@ -44,3 +51,48 @@ def test_one_locator():
     optics, locator = Optics((10, 10)), Locator()
     assert (optics.scale_px, optics.window_px) == (locator.scale_px, locator.window_px) == (1.0, 3.0)
     assert (optics.noise_variance, optics.dark_level, optics.sensor) == (1.0, 0.0, Noise(sigma=1.0))
+
+
+def defaults(text):
+    """What a module's public functions, methods and dataclasses take where nothing is said, as it is written."""
+    found = {}
+    for name, node in _public(ast.parse(text).body):
+        if isinstance(node, ast.FunctionDef):
+            plain, named = node.args.args[len(node.args.args) - len(node.args.defaults) :], node.args.kwonlyargs
+            pairs = zip([*plain, *named], [*node.args.defaults, *node.args.kw_defaults], strict=True)
+            told = {argument.arg: ast.unparse(value) for argument, value in pairs if value is not None}
+        else:
+            fields = [each for each in node.body if isinstance(each, ast.AnnAssign) and each.value is not None]
+            told = {ast.unparse(each.target): ast.unparse(each.value) for each in fields}
+        if told:
+            found[name] = told
+    return found
+
+
+def _public(nodes, before=""):
+    for node in nodes:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield f"{before}{node.name}", node
+            if isinstance(node, ast.ClassDef):
+                yield from _public(node.body, f"{before}{node.name}.")
+
+
+def every_default():
+    """Of all modules, by file."""
+    paths = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    told = {str(path.relative_to(ROOT)): defaults(path.read_text(encoding="utf-8")) for path in paths}
+    return {file: each for file, each in told.items() if each}
+
+
+def test_no_default_changes_unnoticed():
+    """A default that changes is named in the CHANGELOG, and stored anew: ``python -m tests.unit.test_defaults``."""
+    assert every_default() == read(STORED)
+
+
+def test_defaults_are_read_of_functions_methods_and_records():
+    text = "def f(a, b=1, *, c, d='x'): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\ndef _h(i=0): ..."
+    assert defaults(text) == {"f": {"b": "1", "d": "'x'"}, "A": {"n": "3"}, "A.g": {"e": "None"}}
+
+
+if __name__ == "__main__":
+    write(STORED, every_default())
