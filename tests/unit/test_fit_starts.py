@@ -118,3 +118,26 @@ def test_what_is_left_is_told_in_noise_and_in_a_percent_of_the_range(monkeypatch
     monkeypatch.setattr(start, "_problem", lambda parameters, shots, values, share: problem)
     left = start._left(None, (), np.zeros(2), SimpleNamespace(variance=3.0), 0.1)
     assert left == pytest.approx((1 + 9 + 25) / 4 / (3.0 + 0.8**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("lefts", [[0.4], [9.0, 0.3], [9.0, 7.0, 8.0, 6.0]], ids=["at once", "second", "never"])
+def test_poses_around_are_tried_where_much_is_left(lefts, monkeypatch):
+    """The nominal pose alone where it explains the photograph; else the most alike of 26 around it, until one does."""
+    turned, followed = [], []
+
+    def turn(parameters, values, by):
+        turned.append(by)
+        return np.array([float(len(turned))])
+
+    def follow(parameters, shots, values, noise):
+        followed.append(float(values[0]))
+        return values, lefts[min(len(followed), len(lefts)) - 1]
+
+    monkeypatch.setattr(start, "_aligned", lambda parameters, shots, values, noise: values)
+    monkeypatch.setattr(start, "_turned", turn)
+    monkeypatch.setattr(start, "_followed", follow)
+    monkeypatch.setattr(start, "_left", lambda parameters, shots, values, noise, share: abs(float(values[0]) - 17.2))
+    best = start.near(SimpleNamespace(start=lambda: np.zeros(1)), (), None)
+    assert len(set(turned)) == (0 if len(lefts) == 1 else 26)
+    assert followed == [0.0, 17.0, 18.0, 16.0, 19.0][: len(lefts) if lefts[-1] < 1 else 1 + start._KEPT]
+    assert best[0] == followed[int(np.argmin([lefts[min(i, len(lefts) - 1)] for i in range(len(followed))]))]

@@ -1,5 +1,7 @@
 """Ellipses and chessboards under noise that is not white: the told covariance is that of re-shots."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -86,6 +88,15 @@ def test_rows_of_a_board_are_its_derivatives(rng):
     still, moved = measured(clean, grid, 1.0), measured(clean + noise, grid, 1.0)
     told = respond(clean, still, grid) @ noise.ravel()
     assert told == pytest.approx((moved.corners - still.corners).ravel(), abs=0.1 * np.abs(told).max())
+
+
+def test_a_board_of_which_nothing_is_measured_moves_with_no_pixel():
+    """A row of zeros for each coordinate of its 15 corners."""
+    clean, grid = board_picture()
+    still = measured(clean, grid, 1.0)
+    none = replace(still, status=("short",) * len(still.status))
+    rows = respond(clean, none, grid)
+    assert (rows.shape, rows.nnz) == ((30, clean.size), 0)
 
 
 def test_many_functions_of_few_pixels(rng):

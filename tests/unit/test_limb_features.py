@@ -11,8 +11,10 @@ from imaging.features.measurand import measurands
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
 from imaging.pose_scatter import _half_angle
+from measure.features import limbs
+from measure.features.optics import Optics
 from render import Quality
-from scenes import Ball, InvalidInput, Turned
+from scenes import Ball, InvalidInput, Picture, Turned
 from tests.proofs.centres import centre_at, scene_beside
 from tests.proofs.limbs import rows_at, scene_of
 from tests.proofs.silhouettes import LIMIT_PX, cone_of, silhouettes
@@ -169,3 +171,18 @@ def test_a_taper_seen_from_elsewhere_is_another():
     found = brentq(lambda by: opening(here, by) - opening(there), -0.05, 0.05)
     assert abs(change) > 1e-3  # margin: that there is a change to be told
     assert change == pytest.approx(found, rel=0.05)
+
+
+@pytest.mark.parametrize("larger", [0.1, 1.0, 4.0, 13.0])
+def test_places_are_at_most_two_smoothing_scales_apart(larger):
+    """As many times 64 as that takes, no more: of a limb's image of any size."""
+    scene = scenes.load("ball")
+    camera = scene.camera.model_dump()
+    scene = scene.with_(camera={**camera, "focal_px": camera["focal_px"] * larger})
+    picture, ball, optics = Picture.of(scene, (40, 30), (30, 200)), scene.solid.round("ball"), Optics.of(scene)
+    pictures = Pictures.of(picture)
+    length = np.nansum(limb_outline(ball, pictures.sensors, scene.camera).arc)
+    times = limbs._count(pictures, ball, optics) // 64
+    assert times * 64 == limbs._count(pictures, ball, optics)
+    assert length / (times * 64) <= 2 * optics.scale_px
+    assert times == 1 or length / ((times - 1) * 64) > 2 * optics.scale_px

@@ -91,6 +91,12 @@ def test_an_edge_as_sharp_as_its_samples_has_no_mtf50():
     assert np.isnan([found.mtf50, found.mtf50_error]).all()
 
 
+@pytest.mark.parametrize(("blur", "is_told"), [(0.13, True), (0.02, False)])
+def test_how_sharp_is_too_sharp(blur, is_told):
+    """A blur of half of what the pixels resolve is told still, one of a fifteenth is not."""
+    assert np.isfinite(side_blur(clean(blur), layout(), CURVE).sigma).all() == is_told
+
+
 @pytest.mark.parametrize("count", [2, 4])
 def test_sides_differ_where_chance_would_seldom_make_them(count):
     """One in a thousand, by the chi-square of one less than the sides: just above and just below; one side never."""
