@@ -185,23 +185,19 @@ def _may_meet(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> np.nd
     start, step = origins @ frame, vectors @ frame
     if not (step[:, 0] > 0).all():
         return every
-    low, high = _ends(plates.corners @ frame[:, 0])
+    ends = plates.corners @ frame[:, 0]
+    low, high = ends.min(0), ends.max(0)
     away = _ROUND * max(plates.farthest, np.abs(start).max())
     found = np.flatnonzero(high >= start[:, 0].min() - away)
     depths = np.maximum([low.min(), high.max()], start[:, :1])  # (n, 2)
     reached = start[:, None, 1:] + ((depths - start[:, :1]) / step[:, :1])[..., None] * step[:, None, 1:]
     for k in (0, 1):
-        low, high = _ends(plates.corners[:, found] @ frame[:, k + 1])
+        ends = plates.corners[:, found] @ frame[:, k + 1]
+        low, high = ends.min(0), ends.max(0)
         found = found[(high >= reached[..., k].min() - away) & (low <= reached[..., k].max() + away)]
     every[:] = False
     every[found] = True
     return every
-
-
-def _ends(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest of three rows, each (T,)."""
-    one, two, three = heights
-    return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
 
 
 def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.ndarray) -> np.ndarray:

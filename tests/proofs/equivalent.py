@@ -100,6 +100,8 @@ EQUIVALENT: dict[str, str] = {
         "the last part is the same",
     "validation/hard/fit_cases.py: return Answer(float(fit.tilt[ -1] if place == \"tilt\" else end[0]))":
         "of one line the first is the last",
+    "planner/search/varying.py: sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=False)":
+        "a slower way down to the same place",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds

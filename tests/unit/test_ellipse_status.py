@@ -6,6 +6,7 @@ import pytest
 import measure
 from measure.features.optics import Optics
 from measure.find import ellipse
+from measure.photo import ellipses
 from scenes import status
 from tests.oracle import polygon_image
 
@@ -24,3 +25,16 @@ def test_no_maximum(contrast, expected, monkeypatch):
     assert found.status == expected
     assert np.isnan(found.parameters).all()
     assert np.isnan(found.covariance).all()
+
+
+@pytest.mark.parametrize(
+    ("major", "minor", "whole"), [(149.0, 20.0, True), (151.0, 20.0, False), (151.0, 151.0, False)]
+)
+def test_large_ellipses_are_found_by_their_edge_points(major, minor, whole, monkeypatch):
+    """Large along the longer axis: there the likelihood of all pixels is not asked."""
+    asked = []
+    monkeypatch.setattr(ellipses, "fitted_ellipse", lambda *given: asked.append(1) or (None, status.LOW_CONTRAST))
+    none = measure.find_ellipse(np.zeros((70, 80)), TRUE, Optics((70, 80), 0.7, 4.0))
+    monkeypatch.setattr(ellipses, "ellipse_by_points", lambda *given: none)
+    ellipses._found(np.zeros((9, 9)), np.array([4.0, 4.0, major, minor, 0.0]), None, None, False)
+    assert bool(asked) == whole

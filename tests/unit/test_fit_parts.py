@@ -1,17 +1,21 @@
 """The parts of a fit: groups of photographs, noise curves, goodness of fit, parameters."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import planner
 from imaging.blurred.whole import signal_at
+from measure.fitting import fit as fit_module
 from measure.fitting.fit import _with_noise, fit
-from measure.fitting.goodness import p_value, parts
+from measure.fitting.goodness import _score, p_value, parts
 from measure.fitting.likelihood import Problem
 from measure.fitting.noise import Curve, by_neighbours, curve
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots, grouped
 from scenes import InvalidInput, Noise, Picture, Pose
+from scenes.photograph import Photograph
 
 
 @pytest.fixture(scope="module")
@@ -178,3 +182,45 @@ def test_sigma_and_gain_are_told_with_the_noise_s_own_covariance():
     told = Curve(4.0, 0.1, np.array([[1.0, 0.3], [0.3, 0.25]]), 50.0)
     found = _with_noise(np.array([[7.0]]), told, Noise(sigma=2.0))
     assert found == pytest.approx(np.array([[7, 0, 0], [0, 1 / 16, 0.3 / 4], [0, 0.3 / 4, 0.25]]))
+
+
+@pytest.mark.parametrize(("squares", "rounds"), [(40.0, 2), (60.0, 1)])
+def test_what_is_far_off_is_not_fitted_twice(squares, rounds, monkeypatch):
+    """Above 50 of the noise's variance, 9 here, what is left is no noise: weights and noise are not sought again."""
+    fitted = []
+    left = np.sqrt(9.0 * squares) * np.array([1.0, -1.0])
+    problem = SimpleNamespace(
+        variance=lambda values, noise: np.full(2, 9.0), observed=lambda: left,
+        expected=lambda values, noise: np.zeros(2), jacobian=lambda values, noise, which: np.ones((2, 1)),
+    )  # fmt: skip
+    monkeypatch.setattr(fit_module, "Problem", lambda *given: problem)
+    monkeypatch.setattr(fit_module, "most_likely", lambda *given: fitted.append(1) or np.zeros(1))
+    parameters = SimpleNamespace(pictures_at=lambda values, k: None)
+    white = fit_module._solved(parameters, (), np.zeros(1), None, np.array([0]), False)[3][1]
+    assert len(fitted) == rounds
+    assert white.tolist() == [[1 / 3], [1 / 3]]
+
+
+def test_what_the_parameters_explain_already_is_no_direction_of_a_score(rng):
+    """Of two columns of a camera's habits one is a sum of the Jacobian's, to rounding: one freedom is left."""
+    jacobian, white = rng.normal(size=(50, 3)), rng.normal(size=50)
+    other = rng.normal(size=50)
+    along = np.stack([jacobian @ [1.0, -2.0, 0.5], other], 1)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    found = _score(white, along, jacobian, covariance)
+    across = other - jacobian @ np.linalg.lstsq(jacobian, other, rcond=None)[0]
+    assert found.freedom == 1
+    assert found.squares == pytest.approx((across @ white) ** 2 / (across @ across), rel=1e-9)
+    assert _score(white, along[:, :1], jacobian, covariance) == (0.0, 0.0)
+    twice = _score(white, np.stack([other, 3 * other], 1), jacobian, covariance)
+    assert twice == pytest.approx(found, rel=1e-6)
+
+
+@pytest.mark.parametrize("known", [(True, True), (True, False), (False, True), (False, False)])
+def test_a_tone_curve_is_known_where_every_photograph_tells_it(task1, known, monkeypatch):
+    """One that does not say how its levels were made leaves it open."""
+    told = []
+    monkeypatch.setattr(fit_module, "_fitted", lambda *given: told.append(given[-1]))
+    image = planner.image(Picture.of(task1, (30, 135), (15, 315)))
+    fit(task1, [Photograph(image, 255.0, tone_known=each) for each in known], (30, 135), (15, 315))
+    assert told == [all(known)]

@@ -67,3 +67,18 @@ def test_what_is_near_is_drawn_over_what_is_far():
     turned = (scene.solid.normals[scene.solid.triangle_faces] * (eye - middles)).sum(1) > 0
     assert sorted(which) == np.flatnonzero(turned).tolist()
     assert (np.diff(np.linalg.norm(eye - middles[which], axis=1)) <= 1e-9).all()
+
+
+@pytest.mark.parametrize(("spans", "longest"), [([(0.0, 0.5), (0.8, 1.0)], 0), ([(0.0, 0.1), (0.4, 0.9)], 1)])
+def test_a_name_stands_at_the_longest_part_of_an_edge_that_is_seen(spans, longest, monkeypatch):
+    scene, figure = scenes.load("task1"), plt.figure()
+    view = scene_figure._View(scene, Pose(30, 135))
+    monkeypatch.setattr(scene_figure, "visible_spans", lambda *given: spans)
+    try:
+        scene_figure._edge(figure.add_subplot(), view, scene.solid.edges[3])
+    finally:
+        plt.close(figure)
+    start, stop = view.image(scene.solid.vertices[list(scene.solid.edges[3].ends)])
+    along = (view.names[0].places - start) @ (stop - start) / ((stop - start) @ (stop - start))
+    low, high = spans[longest]
+    assert low - 0.01 <= along.min() < along.max() <= high + 0.01

@@ -229,6 +229,26 @@ def test_the_sketch_is_to_scale(plate):
     assert "camera 100 cm away, 15.0° from the vertical, azimuth 85.0°; lamp 100 cm away" in station_sketch.told(plate)
 
 
+@pytest.mark.parametrize("name", ["plate", "two_lights"])
+def test_lamps_are_drawn_where_they_stand(name, monkeypatch):
+    """Each of the scene's, seen from the side and from above, in the scene's unit, with a ray to what is aimed at."""
+    scene, kept = scenes.load(name), []
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure))
+    station_sketch.draw(picture)
+    try:
+        for axis, (right, up) in zip(kept[0].axes, station_sketch.axes_of(picture), strict=True):
+            stars = [line.get_xydata()[0] for line in axis.lines if line.get_marker() == "*"]
+            polar, azimuth = np.radians([list(pose) for pose in picture.lights]).T
+            ways = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+            at = ways * [[light.distance] for light in scene.lights]
+            assert np.array(stars) == pytest.approx(np.stack([at @ right, at @ up], -1), abs=1e-6)
+            ends = [line.get_xydata()[1].tolist() for line in axis.lines if line.get_marker() == "None"]
+            assert all(star.tolist() in ends for star in stars)
+    finally:
+        plt.close(kept[0])
+
+
 def test_a_bars_parts_add_to_u_in_per_cent_of_the_tolerance(rig):
     found = planner.budget(rig)
     sources, table = budget_figure.parts(found.measurands, [0.02])
