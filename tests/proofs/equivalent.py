@@ -100,8 +100,14 @@ EQUIVALENT: dict[str, str] = {
         "the last part is the same",
     "validation/hard/fit_cases.py: return Answer(float(fit.tilt[ -1] if place == \"tilt\" else end[0]))":
         "of one line the first is the last",
-    "planner/search/varying.py: sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=False)":
+    "planner/search/varying.py: "
+    "sensor, light, turns, _ = descend(start, value, sizes=sizes, trusted=trust, fast=False)":
         "a slower way down to the same place",
+    "imaging/light/revolved.py: "
+    "origin, axis, near = walls[0].surface.point, walls[ -1].surface.axis, _SAME * solid.extent":
+        "all walls are about one axis",
+    "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
+        "a polygon's triangles may share any of its corners",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
