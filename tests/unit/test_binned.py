@@ -6,6 +6,7 @@ import pytest
 
 import measure
 from measure.estimators import reach
+from measure.photo import binned
 from measure.photo.binned import back, bin_size, into
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
@@ -35,6 +36,15 @@ def test_same_values_with_the_sigma_of_their_scatter(pictures, monkeypatch):
     assert 0.95 < (sigma / finer).mean() < 1.05
     assert coarse[0].blur_px == pytest.approx(BLUR, abs=0.035)
     assert coarse[0].noise == pytest.approx(SIGMA, rel=0.03)
+
+
+@pytest.mark.parametrize(("blur", "size"), [(0.4, 1), (0.74, 1), (0.76, 1), (1.6, 2), (4.6, 6)])
+def test_pixels_are_as_large_as_leaves_three_quarters_of_one_of_blur(blur, size, monkeypatch):
+    """One pixel at the least, and where sides are short, however blurred."""
+    monkeypatch.setattr(binned, "edge_sigma", lambda image, corners: blur)
+    for long, expected in ((True, size), (False, 1)):
+        monkeypatch.setattr(binned, "is_long", lambda length, told, long=long: long)
+        assert bin_size(np.zeros((9, 9)), CORNERS) == expected
 
 
 def test_points_go_into_larger_pixels_and_back():
