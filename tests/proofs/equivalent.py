@@ -106,6 +106,8 @@ EQUIVALENT: dict[str, str] = {
     "imaging/light/revolved.py: "
     "origin, axis, near = walls[0].surface.point, walls[ -1].surface.axis, _SAME * solid.extent":
         "all walls are about one axis",
+    "measure/boards/approximate.py: inner = [kept for part in parts if part is not None and "
+    "(kept := trimmed(grey, part)) is not None][: 2]": "what grows from another part of a board is the same board",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",
 }  # fmt: skip

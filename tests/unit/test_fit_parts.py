@@ -10,7 +10,7 @@ from imaging.blurred.whole import signal_at
 from measure.fitting import fit as fit_module
 from measure.fitting.fit import _with_noise, fit
 from measure.fitting.goodness import _score, p_value, parts
-from measure.fitting.likelihood import Problem
+from measure.fitting.likelihood import Problem, most_likely
 from measure.fitting.noise import Curve, by_neighbours, curve
 from measure.fitting.parameters import Parameters
 from measure.fitting.photograph import Pixels, Shots, grouped
@@ -224,3 +224,17 @@ def test_a_tone_curve_is_known_where_every_photograph_tells_it(task1, known, mon
     image = planner.image(Picture.of(task1, (30, 135), (15, 315)))
     fit(task1, [Photograph(image, 255.0, tone_known=each) for each in known], (30, 135), (15, 315))
     assert told == [all(known)]
+
+
+@pytest.mark.parametrize("begin", [-3.0, 0.0, 0.2, 1.0, 7.0])
+def test_a_search_begins_within_the_bounds(begin):
+    """Wherever it is told to begin: levels that grow with one parameter between 0 and 1."""
+    free = [SimpleNamespace(low=-np.inf, high=np.inf), SimpleNamespace(low=0.0, high=1.0)]
+    slope = np.array([1.0, 2.0, -3.0])
+    problem = SimpleNamespace(
+        parameters=SimpleNamespace(free=free), smooth=True, observed=lambda: 0.7 * slope,
+        expected=lambda values, noise: values[1] * slope + values[0],
+        jacobian=lambda values, noise, which: slope[:, None],
+    )  # fmt: skip
+    found = most_likely(problem, np.array([0.0, begin]), None, np.array([1]), 1.0)
+    assert found == pytest.approx([0.0, 0.7], abs=1e-4)
