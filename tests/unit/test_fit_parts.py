@@ -232,9 +232,9 @@ def test_a_search_begins_within_the_bounds(begin):
     free = [SimpleNamespace(low=-np.inf, high=np.inf), SimpleNamespace(low=0.0, high=1.0)]
     slope = np.array([1.0, 2.0, -3.0])
     problem = SimpleNamespace(
-        parameters=SimpleNamespace(free=free), smooth=True, observed=lambda: 0.7 * slope,
+        parameters=SimpleNamespace(free=free), smooth=False, observed=lambda: 0.7 * slope,
         expected=lambda values, noise: values[1] * slope + values[0],
-        jacobian=lambda values, noise, which: slope[:, None],
+        jacobian=lambda values, noise, which: slope[:, None], beside=lambda values, which: [],
     )  # fmt: skip
     found = most_likely(problem, np.array([0.0, begin]), None, np.array([1]), 1.0)
     assert found == pytest.approx([0.0, 0.7], abs=1e-4)
