@@ -33,7 +33,7 @@ class Where(Model):
         """Which faces are meant, bool, shape (F,)."""
         found = np.ones(len(solid.faces), bool)
         if self.normal is not None:
-            normal = np.array(self.normal) / np.linalg.norm(self.normal)
+            normal = np.array(self.normal)
             away = np.linalg.norm(np.cross(solid.normals, normal), axis=1), solid.normals @ normal
             found &= np.degrees(np.arctan2(*away)) <= self.within_deg + 1e-6
         if self.box is not None:

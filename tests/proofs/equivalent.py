@@ -108,6 +108,7 @@ EQUIVALENT: dict[str, str] = {
         "all walls are about one axis",
     "measure/boards/approximate.py: inner = [kept for part in parts if part is not None and "
     "(kept := trimmed(grey, part)) is not None][: 2]": "what grows from another part of a board is the same board",
+    "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",
 }  # fmt: skip

@@ -31,6 +31,15 @@ def test_a_point_is_imaged_from_the_cameras_distance(task1):
     assert Pose(*map(float, inputs.sensor)) == Pose(*SENSOR)
 
 
+@pytest.mark.parametrize(("camera", "light"), [(83.0, 61.0), (61.0, 140.0)])
+def test_sensor_and_light_stand_at_their_own_distances(task1, camera, light):
+    """The paper's model at 50 digits and the planner's, where the two are not as far away."""
+    told = task1.model_dump()
+    scene = task1.with_(camera={**told["camera"], "distance": camera}, light={"distance": light})
+    exact = precise_models.paper(scene, precise.Inputs.of(scene, SENSOR, LIGHT))
+    assert planner.predict(scene, SENSOR, LIGHT, "paper").variance_px2 == pytest.approx(float(exact), rel=1e-9)
+
+
 def test_the_poses_that_are_held_are_those_of_the_titles():
     """Of the figure about single precision: one moves, the other is held where its panel says."""
     asked, drawn = [], []
