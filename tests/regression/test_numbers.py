@@ -14,6 +14,7 @@ from tests.regression.numbers import (
     checking,
     exploring,
     files,
+    fitted,
     holes,
     inside,
     measuring,
@@ -33,7 +34,7 @@ pytestmark = pytest.mark.render
 STORED = Path(__file__).with_name("numbers.json")
 _ABOUT = (
     planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside, files, reporting,
-    exploring, running, refusing,
+    exploring, running, refusing, fitted,
 )  # fmt: skip
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 
