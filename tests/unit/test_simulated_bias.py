@@ -9,6 +9,9 @@ import pytest
 
 import measure
 import scenes
+from imaging.geometry.projection import project
+from imaging.models.texture import texture_errors
+from imaging.pictures import Pictures
 from measure import Correction, Images
 from measure.correction import _by_rays
 from render import Quality, Tolerance
@@ -252,3 +255,103 @@ def test_the_light_in_closed_form_is_what_exact_images_show(task1):
     expected = np.linalg.norm(np.array(values[1:]) - values[0], axis=0)
     told = np.concatenate(simulation._light_in_closed_form(picture))
     assert told == pytest.approx(expected, rel=0.6)  # margin: differences of 1e-4 px of a form of first order
+
+
+class _Rendered(How):
+    """A way to make images that are told apart by the seed alone, and that notes what was asked for."""
+
+    def image(self, picture, seed=0):
+        return np.full((picture.scene.camera.height, picture.scene.camera.width), float(seed))
+
+    def active(self, picture):
+        return frozenset({"interreflection"})
+
+
+@pytest.mark.parametrize(
+    ("noise", "count"), [(0.05, 1), (0.0706, 1), (0.0709, 2), (0.15, 5), (9.0, 6), (np.inf, 1)]
+)  # fmt: skip
+def test_as_many_renders_are_measured_as_make_their_noise_a_tenth_of_sigma(picture, noise, count, monkeypatch):
+    """The noise of one is the square root of two times that of the mean of two; the worst value counts, six at most."""
+    asked = []
+
+    def correction(images, *given):
+        asked.append(images)
+        return _made(picture, sources={"rendering": np.array([0.01, noise])}, covariance=np.eye(2), bias=np.zeros(2))
+
+    monkeypatch.setattr(simulation.measure, "correction", correction)
+    found = simulation.steadied(picture, np.zeros((2, 2)), Method("gradient"), _Rendered())
+    assert [each.flat[0] for each in found] == [0, *range(1000, 999 + count)]
+    assert [each.flat[0] for each in asked[0].renders] == [0, 1000]
+
+
+def test_an_image_without_random_light_is_measured_as_it_is(picture, monkeypatch):
+    monkeypatch.setattr(_Rendered, "active", lambda how, picture: frozenset({"shadows"}))
+    monkeypatch.setattr(simulation.measure, "correction", None)
+    assert len(simulation.steadied(picture, np.zeros((2, 2)), Method("gradient"), _Rendered())) == 1
+
+
+def test_a_mean_of_renders_is_taken_where_something_is_measured(picture):
+    """Elsewhere the first is kept; of one there is nothing to take."""
+    height, width = picture.scene.camera.height, picture.scene.camera.width
+    renders = tuple(np.full((height, width), level) for level in (10.0, 16.0, 19.0))
+    mean = simulation.mean_of(picture, renders)
+    assert set(np.unique(mean)) == {10.0, 15.0}
+    assert simulation.mean_of(picture, renders[:1]) is renders[0]
+    ends = picture.scene.solid.vertices[[v for e in ("e4", "e9") for v in picture.scene.solid.edge(e).ends]]
+    at = np.rint(project(ends.reshape(2, 2, 3).mean(1), np.array(list(picture.sensor)), picture.scene.camera)).astype(
+        int
+    )
+    assert [mean[y, x] for x, y in at] == [15.0, 15.0]
+    assert mean[0, 0] == mean[-1, -1] == 10.0
+
+
+def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture, monkeypatch):
+    """For each method, with what propagation says of it; those that are measured tell their own noise beside."""
+    asked = []
+    monkeypatch.setattr(simulation.measure, "correction", lambda *given: asked.append(given) or len(asked))
+    monkeypatch.setattr(simulation, "_completed", lambda *given: given)
+    measured = tuple(np.full((2, 2), -float(i)) for i in range(3))
+    methods = Method("strip", None), Method("isophote", 0.4)
+    how = _Rendered()
+    assert simulation.independent(picture, methods, measured, ("one", "two"), how) == (1, 2)
+    assert [(given[2], given[3], given[4]) for given in asked] == [("strip", None, "one"), ("isophote", 0.4, "two")]
+    of, renders, beside, told = asked[0][0]
+    assert (of, beside, told) == (picture, measured, how)
+    assert [each.flat[0] for each in renders] == [1, 2, 3]
+
+
+def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u(small_task1, monkeypatch):
+    """The simulation is of the part without them; u(bias) has what the closed form tells."""
+    asked = []
+
+    def quiet(picture, method, how):
+        asked.append(picture)
+        return _made(picture)
+
+    monkeypatch.setattr(simulation, "_until_quiet", quiet)
+    grain = {"kind": "statistical", "where": "top", "contrast": 0.1, "correlation": 0.3}
+    scene = small_task1.with_(textures=[grain])
+    picture, how = Picture.of(scene, *POSES), _Rendered()
+    found = simulation._simulated.__wrapped__(picture, Method("gradient"), how)
+    spread = texture_errors(Pictures.of(picture)).variances
+    assert asked[0].scene.textures == ()
+    assert (found.sources["texture"][0], found.sources_image["texture"][0]) == pytest.approx(
+        (spread[1][0] ** 0.5, spread[0][0] ** 0.5)
+    )
+    assert found.sources["rendering"].tolist() == [0.03]
+    plain = simulation._simulated.__wrapped__(Picture.of(small_task1, *POSES), Method("gradient"), how)
+    assert "texture" not in plain.sources
+
+
+def test_a_material_that_cannot_tell_how_it_reflects_less_leaves_the_bias_unknown(monkeypatch):
+    """On a hollow part; of one plain body it changes nothing but the scale."""
+    for name, plain in (("bracket", False), ("task1", True)):
+        scene = scenes.load(name)
+        picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+        assert simulation._of_unknown_kinds(picture) == {}
+        with monkeypatch.context() as changed:
+            changed.setattr(type(scene.material), "dimmed", lambda *given: None)
+            found = simulation._of_unknown_kinds(picture)
+        assert (found == {}) == plain
+        if not plain:
+            assert [each.tolist() for each in found["reflectance"]] == [[np.inf] * len(scene.quantities)] * 2
