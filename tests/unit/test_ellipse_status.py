@@ -1,5 +1,8 @@
 """What is said of an ellipse for which the likelihood has no maximum."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +10,11 @@ import measure
 from measure.features.optics import Optics
 from measure.find import ellipse
 from measure.photo import ellipses
+from measure.photo.noise_curve import NoiseCurve
+from measure.photo.photograph import _quantities
+from measure.photo.recording import recording
 from scenes import status
+from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 
 TRUE = np.array([40.3, 35.7, 14.0, 14.0, 0.0])
@@ -38,3 +45,30 @@ def test_large_ellipses_are_found_by_their_edge_points(major, minor, whole, monk
     monkeypatch.setattr(ellipses, "ellipse_by_points", lambda *given: none)
     ellipses._found(np.zeros((9, 9)), np.array([4.0, 4.0, major, minor, 0.0]), None, None, False)
     assert bool(asked) == whole
+
+
+@pytest.mark.parametrize("contrast", [20.0, 60.0])
+def test_a_picture_without_noise_is_weighted_by_a_millionth_of_its_range(contrast):
+    """Or a fit of exact levels would divide by nothing."""
+    t = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
+    outline = np.column_stack([TRUE[0] + 14 * np.cos(t), TRUE[1] + 14 * np.sin(t)])
+    photo = Photograph(polygon_image(outline, (70, 80), 0.7, contrast))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ellipses, "recording", lambda image: silent(recording(image)))
+        found = ellipses.measure_ellipse(photo, TRUE)
+    assert found.noise == pytest.approx(1e-6 * np.ptp(photo.levels), rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["circle", "ellipse"])
+def test_diameters_and_axes_are_twice_what_is_fitted_and_so_are_their_errors(kind):
+    """Places and the angle as they are."""
+    told = SimpleNamespace(kind=kind, parameters=np.array([30.0, 40.0, 9.0, 7.0, 25.0]), covariance=np.diag(
+        [0.01, 0.04, 0.09, 0.16, 0.25]))  # fmt: skip
+    found = {each.name: (each.value, pytest.approx(each.sigma, rel=1e-12), each.unit) for each in _quantities(told)}
+    places = {"centre x": (30.0, 0.1, "px"), "centre y": (40.0, 0.2, "px")}
+    axes = {"axis a": (18.0, 0.6, "px"), "axis b": (14.0, 0.8, "px"), "angle": (25.0, 0.5, "deg")}
+    assert found == places | ({"diameter": (18.0, 0.6, "px")} if kind == "circle" else axes)
+
+
+def silent(seen):
+    return replace(seen, curve=NoiseCurve(0.0, 0.0, 0.0, 0.0, None))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from measure.photo import compression
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import REACH, correlation
 from measure.photo.noise_curve import noise_curve, scale_of
@@ -127,3 +128,10 @@ def test_jpeg_is_seen(quality, sigma, rng):
     packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
     assert is_compressed(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE)[3:, 6:])
     assert not is_compressed(image)
+
+
+def test_the_cosines_of_a_block_are_at_right_angles_and_of_length_one():
+    """So that what is next to zero is told in the step of grey levels; none of them has a mean."""
+    cosines = compression._cosines().astype(float)
+    assert cosines.T @ cosines == pytest.approx(np.eye(63), abs=1e-5)
+    assert np.abs(cosines.sum(0)).max() < 1e-5  # margin: single precision of 64 numbers

@@ -66,6 +66,23 @@ def test_noise_of_vertices_is_the_residual():
     assert found.residual == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.parametrize("quarter", [False, True])
+def test_the_axis_is_that_of_the_residual(quarter, rng):
+    """Distances of noisy vertices from the axis that is told, less the radius, have the residual that is told."""
+    sections = 48
+    angle = np.linspace(0, 2 * np.pi / (4 if quarter else 1), sections, endpoint=quarter)
+    radii = 2.0 + 1e-5 * rng.normal(size=sections)
+    ring = np.stack([radii * np.cos(angle), radii * np.sin(angle)], 1)
+    wall = np.concatenate([np.column_stack([ring, np.full(sections, z)]) for z in (0.0, 5.0)])
+    corners = [[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]] if quarter else np.empty((0, 3))
+    mesh, frame = turned(trimesh.convex.convex_hull(np.concatenate([wall, corners])), 11)
+    found = cylinders(solid(mesh))[0]
+    away = wall @ frame.T + [3.0, -2.0, 7.0] - found.surface.point
+    off = np.linalg.norm(np.cross(away, found.surface.axis), axis=1) - found.surface.radius
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(found.residual, rel=1e-6)
+    assert found.residual < 1.2e-5
+
+
 def test_walls_of_holes_are_hollow():
     """A bracket's two bores of unequal facets, turned in space: radii 4 and 5 mm, 12 and 6 mm deep."""
     mesh, frame = turned(bracket(angles=unevenly(np.random.default_rng(2), 60)), 4)
