@@ -108,6 +108,10 @@ EQUIVALENT: dict[str, str] = {
         "all walls are about one axis",
     "measure/boards/approximate.py: inner = [kept for part in parts if part is not None and "
     "(kept := trimmed(grey, part)) is not None][: 2]": "what grows from another part of a board is the same board",
+    "measure/fitting/likelihood.py: return there if any(np.not_equal(each, lit[ 1]).any() for each in lit) else []":
+        "that all are alike may be asked of any of them",
+    "measure/fitting/goodness.py: share = np.maximum(level, -0.999999999) / max(float(level.max()), 1e-9)":
+        "what is not above 0 is limited in the next line",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",

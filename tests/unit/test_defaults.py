@@ -54,19 +54,24 @@ def test_one_locator():
 
 
 def defaults(text):
-    """What a module's public functions, methods and dataclasses take where nothing is said, as it is written."""
+    """What a module's public functions, methods and dataclasses take, and where nothing is said, as it is written."""
     found = {}
     for name, node in _public(ast.parse(text).body):
         if isinstance(node, ast.FunctionDef):
-            plain, named = node.args.args[len(node.args.args) - len(node.args.defaults) :], node.args.kwonlyargs
-            pairs = zip([*plain, *named], [*node.args.defaults, *node.args.kw_defaults], strict=True)
-            told = {argument.arg: ast.unparse(value) for argument, value in pairs if value is not None}
+            if node.args.defaults or node.args.kwonlyargs:
+                found[name] = _bare(node.args)
         else:
             fields = [each for each in node.body if isinstance(each, ast.AnnAssign) and each.value is not None]
             told = {ast.unparse(each.target): ast.unparse(each.value) for each in fields}
-        if told:
-            found[name] = told
+            found |= {name: told} if told else {}
     return found
+
+
+def _bare(arguments):
+    """How a function is called, without annotations."""
+    for each in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+        each.annotation = None
+    return ast.unparse(arguments)
 
 
 def _public(nodes, before=""):
@@ -90,8 +95,10 @@ def test_no_default_changes_unnoticed():
 
 
 def test_defaults_are_read_of_functions_methods_and_records():
-    text = "def f(a, b=1, *, c, d='x'): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\ndef _h(i=0): ..."
-    assert defaults(text) == {"f": {"b": "1", "d": "'x'"}, "A": {"n": "3"}, "A.g": {"e": "None"}}
+    text = (
+        "def f(a, b: int=1, *, c, d='x'): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\ndef _h(i=0): ..."
+    )
+    assert defaults(text) == {"f": "a, b=1, *, c, d=0", "A": {"n": "3"}, "A.g": "self, e=None"}
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import planner
 from imaging.blurred.whole import signal_at
 from measure.fitting import fit as fit_module
 from measure.fitting.fit import _with_noise, fit
-from measure.fitting.goodness import _score, p_value, parts
+from measure.fitting.goodness import _curved, _score, p_value, parts
 from measure.fitting.likelihood import Problem, most_likely
 from measure.fitting.noise import Curve, by_neighbours, curve
 from measure.fitting.parameters import Parameters
@@ -238,3 +238,13 @@ def test_a_search_begins_within_the_bounds(begin):
     )  # fmt: skip
     found = most_likely(problem, np.array([0.0, begin]), None, np.array([1]), 1.0)
     assert found == pytest.approx([0.0, 0.7], abs=1e-4)
+
+
+@pytest.mark.parametrize("brightest", [0.4, 3.0, 200.0])
+def test_a_curved_response_is_the_derivative_of_a_power(brightest):
+    """Of (level / brightest)^gamma at gamma 1, over the noise, by central differences; darkness and less has none."""
+    level = brightest * np.array([1.0, 0.6, 0.03, 0.0, -0.2])
+    found = _curved(level / 2.0, level)[:, 0]
+    step, share = 1e-6, np.array([1.0, 0.6, 0.03])
+    expected = brightest * (share ** (1 + step) - share ** (1 - step)) / (2 * step) / 2.0
+    assert found == pytest.approx([*expected, 0.0, 0.0], rel=1e-6, abs=1e-6 * brightest)

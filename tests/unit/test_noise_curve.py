@@ -2,6 +2,7 @@
 ones."""
 
 from functools import lru_cache
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from measure.photo import compression
+from measure.photo import noise_curve as noise_curve_module
 from measure.photo.compression import is_compressed
 from measure.photo.correlation import REACH, correlation
 from measure.photo.noise_curve import noise_curve, scale_of
@@ -135,3 +137,17 @@ def test_the_cosines_of_a_block_are_at_right_angles_and_of_length_one():
     cosines = compression._cosines().astype(float)
     assert cosines.T @ cosines == pytest.approx(np.eye(63), abs=1e-5)
     assert np.abs(cosines.sum(0)).max() < 1e-5  # margin: single precision of 64 numbers
+
+
+@pytest.mark.parametrize("step", [0.0, 1.0, 16.0])
+def test_groups_of_patches_are_no_surer_than_rounding_allows(step):
+    """The standard error is that of a chi-square, of no less variance than rounding alone makes."""
+    levels, variances = np.linspace(10, 90, 16), np.geomspace(1e-4, 40.0, 16)
+    level, variance = np.repeat(levels, 130), np.repeat(variances, 130)
+    patches = SimpleNamespace(level=level, variance=variance, freedom=46.0, pixels=np.zeros((2080, 49)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(noise_curve_module, "before_rounding", lambda pixels, surface, variance, step: variance - 0.5)
+        found, before, error = noise_curve_module._groups(patches, step)
+    assert found == pytest.approx(levels, rel=1e-9)
+    assert before == pytest.approx(variances - (0.5 if step else 0.0), rel=1e-9)
+    assert error == pytest.approx(np.maximum(variances, step**2 / 12) * np.sqrt(2 / (46 * 130)), rel=1e-6)
