@@ -112,6 +112,10 @@ EQUIVALENT: dict[str, str] = {
         "that all are alike may be asked of any of them",
     "measure/fitting/goodness.py: share = np.maximum(level, -0.999999999) / max(float(level.max()), 1e-9)":
         "what is not above 0 is limited in the next line",
+    "measure/fitting/noise.py: dark, gain = min(float(np.average(variance, weights=freedom)), 1e-9), 0.0":
+        "where rounds of scoring begin that end at one place",
+    "planner/search/bound.py: _DEGREE = 8  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the "
+    "smooth functions here": "one degree more of what is exact",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",

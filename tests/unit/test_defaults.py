@@ -95,10 +95,8 @@ def test_no_default_changes_unnoticed():
 
 
 def test_defaults_are_read_of_functions_methods_and_records():
-    text = (
-        "def f(a, b: int=1, *, c, d='x'): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\ndef _h(i=0): ..."
-    )
-    assert defaults(text) == {"f": "a, b=1, *, c, d=0", "A": {"n": "3"}, "A.g": "self, e=None"}
+    text = "def f(a, b: int=1, *, c, d=0): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\n"
+    assert defaults(text + "def _h(i=0): ...") == {"f": "a, b=1, *, c, d=0", "A": {"n": "3"}, "A.g": "self, e=None"}
 
 
 if __name__ == "__main__":

@@ -40,6 +40,17 @@ def test_positions_keep_off_the_border(x, y):
     assert (places <= np.array([81, 71]) + 1e-9).all()  # margin: kept by its kind
 
 
+@pytest.mark.parametrize(("window", "scale"), [(3.0, 1.6), (4.5, 0.7)])
+def test_the_border_is_kept_off_by_what_the_locator_sees(window, scale):
+    """Of an outline that just touches that much room all places are there, of one that is farther out not."""
+    optics, margin = Optics((80, 90), 0.8, 1.0, scale, window), window + 4 * scale + 1
+    counts = []
+    for x in (margin + 10 + 0.01, margin + 10 - 0.3):
+        counts.append(len(_positions(to_symmetric(np.array([x, 39.0, 10.0, 10.0, 0.0])), optics, 1.0)[0]))
+    assert counts[0] == int(20 * np.pi / scale)
+    assert counts[1] < counts[0]
+
+
 @pytest.mark.parametrize("circle", [False, True])
 def test_start_of_exact_points(circle):
     """From a pixel off to the ellipse on which the valid points lie; the others do not count; four are too few."""
