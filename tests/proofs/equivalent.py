@@ -116,6 +116,10 @@ EQUIVALENT: dict[str, str] = {
         "where rounds of scoring begin that end at one place",
     "planner/search/bound.py: _DEGREE = 8  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the "
     "smooth functions here": "one degree more of what is exact",
+    "validation/cost/size.py: work.measure_chunk(sized, image, seed, 0, 3)":
+        "how many images are measured first, whose time does not count",
+    "measure/features/blurred_ellipse.py: return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)":
+        "of two axes the second is the last",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",

@@ -64,8 +64,9 @@ def test_contrast_is_inside_less_outside_over_the_noise():
     coarse = SimpleNamespace(levels=lambda at: 7.0 * at[:, 0] ** 2, noise=2.0)
     expected = np.median(7 * ((places[:, 0] - 3) ** 2 - (places[:, 0] + 3) ** 2)) / 2
     assert contrast(coarse, places, normals) == pytest.approx(expected)
-    for sum_, sign in ((0.1, 1), (0.0, 1), (-0.1, -1)):
-        told = SimpleNamespace(across=lambda *given, told=sum_: np.array([[1.0, -1.0, told]]))
+    for outside, sign in ((0.6, 1), (0.5, 1), (0.4, -1)):  # the rise a pixel inside, at the outline, and outside
+        rises = {-1.0: -2.0, 0.0: 1.5, 1.0: outside}
+        told = SimpleNamespace(across=lambda at, along, asked, rises=rises: np.array([[rises[each] for each in asked]]))
         assert sign_of(told, places, normals) == sign
 
 
