@@ -18,7 +18,7 @@ from imaging.geometry.projection import edge_points, facing, project_ideal
 from imaging.light.appearance import face_signal
 from imaging.pictures import Pictures
 from render.phenomena.base import Influence, largest
-from scenes import Scene
+from scenes import Curved, Scene
 
 NEAR_STEP = float(np.exp(-0.5))
 _FRACTIONS = np.linspace(0.03, 0.97, 24)
@@ -49,6 +49,20 @@ class Sides(NamedTuple):
         """Where shading puts the edge, px towards the second face, shape (S, E, n)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return variance * self.slopes.sum(2) / self.contrast
+
+
+def brightest(pictures: Pictures) -> float:
+    """Highest level above darkness beside a required edge, or on a facet of a required curved surface."""
+    scene, solid = pictures.scene, pictures.scene.solid
+    found = sides(pictures).levels.max() if required(scene) else 0.0
+    walls = [solid.round(name) for name in circles(scene)]
+    facets = [face for wall in walls if isinstance(wall, Curved) for face in wall.faces]
+    shown = np.isin(solid.triangle_faces, facets)
+    if not shown.any():
+        return float(found)
+    faces = solid.triangle_faces[shown]
+    levels = face_signal(pictures, solid.triangles[shown].mean(1), faces, 1)
+    return float(max(found, np.where(facing(solid, pictures.sensor_at)[..., faces], levels, 0.0).max()))
 
 
 def sides(pictures: Pictures, *, fall_off: bool = True) -> Sides:
@@ -141,14 +155,17 @@ def lever(pictures: Pictures) -> np.ndarray:
 def required(scene: Scene) -> tuple[str, ...]:
     """The straight edges that are needed, then those around the face of each circle, which stand for it.
 
-    Of a face with none pieces of the circle itself do. The longest sharp edges where nothing is asked for.
+    Of a face with none pieces of the circle itself do; nothing stands for a curved surface. The longest sharp edges
+    where nothing is asked for.
     """
     solid, names = scene.solid, list(straight(scene))
     if not scene.features:
         return tuple(edge.name for edge in sorted(solid.sharp or solid.edges, key=solid.length, reverse=True)[:_MOST])
     rims = {name for circle in solid.circles for name in circle.edges}
     for name in circles(scene):
-        circle = solid.circle(name)
+        circle = solid.round(name)
+        if isinstance(circle, Curved):
+            continue
         beside = [edge.name for edge in solid.edges if circle.face in edge.faces and edge.name not in rims]
         pieces = circle.edges[:: max(1, len(circle.edges) // _STAND_INS)]
         names += (beside or pieces)[:_STAND_INS]

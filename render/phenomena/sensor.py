@@ -9,16 +9,16 @@ from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.pictures import Pictures
 from imaging.sensor import shot_noise
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed
-from render.phenomena.edges import sides
+from render.phenomena.edges import brightest
 from scenes import Scene
 
 
 def _brightest(pictures: Pictures) -> float:
-    """Highest level above darkness beside a required edge."""
+    """Highest level above darkness that is measured, or behind it."""
     scene = pictures.scene
     floor = scene.camera.exposure * scene.floor.reflectance if scene.floor else 0.0
     behind = sum(scene.camera.exposure * scene.lights[which].intensity for which in backlights(scene))
-    return max(float(sides(pictures).levels.max()), floor, behind)
+    return max(brightest(pictures), floor, behind)
 
 
 def _relative(part: float, rest: float) -> Influence:

@@ -8,6 +8,8 @@ import scenes
 from imaging.geometry.projection import direction
 from planner import Pictures
 from render.phenomena import EFFECTS, Tolerance, choose
+from render.phenomena.edges import brightest
+from render.phenomena.register import of_settings
 from scenes import Floor, InvalidInput, Noise, Obstacle, Picture, Pose
 from scenes.load import load, names
 
@@ -131,3 +133,17 @@ def test_costs(task1):
     assert {name: effect.cost >= 1 for name, effect in every.items()} == dict.fromkeys(EFFECTS, True)
     free = {name for name, effect in every.items() if effect.cost == 1}
     assert free == {name for name, effect in every.items() if "costs nothing" in effect.switch}
+
+
+@pytest.mark.parametrize("name", ["ball", "shaft_ring", "flange"])
+def test_curved_surfaces_reach_the_end_of_the_scale(name):
+    """The brightest facet that is seen tells it; of the ball, of which nothing else is seen, as a render does."""
+    scene = scenes.load(name).with_(noise={"bits": 8, "gain": 0.05})
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    level = brightest(of_settings(scene, picture))
+    seen = render.image(picture, quality=render.Quality(supersample=2, edge_samples=4)).max() - scene.noise.dark_level
+    assert level == pytest.approx(seen, rel=0.01) if name == "ball" else 0.5 * seen < level < 1.01 * seen
+    for exposure, said in ((1.0, False), (255 / level, True)):
+        brighter = scene.with_(camera={"exposure": exposure * scene.camera.exposure})
+        told = {each.effect.name: each for each in render.effects(brighter)}
+        assert told["saturation"].on == said

@@ -5,7 +5,10 @@ import functools
 import scenes
 from scenes import Pose
 
-# what no bundled scene shows: other lights, and things around holes and limbs
+_NOISE = {"sigma": 2.1, "bits": 10, "gain": 0.06, "dark_level": 23.0, "prnu": 0.004, "dsnu": 0.4}
+
+# what no bundled scene shows: other lights, things around holes and limbs, and distances, scales and
+# noises of which no two are alike, or 0 or 1
 _CHANGED = {
     "block under a disc": ("task1", {"light": {"kind": "disc", "distance": 61.0, "radius": 7.0}}),
     "block under a bar": ("task1", {"light": {"kind": "bar", "distance": 47.0, "length": 31.0, "width": 3.0,
@@ -24,6 +27,17 @@ _CHANGED = {
                                      "settings": [{"sensor": [12.0, 70.0], "light": [31.0, 81.0]}]}),
     "block through a lens": ("wedge", {"camera": {"lens": {"distortion": [-0.11, 0.05, 0.002, -0.001, 0.01]},
                                                   "roll_deg": 13.0}}),
+    "block of unequal numbers": ("task1", {
+        "camera": {"distance": 83.0, "look_at": [1.1, -0.7, 0.6], "roll_deg": 13.0, "blur_px": 0.75, "exposure": 230.0,
+                   "lens": {"aperture_radius": 0.4, "focus": 81.0}},
+        "light": {"distance": 61.0}, "locator": {"scale_px": 1.4, "window_px": 3.7}, "noise": _NOISE,
+        "jitter": {"sensor_deg": 0.05, "light_deg": 0.1}}),
+    "plate of unequal numbers": ("plate", {
+        "camera": {"distance": 91.0, "look_at": [0.9, -0.4, 0.3], "roll_deg": -21.0, "blur_px": 0.5},
+        "light": {"distance": 67.0}, "locator": {"scale_px": 0.85, "window_px": 3.3}, "noise": _NOISE}),
+    "ball of unequal numbers": ("ball", {
+        "camera": {"distance": 171.0, "look_at": [0.4, -0.9, 9.1], "roll_deg": 8.0, "blur_px": 0.8},
+        "light": {"distance": 290.0}, "locator": {"scale_px": 1.3, "window_px": 3.9}, "noise": _NOISE}),
 }  # fmt: skip
 
 
