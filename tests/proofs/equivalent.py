@@ -120,6 +120,20 @@ EQUIVALENT: dict[str, str] = {
         "how many images are measured first, whose time does not count",
     "measure/features/blurred_ellipse.py: return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)":
         "of two axes the second is the last",
+    "validation/cost/points.py: total = density.sum(1)": "of two axes the second is the last",
+    "imaging/contours/limb.py: return turn / (moved * tangent).sum(1)": "of two axes the second is the last",
+    "measure/find/four_sides.py: "
+    "lines.append(cv2.fitLine(used, cv2.DIST_HUBER, 0, -0.99, 0.01).ravel().astype(float))":
+        "how nearly a search for lines is done before it is refined",
+    "imaging/blurred/arrangement.py: "
+    "required=np.array([edge.ends if i in drawn else (-1, - 2) for i, edge in enumerate(required)]),":
+        "below 0 is below 0",
+    "imaging/blurred/model.py: "
+    "rise = scatter.by_piece(product, self.nodes.weight[:, None] * traced.tangent[:, ::-1] / [-1, 1])":
+        "divided by 1 or -1",
+    "imaging/sensor.py: _QUIETEST = 6  # grey levels that less noise reaches": "one level more has no probability",
+    "render/build.py: _BLOCK = 33  # fine pixels that share a stream of random numbers in scalar variants; else it "
+    "depends on the processor": "which random numbers are whose",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",

@@ -1,14 +1,18 @@
 """Comparison of runs: how often it cries wolf, and what it must see."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
 from mpmath import mp
 from scipy import stats
 
 from scenes import InvalidInput
 from validation import comparison
+from validation.cli.compare import compare_command
 
 
 def document(rng, settings=4, n=1000, factor=1.0, shift=0.0, failed=0):
@@ -120,3 +124,15 @@ def test_a_pose_is_two_angles(rng, tmp_path, role, angles):
     (tmp_path / "result.json").write_text(json.dumps(told))
     with pytest.raises(InvalidInput, match=r"must be a run directory or its result\.json, got"):
         comparison.read(tmp_path)
+
+
+def test_what_only_one_run_has_is_named_by_its_first_and_counted(monkeypatch, capsys):
+    """Of both runs; nothing is said where they have the same settings."""
+    for before, after in ((["a", "b"], []), ([], ["c", "d", "e"])):
+        found = SimpleNamespace(text="t", changed=(), only_before=before, only_after=after, to_json=dict)
+        monkeypatch.setattr(comparison, "compare", lambda *given, found=found: found)
+        monkeypatch.setattr(comparison, "read", lambda path: path)
+        with pytest.raises(typer.Exit):
+            compare_command(Path("x"), Path("y"), 0.01)
+        words = "only before, not compared: 2, as a" if before else "only after, not compared: 3, as c"
+        assert capsys.readouterr().out == f"t\n  {words}\n"

@@ -1,6 +1,8 @@
 """Photographs in files: orientation, tone curve, channel, raw mosaic."""
 
+import contextlib
 import io
+import os
 
 import numpy as np
 import pytest
@@ -183,3 +185,17 @@ def test_a_raw_mosaic_has_one_channel_however_it_is_kept(shape, tmp_path, rng):
     np.save(tmp_path / "three.npy", 100 + rng.normal(size=(16, 20, 3)))
     with pytest.raises(InvalidInput, match=r"--bayer must go with a file of one channel, got .*three\.npy with 3"):
         photograph.read(tmp_path / "three.npy", bayer="RGGB")
+
+
+def test_what_decoders_say_of_broken_files_is_not_shown(tmp_path, capfd):
+    """They are written in C: to the process's own standard error, which is as it was afterwards."""
+    path = tmp_path / "a.jpg"
+    Image.fromarray(np.full((64, 64), 90, np.uint8)).save(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) - 40])
+    with contextlib.suppress(InvalidInput):
+        photograph.read(path)
+    with image_file._silent():
+        os.write(2, b"from C")
+    os.write(2, b"ours")
+    assert capfd.readouterr().err == "ours"

@@ -82,3 +82,16 @@ def test_a_name_stands_at_the_longest_part_of_an_edge_that_is_seen(spans, longes
     along = (view.names[0].places - start) @ (stop - start) / ((stop - start) @ (stop - start))
     low, high = spans[longest]
     assert low - 0.01 <= along.min() < along.max() <= high + 0.01
+
+
+def test_a_circles_name_stands_on_any_of_its_four_sides():
+    """Above it first, then right, left and below."""
+    scene, figure = scenes.load("plate"), plt.figure()
+    view = scene_figure._View(scene, Pose(20, 60))
+    try:
+        scene_figure._circle(figure.add_subplot(), view, scene.solid.circles[0])
+    finally:
+        plt.close(figure)
+    (above, right, left, below), rim = view.names[0].places, view.names[0].places
+    assert above[1] == rim[:, 1].min() < rim[:, 1].max() == below[1]
+    assert left[0] == rim[:, 0].min() < rim[:, 0].max() == right[0]

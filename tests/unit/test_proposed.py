@@ -7,7 +7,7 @@ import trimesh
 import planner
 import scenes
 from scenes import Pose
-from scenes.measurands.proposed import proposed
+from scenes.measurands.proposed import _tolerance, proposed
 from scenes.parts import mesh
 from scenes.parts.part_file import with_walls
 from scenes.parts.walls import recognised_walls
@@ -160,3 +160,12 @@ def test_of_each_sensor_the_best_light_is_looked_at_closely():
     worth = np.array([[1, 2, 0, 0], [5, 0, 7, 0], [0, 0, 0, 6]], float).ravel()
     assert first_look._apart(worth, 2) == [1 * 4 + 2, 2 * 4 + 3]
     assert first_look._apart(worth, 5) == [1 * 4 + 2, 2 * 4 + 3, 0 * 4 + 1]
+
+
+def test_lengths_and_what_they_may_be_off_are_the_standards():
+    """ISO 2768-1, class m: the last length of each range, and just beyond it; of small ones a fifth."""
+    table = {6: 0.1, 30: 0.2, 120: 0.3, 400: 0.5, 1000: 0.8, 2000: 1.2}
+    beyond = [*list(table.values())[1:], 2.0]
+    assert {length: _tolerance(length, "mm") for length in table} == table
+    assert [_tolerance(length + 0.01, "mm") for length in table] == beyond
+    assert (_tolerance(0.3, "mm"), _tolerance(40.0, "cm"), _tolerance(0.4001, "m")) == (0.06, 0.05, 0.0008)

@@ -12,6 +12,7 @@ import measure
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.photo.blur import SideBlur, side_blur
+from measure.photo.expected import optics_of
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.patches import smooth_patches
 from measure.photo.uneven import _inside, orders
@@ -154,3 +155,15 @@ def test_what_lies_within_a_polygon(turn, rng):
     expected = [cv2.pointPolygonTest(outline, place.tolist(), True) > 0 for place in places]
     assert _inside(places, corners).tolist() == expected
     assert 20 < sum(expected) < 180
+
+
+@pytest.mark.parametrize("corner", [(8.0, 9.0), (16.0, 16.0), (40.0, 30.0)])
+def test_the_noise_is_that_of_the_mean_level_around(corner):
+    """Within 16 px of the corners, and within the image: where no two rows or columns are alike."""
+    image = np.add.outer(np.geomspace(1, 4000, 90), np.geomspace(2, 9000, 110))
+    corners = np.array(corner) + np.array([[0.0, 0], [30, 2], [28, 25], [1, 22]])
+    curve = NoiseCurve(1.0, 0.5, 0.0, 0.0, None)
+    x0, y0 = np.maximum(np.floor(corners.min(0) - 16), 0).astype(int)
+    x1, y1 = np.ceil(corners.max(0) + 17).astype(int)
+    expected = curve.variance(image[y0:y1, x0:x1].mean())
+    assert optics_of(image, corners, 1.5, curve).noise_variance == pytest.approx(float(expected), rel=1e-12)

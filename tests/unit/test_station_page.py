@@ -215,6 +215,16 @@ def test_marks_lie_on_what_is_measured(plate):
     assert abs(along[0] * off[1] - along[1] * off[0]) / np.hypot(*along) < 1e-6
 
 
+def test_balloons_are_tied_to_what_lies_between_the_features(plate):
+    """Well within it, the middle first."""
+    tied = station_view._between(np.array([10.0, 40.0]), np.array([30.0, 20.0]))
+    share = (tied - [10.0, 40.0]) / [20.0, -20.0]
+    assert share[:, 0] == pytest.approx(share[:, 1])
+    assert share[0, 0] == pytest.approx(0.5)
+    assert ((share > 0.1) & (share < 0.9)).all()
+    assert len(np.unique(share[:, 0].round(6))) == len(tied) > 3
+
+
 def test_the_sketch_is_to_scale(plate):
     """From the side the camera stands at its distance, its polar angle from up; from above at the part of it across."""
     side, above = station_sketch.axes_of(plate)
