@@ -179,9 +179,14 @@ def _solved(parameters, shots, values, noise, which, estimated):
     return values, noise, told, (problem, white, variance)
 
 
+def _are_repeated(shots: tuple[Shots, ...]) -> bool:
+    """Whether of some pose there are several photographs."""
+    return any(each.count > 1 for each in shots)
+
+
 def _curve(problem: Problem, values: np.ndarray, noise: Noise) -> Curve:
     """Of repetitions where there are any, else of neighbours."""
-    repeated = any(each.count > 1 for each in problem.shots)
+    repeated = _are_repeated(problem.shots)
     found = []
     for k, shots in enumerate(problem.shots):
         signal = problem.signal(values, k)
@@ -226,11 +231,10 @@ def _result(parameters, shots, values, noise, told, errors, final, p, known) -> 
         whole = _with_noise(whole, told, noise)
         statuses = (*statuses, OK, OK)
     status = MISFIT if p < WORST else worst(tone, HELD if HELD in statuses else OK)
-    repeated = any(each.count > 1 for each in shots)
     return Fit(
         names, units, start, values, whole, statuses, status, p, scene, pictures,
         tuple(each.members for each in shots), tuple(_pictures_of(problem, rest)),
-        "given" if told is None else "repeated" if repeated else "estimated",
+        "given" if told is None else "repeated" if _are_repeated(shots) else "estimated",
     )  # fmt: skip
 
 

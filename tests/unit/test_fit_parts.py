@@ -248,3 +248,9 @@ def test_a_curved_response_is_the_derivative_of_a_power(brightest):
     step, share = 1e-6, np.array([1.0, 0.6, 0.03])
     expected = brightest * (share ** (1 + step) - share ** (1 - step)) / (2 * step) / 2.0
     assert found == pytest.approx([*expected, 0.0, 0.0], rel=1e-6, abs=1e-6 * brightest)
+
+
+@pytest.mark.parametrize(("counts", "repeated"), [((1, 1), False), ((1, 3), True), ((2, 1), True), ((2, 2), True)])
+def test_photographs_are_repeated_where_of_some_pose_there_are_several(counts, repeated):
+    shots = tuple(Shots(np.zeros((2, 2)), count, None, (0,)) for count in counts)
+    assert fit_module._are_repeated(shots) == repeated

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from imaging.blurred.boundaries import _SUPPORT, _interpolation
-from planner.search.bound import _DEGREE, _influence, _lagrange, _nodes
+from imaging.sensor import headroom, recorded
+from planner.search.bound import _DEGREE, _cut_off, _influence, _lagrange, _nodes
 
 
 def reproduced(weights, nodes, at, degree, rng):
@@ -39,3 +40,16 @@ def test_influence(rng):
         design = np.column_stack([np.ones(9), points[k]])
         expected = (np.array([a[k], b[k]]) @ np.linalg.pinv(design)) ** 2
         assert found[k] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("levels", [(300.0, 260.0), (245.0, 90.0), (150.0, 90.0), (234.5, 233.0)])
+def test_the_end_of_the_scale_never_raises_what_a_search_may_rely_on(levels, task1):
+    """The least factor of noise over squared contrast along an edge: 1 at the most, a little less where it is less."""
+    sides, r2 = np.array(levels) * 1e6 * np.ones((1, 1, 2)), np.full((1, 1, 9), 1e4)
+    with np.errstate(divide="ignore"):  # of no contrast
+        found = float(_cut_off(task1, sides, r2)[0, 0])
+    told, noise = recorded(task1.noise, task1.noise.dark_level + np.array(levels)), task1.noise
+    with np.errstate(divide="ignore"):
+        ratio = told.noise_variance.mean() / np.diff(told.level)[0] ** 2 * np.diff(levels)[0] ** 2 / noise.variance
+    hot = levels[0] > 0.99 * headroom(noise)
+    assert found == pytest.approx(min(0.98 * ratio, 1.0) if hot else 1.0, rel=1e-9)
