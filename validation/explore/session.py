@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import AsyncIterable, Awaitable, Callable
 from concurrent.futures import BrokenExecutor
@@ -41,8 +42,8 @@ def answered(scene: Scene, state: State, closely: bool) -> dict[str, Any]:
     message = {"type": "answer", **answers.to_message(told)}
     if told.prediction is not None:
         picture = state.picture(scene)
-        part = preview.window(scene, picture)
-        message["picture"] = preview.to_message("preview", preview.drawn(scene, picture, part), part)
+        part, draw = preview.window(scene, picture), preview.drawn if closely else preview.sketched
+        message["picture"] = preview.to_message("preview", draw(scene, picture, part), part)
         message["overlay"] = preview.overlay(scene, picture, told)
     return message | {"ms": 1e3 * (time.perf_counter() - began), "core_s": time.thread_time() - worked}
 
@@ -62,7 +63,7 @@ class Session:
         self._wake = asyncio.Event()
         self._after: asyncio.Task | None = None
         self._job: asyncio.Task | None = None
-        self._close_s = 0.0
+        self._close_s = math.inf  # nobody knows before the first
         self._refused = False
         self._sphere: tuple[tuple, np.ndarray] | None = None
         self._clean: tuple[tuple, Any] | None = None
