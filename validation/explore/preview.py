@@ -80,9 +80,14 @@ def drawn(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     return shades(scene, small + scene.noise.dark_level)
 
 
+def is_large(scene: Scene) -> bool:
+    """Whether there are so many triangles that drawing all of them takes longer than casting rays."""
+    return len(scene.bodies.triangles) >= _MANY
+
+
 def sketched(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     """The same, of a part of many triangles with fewer pixels and by rays, whose cost hardly grows with triangles."""
-    if len(scene.bodies.triangles) < _MANY or not has_embree():
+    if not is_large(scene) or not has_embree():
         return drawn(scene, picture, part)
     pictures, scale = glanced(picture), part.scale / _COARSE
     shape = max(1, round(part.height * scale)), max(1, round(part.width * scale))

@@ -20,7 +20,9 @@ from validation.explore.tools import Tools, open_tools
 PAGE = Path(__file__).parent / "page"
 _FILES = {"/": "index.html"} | {
     f"/{name}": name
-    for name in ("page.css", "page.js", "view.js", "picture.js", "panel.js", "labels.js", "history.js", "address.js")
+    for name in (
+        "page.css", "page.js", "view.js", "solid.js", "picture.js", "panel.js", "labels.js", "history.js", "address.js",
+    )  # fmt: skip
 }
 _MOST = 1 << 16  # bytes of a visitor's message
 _MOST_VISITORS = 16
