@@ -245,8 +245,8 @@ class Session:
 def scene_message(scene: Scene, state: State) -> dict[str, Any]:
     """What the page needs once: the object's triangles and needed edges, what is measured, and the first state.
 
-    Numbers of ``corners`` (three of each triangle) are multiples of ``step``, those of ``normals`` of 1 / 127: the bytes
-    of integers, base64.
+    Numbers of ``corners`` (three of each triangle) are multiples of ``step``, those of ``normals`` of 1 / 127:
+    integers' bytes, base64.
     """
     bodies, solid = scene.bodies, scene.solid
     middle = np.array(scene.camera.look_at)
