@@ -14,10 +14,12 @@ from tests.chromium import Page
 from validation.explore.server import serve
 from validation.explore.session import Place
 
-# Milliseconds from each state that was sent while something was dragged to its answer on the page, by number; the
-# newest state is always answered, those between may be left out.
+# Milliseconds from each state that was sent while something was dragged to its answer on the page, by number, and
+# seconds of the server's core for it; the newest state is always answered, those between may be left out.
 _WATCH = """(() => {
-  window.asked = {}; window.took = [];
+  window.asked = {}; window.took = []; window.cores = [];
+  if (window.watched) return true;
+  window.watched = true;
   const send = WebSocket.prototype.send;
   let moved = 0;
   addEventListener("pointermove", () => { moved = performance.now(); }, true);
@@ -29,7 +31,10 @@ _WATCH = """(() => {
   };
   new MutationObserver(() => {
     const number = explore.answered;
-    if (asked[number]) { took.push(performance.now() - asked[number]); delete asked[number]; }
+    if (!asked[number]) return;
+    took.push(performance.now() - asked[number]);
+    cores.push(explore.core_s);
+    delete asked[number];
   }).observe(document.getElementById("answer"), { subtree: true, childList: true, characterData: true });
   return true;
 })()"""
@@ -58,19 +63,25 @@ async def first_answer(page: Page, url: str) -> None:
 
 
 async def drag_lamp(page: Page, by: tuple[float, float], steps: int, pause: float) -> list[float]:
-    """Drag the lamp with the mouse; the milliseconds from each movement to its answer on the page."""
-    await page.value(_WATCH)
-    x, y = await page.value("window.explore.view.spot(0)")
-    await page.drag((x, y), by, steps, pause)
+    """Drag the lamp with the mouse and wait; the milliseconds from each movement to its answer on the page."""
+    times = await drag(page, 0, by, steps, pause)
     await settled(page)
+    return times
+
+
+async def drag(page: Page, which: int, by: tuple[float, float], steps: int, pause: float) -> list[float]:
+    """The same of the camera or a lamp, until the mouse stands still; the server's seconds are left in the page."""
+    await page.value(_WATCH)
+    x, y = await page.value(f"window.explore.view.spot({which})")
+    await page.drag((x, y), by, steps, pause)
     return await page.value("window.took")
 
 
-async def settled(page: Page) -> None:
+async def settled(page: Page, seconds: float = 30) -> None:
     """Wait until the last state that was sent is answered from a close look."""
     await asyncio.sleep(0.35)  # longer than the page waits before it says that nothing moves
-    await page.until("window.explore.answered === window.explore.number", 30)
-    await page.until("document.getElementById('sigma').dataset.closely !== 'false'", 30)
+    await page.until("window.explore.answered === window.explore.number", seconds)
+    await page.until("document.getElementById('sigma').dataset.closely !== 'false'", seconds)
 
 
 def told(times: list[float]) -> str:

@@ -24,6 +24,7 @@ from validation.explore.state import MOST_VIEWS, State
 from validation.explore.tools import Tools
 
 Send = Callable[[dict[str, Any]], Awaitable[None]]
+Work = Callable[..., Awaitable[None]]
 _LOG = logging.getLogger("validation.explore")
 _MOST_STEPS = 32767  # of the corners of triangles, as far as they reach
 _MOST_TOLD = 300  # characters of an error
@@ -117,9 +118,9 @@ class Session:
             self._wake.clear()
             state, rest, number = self._newest
             closely = self._close_s < _CLOSE_S
-            await self._guarded(self._answer(self._tools.quickly, state, closely, number))
+            await self._guarded(self._answer, self._tools.quickly, state, closely, number)
             if rest and not self._wake.is_set():
-                self._after = asyncio.create_task(self._guarded(self._rest(state, closely, number)))
+                self._after = asyncio.create_task(self._guarded(self._rest, state, closely, number))
 
     async def _answer(self, where: Callable, state: State, closely: bool, number: int) -> None:
         message = await where(answered, self._scene, state, closely)
@@ -171,13 +172,13 @@ class Session:
         if self._job is not None and not self._job.done():
             raise InvalidInput("another work must be finished or stopped before this, got one under way")
         work = {"best": self._best, "prove": self._prove, "render": self._show}[kind]
-        self._job = asyncio.create_task(self._working(kind, work(self.state)))
+        self._job = asyncio.create_task(self._working(kind, work, self.state))
 
-    async def _working(self, kind: str, work: Awaitable[None]) -> None:
+    async def _working(self, kind: str, work: Work, state: State) -> None:
         await self._send({"type": "job", "kind": kind, "state": "begun"})
         ending = "stopped"
         try:
-            await self._guarded(work)
+            await self._guarded(work, state)
             ending = "done"
         finally:
             await self._send({"type": "job", "kind": kind, "state": ending})
@@ -224,10 +225,10 @@ class Session:
         else:
             await self._send({"type": "saved", "path": str(path)})
 
-    async def _guarded(self, work: Awaitable[None]) -> None:
+    async def _guarded(self, work: Work, *arguments: Any) -> None:
         """Every error is told on the page; one that is neither bad input nor the loss of a process is logged, too."""
         try:
-            await work
+            await work(*arguments)
         except ConnectionError:  # the visitor has left
             pass
         except Exception as error:

@@ -131,7 +131,7 @@ const take = {
   answer(message) {
     if (message.number < window.explore.answered) return;
     window.explore.answered = message.number;
-    window.explore.ms = message.ms;
+    window.explore.core_s = message.core_s;
     latest = message;
     view.limiting = message.limiting;
     panel.answer(message, state, measurand);
