@@ -70,10 +70,11 @@ async def drag_lamp(page: Page, by: tuple[float, float], steps: int, pause: floa
 
 
 async def drag(page: Page, which: int, by: tuple[float, float], steps: int, pause: float) -> list[float]:
-    """The same of the camera or a lamp, until the mouse stands still; the server's seconds are left in the page."""
+    """The same of the camera or a lamp, until the last answer; the server's seconds are left in the page."""
     await page.value(_WATCH)
     x, y = await page.value(f"window.explore.view.spot({which})")
     await page.drag((x, y), by, steps, pause)
+    await page.until("window.explore.answered === window.explore.number", 60)
     return await page.value("window.took")
 
 
