@@ -1,16 +1,21 @@
-"""The page of `ice explore` in a browser, and how long it takes to answer."""
+"""The page of `ice explore` in a browser, and how long it takes to answer.
+
+``python -m tests.exploring SCENE FILE`` takes the page's picture when all is computed (docs/explore.md has one).
+"""
 
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import scenes
-from tests.chromium import Page
+from tests.chromium import Page, chromium
 from validation.explore.server import serve
 from validation.explore.session import Place
 
@@ -89,3 +94,18 @@ def told(times: list[float]) -> str:
     """One line about them."""
     part = np.percentile(times, [50, 90, 100])
     return f"{len(times)} answers, ms: median {part[0]:.0f}, 90 % {part[1]:.0f}, longest {part[2]:.0f}"
+
+
+async def pictured(name: str, file: Path) -> None:
+    """Write the page's picture, of 256 colours."""
+    async with served(name, file.parent) as url, chromium(1120, 788) as page:
+        await first_answer(page, url)
+        await settled(page, 120)
+        await page.until("document.getElementById('budget').children.length > 0", 120)
+        await page.screenshot(file)
+    with Image.open(file) as image:
+        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    asyncio.run(pictured(sys.argv[1], Path(sys.argv[2])))

@@ -58,7 +58,7 @@ class Session:
     """A visitor's state and the work that is under way for it.
 
     Of states that come faster than they can be answered the newest is taken and the others are left out. Where a close
-    look takes long, or of a large part before it is known, an answer is a glance. When a state is the last for a while
+    look takes long, or before that is known, an answer is a glance. When a state is the last for a while
     (``rest``) the close look, the sphere, the effects and the rendered picture follow, each of them given up as soon as
     another state comes.
     """
@@ -70,7 +70,7 @@ class Session:
         self._wake = asyncio.Event()
         self._after: asyncio.Task | None = None
         self._job: asyncio.Task | None = None
-        self._close_s = math.inf if preview.is_large(place.scene) else 0.0  # of the last one
+        self._close_s = math.inf  # of the last one
         self._refused = False
         self._sphere: tuple[tuple, np.ndarray] | None = None
         self._clean: tuple[tuple, Any] | None = None
@@ -132,7 +132,8 @@ class Session:
     async def _rest(self, state: State, closely: bool, number: int) -> None:
         """What follows when nothing moves; a long close look in a process, so that a movement is answered meanwhile."""
         if not (closely or self._refused):
-            await self._answer(self._tools.slowly, state, True, number)
+            first = math.isinf(self._close_s) and not preview.is_large(self._scene)
+            await self._answer(self._tools.quickly if first else self._tools.slowly, state, True, number)
         await self._colour(state)
         if self._refused:
             return
