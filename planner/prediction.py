@@ -82,6 +82,7 @@ class Prediction(Shown):
         The worst of all quantities:
         ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
         is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
+        ``glanced``: the same as ``ok``, but nobody has looked for a bias.
     measurands : tuple of Forecast
         One for each quantity.
     covariance, covariance_object : ndarray, shape (M, M)

@@ -98,7 +98,7 @@ def told(times: list[float]) -> str:
 
 async def pictured(name: str, file: Path) -> None:
     """Write the page's picture, of 256 colours."""
-    async with served(name, file.parent) as url, chromium(1120, 788) as page:
+    async with served(name, file.parent) as url, chromium(1280, 900) as page:
         await first_answer(page, url)
         await settled(page, 120)
         await page.until("document.getElementById('budget').children.length > 0", 120)

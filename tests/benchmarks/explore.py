@@ -49,6 +49,8 @@ async def dragged(page: Page, which: int) -> str:
     """The median until the answer, and processors' time of one."""
     before = await worked_for(page)
     times = await drag(page, which, (-60.0, 30.0), _STEPS, _PAUSE)
+    if not times:
+        return "no answer before rest"
     working = 1e3 * (await worked_for(page) - before) / len(times)
     served = 1e3 * float(np.median(await page.value("window.cores")))
     await settled(page, _MOST)

@@ -29,6 +29,7 @@ _LOG = logging.getLogger("validation.explore")
 _MOST_STEPS = 32767  # of the corners of triangles, as far as they reach
 _MOST_TOLD = 300  # characters of an error
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered without being asked for
+_LONG_S = 0.5  # of one core: a close look that takes longer is taken in a process
 _CLOSE_S = 0.08  # of one core: an answer that takes longer follows one from a glance, when nothing is dragged
 
 
@@ -132,8 +133,8 @@ class Session:
     async def _rest(self, state: State, closely: bool, number: int) -> None:
         """What follows when nothing moves; a long close look in a process, so that a movement is answered meanwhile."""
         if not (closely or self._refused):
-            first = math.isinf(self._close_s) and not preview.is_large(self._scene)
-            await self._answer(self._tools.quickly if first else self._tools.slowly, state, True, number)
+            is_long = self._close_s > _LONG_S if math.isfinite(self._close_s) else preview.is_large(self._scene)
+            await self._answer(self._tools.slowly if is_long else self._tools.quickly, state, True, number)
         await self._colour(state)
         if self._refused:
             return
