@@ -22,7 +22,7 @@ from planner.search.objective import DEFAULT_OBJECTIVE, Objective, minimised
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.measurands.features import place_of
 from scenes.results import Shown
-from scenes.status import WORST_FIRST
+from scenes.status import GLANCED, OK, WORST_FIRST
 from scenes.units import in_unit
 
 __all__ = ["DEFAULT_OBJECTIVE", "EdgePrediction", "Objective", "Prediction", "minimised", "predict", "variances"]
@@ -82,6 +82,7 @@ class Prediction(Shown):
         The worst of all quantities:
         ``ok``, ``clutter``, ``not_visible``, ``low_contrast``, ``short`` or ``ill_conditioned``. ``clutter``: the bias
         is above a quarter of sigma, or something too near for it to be trusted; not said of the ``bound``.
+        ``glanced``: the same as ``ok``, but nobody has looked for a bias.
     measurands : tuple of Forecast
         One for each quantity.
     covariance, covariance_object : ndarray, shape (M, M)
@@ -219,8 +220,8 @@ def predict(
         ``calibrated`` is absolute; ``paper`` follows the paper and has a free scale; ``bound`` is what no
         unbiased estimator can beat.
     closely : bool
-        Whether rims of circles are looked at closely (a quarter of a second where there are bores), or glanced at as by
-        the search of `plan`.
+        Whether edges' surroundings and rims of circles are looked at closely (up to seconds on parts of many edges), or
+        glanced at as by the search of `plan`: biases are then NaN, and ``glanced`` is said for ``ok``.
 
     Raises
     ------
@@ -239,11 +240,15 @@ def predict(
         raise InvalidInput("light must be a pose, got nothing")
     scene, pictures = picture.scene, Pictures.of(picture) if closely else glanced(picture)
     evaluated, known = variance_model(model)(pictures), measurand(pictures)
-    biased, off, clutter = _of_locator(pictures, model)
+    glance = not closely and model != "bound"
+    biased, off, clutter = _unknown(evaluated) if glance else _of_locator(pictures, model)
     textures = texture_errors(pictures)
     if textures is not None and model != "bound":
         biased = tuple(each + shift for each, shift in zip(biased, textures.shifts, strict=True))
     told = forecasts(scene, evaluated, clutter, biased, textures and textures.variances)
+    edges = _edges(evaluated, clutter, off)
+    if glance:
+        told, edges = (tuple(map(_glanced_at, each)) for each in (told, edges))
     gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
     covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
     first = ("kind", "value_image", "value_object", "variance_image", "variance_object", "bias_image")
@@ -252,7 +257,7 @@ def predict(
         **{name: getattr(told[0], name) for name in first},
         corners=known.points,
         covariances=feature_covariances(pictures, evaluated),
-        edges=_edges(evaluated, clutter, off),
+        edges=edges,
         status=worst(told),
         measurands=told,
         covariance=covariance,
@@ -269,6 +274,17 @@ def _edges(evaluated: Errors, clutter: np.ndarray, off: np.ndarray) -> tuple[Edg
         EdgePrediction(name, float(length), float(step), WORST_FIRST[rank], tuple(line.tolist()))
         for name, length, step, rank, line in rows
     )
+
+
+def _unknown(evaluated: Errors) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+    """What `_of_locator` gives, where nobody has looked: NaN, and no clutter."""
+    edges, none = len(evaluated.measurands.view.names), np.full(len(evaluated.measurands.quantities), np.nan)
+    return (none, none), np.full((edges, 2), np.nan), np.zeros(edges, bool)
+
+
+def _glanced_at(told: Any) -> Any:
+    """A forecast, or an edge's: what would be ``ok`` may be another thing at a close look."""
+    return replace(told, status=GLANCED) if told.status == OK else told
 
 
 @lru_cache(maxsize=16)

@@ -13,6 +13,7 @@ from typing import Any
 
 OK = "ok"
 TONE_UNKNOWN = "tone_unknown"
+GLANCED = "glanced"
 CLUTTER = "clutter"
 MISFIT = "misfit"
 CORRELATED = "correlated"
@@ -37,6 +38,7 @@ MEANINGS = {
     MISFIT: "the image is not what the model says within its noise: neither value nor variance can be relied on",
     CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
+    GLANCED: "known at a glance: what lies around its edges, and their bias, have not been looked at yet",
     OK: "value and sigma can be relied on",
 }
 REMEDIES = {
@@ -52,11 +54,12 @@ REMEDIES = {
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
     CLUTTER: "move lamp or camera (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
+    GLANCED: "let camera and lamp rest: the close look follows",
     OK: "",
 }
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
-MEASURED = (OK, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+MEASURED = (OK, GLANCED, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
 OF_SIGMA, OF_TOLERANCE = 1.0, 0.2  # what u(bias) may be of noise, and of half the tolerance zone
 
 

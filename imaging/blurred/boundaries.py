@@ -7,6 +7,7 @@ ray through the place meets the face's plane.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -210,6 +211,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     return np.concatenate([values[..., :1], (values[..., 1:] - values[..., :1]) / _STEP], -1)
 
 
+@lru_cache(maxsize=16)
 def sided(solid: Solid) -> np.ndarray:
     """Faces on both sides of each edge, (J, 2): opposite to the normal (-t_y, t_x) of its image, and on the normal's.
 

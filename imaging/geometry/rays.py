@@ -56,8 +56,13 @@ def first_face(
     """
     shape = origins.shape[:-1]
     rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
-    face, t = (by_embree if rtcore_scene else by_trial)(_plates(solid, margin), *rays, own)
+    face, t = (by_embree if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
     return face.reshape(shape), t.reshape(shape)
+
+
+def has_embree() -> bool:
+    """Whether Embree is there: a ray's cost then hardly grows with the number of triangles."""
+    return rtcore_scene is not None
 
 
 def by_trial(

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging.geometry.projection import light_frame, light_position
-from scenes import Camera, Luminaire, Scene
+from scenes import Camera, Luminaire, Scene, Solid
 from scenes.lights import FULL, Nodes
 
 
@@ -62,7 +62,12 @@ def emitters(scene: Scene, lights: tuple[np.ndarray, ...], fewest: int = FULL) -
 
 def reach_of(scene: Scene) -> float:
     """How far from the reference point the object's vertices are, scene units."""
-    return float(np.linalg.norm(scene.solid.vertices - np.array(scene.camera.look_at), axis=1).max())
+    return _reach(scene.solid, scene.camera.look_at)
+
+
+@lru_cache(maxsize=64)  # asked for with each set of pictures
+def _reach(solid: Solid, look_at: tuple[float, float, float]) -> float:
+    return float(np.linalg.norm(solid.vertices - np.array(look_at), axis=1).max())
 
 
 def _placed(camera: Camera, light: Luminaire, which: int, poses: np.ndarray, made: Nodes) -> list[Emitter]:

@@ -5,8 +5,11 @@ import json
 import math
 import re
 import socket
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from aiohttp import ClientSession, CookieJar, web
@@ -15,12 +18,13 @@ from yarl import URL
 
 import planner
 import scenes
+from imaging.geometry import rays
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Setting
 from scenes.status import MEANINGS, REMEDIES
 from validation.batch.work import Chunk, Clean, Found, Packed
-from validation.explore import answers, best, budgets, effects, preview, prove, save, session, sphere
+from validation.explore import answers, best, budgets, effects, preview, prove, save, session, sphere, tools
 from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
 from validation.explore.server import serve
@@ -163,6 +167,30 @@ def test_a_glance_at_a_block_is_a_close_look(task1):
         assert told.closely is closely
 
 
+def test_nothing_is_ok_at_a_glance(plate):
+    """Where a close look says ``ok`` or ``clutter`` a glance knows neither bias nor what all views tell together."""
+    state = State.first(plate)
+    state = replace(state, views=(state.setting,))
+    close, glance = (answers.to_message(answers.answer(plate, state, closely=closely)) for closely in (True, False))
+    assert "ok" in {row["status"] for row in close["measurands"]}
+    for part in ("measurands", "edges"):
+        assert {row["status"] for row in glance[part]} == {"glanced"}
+    for row, before in zip(glance["measurands"], close["measurands"], strict=True):
+        assert row["bias"] is None
+        assert "together" not in row
+        assert "together" in before
+    lines = preview.overlay(plate, state.picture(plate), answers.answer(plate, state, closely=False))["lines"]
+    assert {line["status"] for line in lines} == {"glanced"}
+    dark = planner.predict(scenes.load("task1"), (30, 90), (90, 90), closely=False)
+    assert dark.status in ("not_visible", "low_contrast")
+
+
+def test_a_glance_for_the_bound_is_no_doubt(task1):
+    """No unbiased estimator can beat it: there is no bias to look for."""
+    told = planner.predict(task1, (30, 90), (15, 270), "bound", closely=False)
+    assert (told.status, told.bias_image) == ("ok", 0.0)
+
+
 @pytest.mark.parametrize("moving", [SENSOR, 0])
 def test_sphere(task1, moving):
     """Patches cover the hemisphere, and each has the value that the planner gives for the pose of its middle."""
@@ -197,6 +225,26 @@ def test_preview_is_the_picture(task1):
     assert (apart > 12).mean() < 0.05  # margin: the share of pixels near edges, 3 %
     # margin: the order is said, against 2 grey levels
     assert np.abs(255 - drawn - clean).mean() > 50  # a picture of the wrong brightness is another one
+
+
+@pytest.mark.skipif(not rays.has_embree(), reason="Embree has no wheel here")
+@pytest.mark.parametrize(("name", "lens"), [("ball", {}), ("bracket_mm", {}), ("plate", {"distortion": [-0.2, 0.1]})])
+def test_a_sketch_is_the_drawn_picture_with_fewer_pixels(name, lens, monkeypatch):
+    """Levels, and places to a part of a pixel: shifted by one of the drawn picture's it fits less, either way alike."""
+    scene = scenes.load(name).with_(camera={"lens": lens}) if lens else scenes.load(name)
+    assert scene.camera.lens.bends is bool(lens)
+    picture = State.first(scene).picture(scene)
+    part = preview.window(scene, picture)
+    drawn = preview.drawn(scene, picture, part).astype(float)
+    assert np.array_equal(preview.sketched(scene, picture, part), drawn)  # few triangles
+    monkeypatch.setattr(preview, "_MANY", 0)
+    sketch = preview.sketched(scene, picture, part).astype(float)
+    assert all(abs(2 * n - m) <= 2 for n, m in zip(sketch.shape, drawn.shape, strict=True))
+    large = cv2.resize(sketch, drawn.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    one, here, other = (np.abs(np.roll(large, (by, by), (0, 1)) - drawn).mean() for by in (-1, 0, 1))
+    assert np.median(np.abs(large - drawn)) < 1
+    assert here < 0.8 * min(one, other)  # margin: what a whole pixel makes
+    assert abs(one - other) < 0.2 * here  # margin: what a tenth of a pixel makes
 
 
 def test_overlay(plate):
@@ -413,6 +461,113 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
     assert len(answered) <= 2
     assert sent[0]["type"] == "scene"
     assert any("type must be one of 'state', 'restore', 'best'" in message.get("text", "") for message in sent)
+
+
+@pytest.mark.parametrize(
+    ("error", "told", "logged"),
+    [
+        (InvalidInput("light must be a pose, got nothing"), "light must be a pose, got nothing", 0),
+        (KeyError("two\nlines"), "this failed by an error of the program, KeyError('two\\nlines')", 1),
+        (ExceptionGroup("g", [ValueError("x")]), "this failed by an error of the program, ValueError('x')", 1),
+    ],
+)
+def test_every_error_of_work_is_told_in_one_line(task1, caplog, error, told, logged):
+    """At rest, in an answer, and of what a button begins; one that is no bad input is logged with its traceback."""
+
+    class Tools:
+        async def quickly(self, work, *arguments):
+            raise error
+
+        slowly = quickly
+
+    async def run(text):
+        sent = asyncio.Queue()
+
+        async def messages():
+            yield text
+            while (message := await asyncio.wait_for(sent.get(), 5))["type"] != "told":
+                pass
+            found.append(message["text"])
+
+        await session.Session(session.Place(task1, "task1", None), Tools(), sent.put).run(messages())
+
+    found, state = [], State.first(task1).to_message()
+    for message in ({"type": "state", "state": state, "rest": True}, {"type": "best"}):
+        asyncio.run(run(json.dumps(message)))
+    assert found == [told, told]
+    assert len([record for record in caplog.records if record.exc_info]) >= 2 * logged
+    assert bool(caplog.records) is bool(logged)
+
+
+def test_a_close_look_that_takes_long_holds_nobody_up(task1):
+    """It is taken in a process when nothing moves; answers to movements meanwhile are glances, and it is given up."""
+    asked = []
+
+    class Tools:
+        async def quickly(self, work, *arguments):
+            asked.append(("quickly", work, arguments[-1]))
+            return work(*arguments) | {"core_s": 9.0} if work is session.answered else None
+
+        async def slowly(self, work, *arguments):
+            asked.append(("slowly", work, arguments[-1]))
+            await asyncio.sleep(60)
+
+    async def run():
+        sent, state = asyncio.Queue(), State.first(task1).to_message()
+
+        async def answered():
+            while (message := await asyncio.wait_for(sent.get(), 10))["type"] != "answer":
+                pass
+            return message["number"], message["closely"]
+
+        async def messages():
+            for number, (rest, count) in enumerate([(True, 2), (False, 1), (True, 1), (False, 1)], 1):
+                yield json.dumps({"type": "state", "state": state, "rest": rest, "number": number})
+                found.extend([await answered() for _ in range(count)])
+                await asyncio.sleep(0.01)
+
+        found = []
+        await session.Session(session.Place(task1, "task1", None), Tools(), sent.put).run(messages())
+        return found
+
+    assert asyncio.run(run()) == [(1, False), (1, True), (2, False), (3, False), (4, False)]
+    looks = [(where, closely) for where, work, closely in asked if work is session.answered]
+    glance, close = ("quickly", False), ("slowly", True)
+    assert looks == [
+        glance,
+        ("quickly", True),
+        glance,
+        glance,
+        close,
+        glance,
+    ]  # how long it takes is known from the first
+
+
+def test_work_in_processes_that_nobody_waits_for_never_begins():
+    """What has begun is left to itself, its error too; what waits for a process is forgotten."""
+
+    async def run():
+        begun = []
+
+        def work(number):
+            begun.append(number)
+            time.sleep(0.05)
+            raise KeyError(number)
+
+        with ThreadPoolExecutor(1) as crew:
+            given = tools.Tools(crew, crew, asyncio.Semaphore(1))
+            one, two = (asyncio.create_task(given.slowly(work, number)) for number in (1, 2))
+            await asyncio.sleep(0.01)
+            one.cancel()
+            two.cancel()
+            for task in (one, two):
+                with pytest.raises(asyncio.CancelledError):
+                    await task
+            with pytest.raises(KeyError, match="3"):
+                await given.slowly(work, 3)
+        return begun
+
+    assert asyncio.run(run()) == [1, 3]
 
 
 def test_work_can_be_stopped(task1):

@@ -36,9 +36,9 @@ class Answer:
     covariances : ndarray, shape (2, 2, 2)
         Their covariances, px^2; NaN of an edge.
     closely : bool
-        Whether rims of circles were looked at closely.
+        Whether edges' surroundings and rims of circles were looked at.
     together : Combination or None
-        What the pictures of the state's views and its own tell together; None without views.
+        What the pictures of the state's views and its own tell together; None without views, or at a glance.
     """
 
     refused: str = ""
@@ -69,7 +69,7 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
     try:
         *others, picture = state.pictures(scene)
         predicted = planner.predict(picture, closely=closely)
-        together = planner.combine([*(_kept(each, closely) for each in others), predicted]) if others else None
+        together = planner.combine([*map(_kept, others), predicted]) if others and closely else None
     except InvalidInput as error:
         return Answer(refused=str(error))
     pictures = Pictures.of(picture) if closely else glanced(picture)
@@ -86,9 +86,9 @@ def answer(scene: Scene, state: State, *, closely: bool = True) -> Answer:
 
 
 @lru_cache(maxsize=4 * MOST_VIEWS)
-def _kept(picture: Picture, closely: bool) -> planner.Prediction:
+def _kept(picture: Picture) -> planner.Prediction:
     """Of a view that stays while another is moved."""
-    return planner.predict(picture, closely=closely)
+    return planner.predict(picture)
 
 
 def _shares(parts: dict[str, np.ndarray]) -> dict[str, float]:

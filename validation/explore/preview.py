@@ -10,17 +10,22 @@ import cv2
 import numpy as np
 
 from imaging.features.projected_edges import projected_edges
-from imaging.geometry.projection import depth, facing, frame, project
+from imaging.geometry.lens import image_centre, undistorted
+from imaging.geometry.projection import camera_frame, depth, facing, frame, project
+from imaging.geometry.rays import first_face, has_embree
 from imaging.light.appearance import face_signal, seen_by_rays
 from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced
 from scenes import Picture, Scene
+from scenes.status import GLANCED, OK
 from validation.explore.answers import Answer, finite
 
 WIDE = 420  # px, at most, of what is sent
 _MARGIN = 0.12  # of the object's image, around it
 _FINE = 2  # drawn this many times finer, then averaged
+_COARSE = 2  # times fewer pixels each way of what is sketched
+_MANY = 5000  # triangles from which on rays are quicker
 _CHORDS = 48
 
 
@@ -62,17 +67,50 @@ def drawn(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     image = (project(corners, pose, scene.camera) - [part.left - 0.5, part.top - 0.5]) * scale - 0.5
     away = depth(corners, pose, scene.camera).reshape(-1, 3).mean(1)
     seen = facing(bodies, pictures.sensor_at)[bodies.triangle_faces] & np.isfinite(image.reshape(-1, 6)).all(1)
-    order = [t for t in np.argsort(-away) if seen[t]]
+    order = np.argsort(-away)
+    order = order[seen[order]]
     levels = np.full(len(away), 0.0)
     levels[order] = face_signal(pictures, bodies.triangles[order].mean(1), bodies.triangle_faces[order], 1)
     canvas = np.full(shape, _beside(pictures, scene), np.float32)
     places = np.rint(np.clip(image.reshape(-1, 3, 2), -8191, 8191) * 4).astype(np.int32)
     for t in order:
         cv2.fillConvexPoly(canvas, places[t], float(levels[t]), shift=2)
-    if scene.camera.blur_px * scale > 0.3:
-        canvas = cv2.GaussianBlur(canvas, (0, 0), scene.camera.blur_px * scale)
+    canvas = _blurred(canvas, scene.camera.blur_px * scale)
     small = cv2.resize(canvas, (shape[1] // _FINE, shape[0] // _FINE), interpolation=cv2.INTER_AREA)
     return shades(scene, small + scene.noise.dark_level)
+
+
+def is_large(scene: Scene) -> bool:
+    """Whether there are so many triangles that drawing all of them takes longer than casting rays."""
+    return len(scene.bodies.triangles) >= _MANY
+
+
+def sketched(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
+    """The same, of a part of many triangles with fewer pixels and by rays, whose cost hardly grows with triangles."""
+    if not is_large(scene) or not has_embree():
+        return drawn(scene, picture, part)
+    pictures, scale = glanced(picture), part.scale / _COARSE
+    shape = max(1, round(part.height * scale)), max(1, round(part.width * scale))
+    rays = _rays(pictures, part, shape)
+    face, away = first_face(scene.bodies, np.broadcast_to(pictures.sensor_at, rays.shape), rays, ())
+    met = face >= 0
+    canvas = np.full(shape, _beside(pictures, scene), np.float32)
+    canvas[met] = face_signal(pictures, pictures.sensor_at + away[met][:, None] * rays[met], face[met], 1)
+    return shades(scene, _blurred(canvas, scene.camera.blur_px * scale) + scene.noise.dark_level)
+
+
+def _rays(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarray:
+    """Directions in which one picture's sensor looks through pixels of so many rows and columns, shape (h, w, 3)."""
+    camera, axes = pictures.scene.camera, camera_frame(pictures.scene.camera, pictures.sensors)
+    y, x = ((np.arange(n) + 0.5) * size / n - 0.5 for n, size in zip(shape, (part.height, part.width), strict=True))
+    places = np.stack(np.meshgrid(part.left + x, part.top + y), -1)
+    places = (undistorted(places, camera) - image_centre(camera)) / camera.focal_px
+    return axes.forward + places[..., :1] * axes.right + places[..., 1:] * axes.down
+
+
+def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
+    """By the lens, standard deviation in pixels of the canvas."""
+    return cv2.GaussianBlur(canvas, (0, 0), sigma) if sigma > 0.3 else canvas
 
 
 def _beside(pictures: Pictures, scene: Scene) -> float:
@@ -116,7 +154,7 @@ def overlay(scene: Scene, picture: Picture, told: Answer) -> dict[str, Any]:
     for name in told.prediction.measurands and _circles(scene):
         points = project(_rim(scene, name), pose, scene.camera)
         if np.isfinite(points).all():
-            lines.append({"name": name, "status": "ok", "points": points.round(2).tolist()})
+            lines.append({"name": name, "status": OK if told.closely else GLANCED, "points": points.round(2).tolist()})
     corners = [
         {"at": at.tolist(), "covariance": covariance.tolist()}
         for at, covariance in zip(told.corners, told.covariances, strict=True)

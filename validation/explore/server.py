@@ -18,10 +18,8 @@ from validation.explore.session import Place, Session
 from validation.explore.tools import Tools, open_tools
 
 PAGE = Path(__file__).parent / "page"
-_FILES = {"/": "index.html"} | {
-    f"/{name}": name
-    for name in ("page.css", "page.js", "view.js", "picture.js", "panel.js", "labels.js", "history.js", "address.js")
-}
+_NAMES = "address", "history", "labels", "page", "panel", "picture", "solid", "view"
+_FILES = {"/": "index.html", "/page.css": "page.css"} | {f"/{name}.js": f"{name}.js" for name in _NAMES}
 _MOST = 1 << 16  # bytes of a visitor's message
 _MOST_VISITORS = 16
 

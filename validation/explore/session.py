@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import logging
+import math
 import time
 from collections.abc import AsyncIterable, Awaitable, Callable
 from concurrent.futures import BrokenExecutor
@@ -21,8 +24,13 @@ from validation.explore.state import MOST_VIEWS, State
 from validation.explore.tools import Tools
 
 Send = Callable[[dict[str, Any]], Awaitable[None]]
+Work = Callable[..., Awaitable[None]]
+_LOG = logging.getLogger("validation.explore")
+_MOST_STEPS = 32767  # of the corners of triangles, as far as they reach
+_MOST_TOLD = 300  # characters of an error
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered without being asked for
-_CLOSE_S = 0.08  # of one core: an answer that takes longer is given from a glance while something is dragged
+_LONG_S = 0.5  # of one core: a close look that takes longer is taken in a process
+_CLOSE_S = 0.08  # of one core: an answer that takes longer follows one from a glance, when nothing is dragged
 
 
 @dataclass(frozen=True)
@@ -41,8 +49,8 @@ def answered(scene: Scene, state: State, closely: bool) -> dict[str, Any]:
     message = {"type": "answer", **answers.to_message(told)}
     if told.prediction is not None:
         picture = state.picture(scene)
-        part = preview.window(scene, picture)
-        message["picture"] = preview.to_message("preview", preview.drawn(scene, picture, part), part)
+        part, draw = preview.window(scene, picture), preview.drawn if closely else preview.sketched
+        message["picture"] = preview.to_message("preview", draw(scene, picture, part), part)
         message["overlay"] = preview.overlay(scene, picture, told)
     return message | {"ms": 1e3 * (time.perf_counter() - began), "core_s": time.thread_time() - worked}
 
@@ -50,9 +58,10 @@ def answered(scene: Scene, state: State, closely: bool) -> dict[str, Any]:
 class Session:
     """A visitor's state and the work that is under way for it.
 
-    Of states that come faster than they can be answered the newest is taken and the others are left out. When a state
-    is the last for a while (``rest``) the close look, the sphere, the effects and the rendered picture follow, each of
-    them given up as soon as another state comes.
+    Of states that come faster than they can be answered the newest is taken and the others are left out. Where a close
+    look takes long, or before that is known, an answer is a glance. When a state is the last for a while
+    (``rest``) the close look, the sphere, the effects and the rendered picture follow, each of them given up as soon as
+    another state comes.
     """
 
     def __init__(self, place: Place, tools: Tools, send: Send) -> None:
@@ -62,7 +71,7 @@ class Session:
         self._wake = asyncio.Event()
         self._after: asyncio.Task | None = None
         self._job: asyncio.Task | None = None
-        self._close_s = 0.0
+        self._close_s = math.inf  # of the last one
         self._refused = False
         self._sphere: tuple[tuple, np.ndarray] | None = None
         self._clean: tuple[tuple, Any] | None = None
@@ -109,22 +118,23 @@ class Session:
             await self._wake.wait()
             self._wake.clear()
             state, rest, number = self._newest
-            closely = rest or self._close_s < _CLOSE_S
-            if closely and self._close_s >= _CLOSE_S:  # slow: a glance first
-                await self._answer(state, False, number)
-            await self._answer(state, closely, number)
+            closely = self._close_s < _CLOSE_S
+            await self._guarded(self._answer, self._tools.quickly, state, closely, number)
             if rest and not self._wake.is_set():
-                self._after = asyncio.create_task(self._guarded(self._rest(state)))
+                self._after = asyncio.create_task(self._guarded(self._rest, state, closely, number))
 
-    async def _answer(self, state: State, closely: bool, number: int) -> None:
-        message = await self._tools.quickly(answered, self._scene, state, closely)
+    async def _answer(self, where: Callable, state: State, closely: bool, number: int) -> None:
+        message = await where(answered, self._scene, state, closely)
         self._refused = bool(message["refused"])
         if closely and not self._refused:
             self._close_s = message["core_s"]
         await self._send(message | {"number": number})
 
-    async def _rest(self, state: State) -> None:
-        """What follows when nothing moves."""
+    async def _rest(self, state: State, closely: bool, number: int) -> None:
+        """What follows when nothing moves; a long close look in a process, so that a movement is answered meanwhile."""
+        if not (closely or self._refused):
+            is_long = self._close_s > _LONG_S if math.isfinite(self._close_s) else preview.is_large(self._scene)
+            await self._answer(self._tools.slowly if is_long else self._tools.quickly, state, True, number)
         await self._colour(state)
         if self._refused:
             return
@@ -164,13 +174,13 @@ class Session:
         if self._job is not None and not self._job.done():
             raise InvalidInput("another work must be finished or stopped before this, got one under way")
         work = {"best": self._best, "prove": self._prove, "render": self._show}[kind]
-        self._job = asyncio.create_task(self._working(kind, work(self.state)))
+        self._job = asyncio.create_task(self._working(kind, work, self.state))
 
-    async def _working(self, kind: str, work: Awaitable[None]) -> None:
+    async def _working(self, kind: str, work: Work, state: State) -> None:
         await self._send({"type": "job", "kind": kind, "state": "begun"})
         ending = "stopped"
         try:
-            await self._guarded(work)
+            await self._guarded(work, state)
             ending = "done"
         finally:
             await self._send({"type": "job", "kind": kind, "state": ending})
@@ -217,40 +227,49 @@ class Session:
         else:
             await self._send({"type": "saved", "path": str(path)})
 
-    async def _guarded(self, work: Awaitable[None]) -> None:
-        """Bad input, and the loss of a process, is told on the page."""
+    async def _guarded(self, work: Work, *arguments: Any) -> None:
+        """Every error is told on the page; one that is neither bad input nor the loss of a process is logged, too."""
         try:
-            await work
-        except (InvalidInput, BrokenExecutor) as error:
-            await self._tell(str(error))
-        except ExceptionGroup as several:  # of pieces that were measured at once
-            await self._tell(str(several.exceptions[0]))
+            await work(*arguments)
+        except ConnectionError:  # the visitor has left
+            pass
+        except Exception as error:
+            first = error.exceptions[0] if isinstance(error, ExceptionGroup) else error  # of pieces measured at once
+            if isinstance(first, InvalidInput | BrokenExecutor):
+                await self._tell(str(first))
+            else:
+                _LOG.error("work for a page of ice explore failed", exc_info=first)
+                await self._tell(" ".join(f"this failed by an error of the program, {first!r}"[:_MOST_TOLD].split()))
 
     async def _tell(self, text: str) -> None:
         await self._send({"type": "told", "text": text})
 
 
 def scene_message(scene: Scene, state: State) -> dict[str, Any]:
-    """What the page needs once: the object's triangles and edges, what is measured, and the first state."""
+    """What the page needs once: the object's triangles and needed edges, what is measured, and the first state.
+
+    Numbers of ``corners`` (three of each triangle) are multiples of ``step``, those of ``normals`` of 1 / 127:
+    integers' bytes, base64.
+    """
     bodies, solid = scene.bodies, scene.solid
     middle = np.array(scene.camera.look_at)
     size = float(np.linalg.norm(solid.vertices - middle, axis=1).max())
     needed = {name for quantity in scene.quantities for name in quantity.edges}
     edges = [
-        {
-            "name": edge.name if edge.name in needed else "",
-            "ends": _rounded((solid.vertices[list(edge.ends)] - middle) / size),
-        }
+        {"name": edge.name, "ends": _rounded((solid.vertices[list(edge.ends)] - middle) / size)}
         for edge in solid.edges
-        if edge.kind != "smooth"
+        if edge.name in needed
     ]
+    corners = (bodies.triangles - middle) / size
+    step = float(np.abs(corners).max()) / _MOST_STEPS
     return {
         "type": "scene",
         "name": scene.name,
         "title": scene.title,
         "units": scene.units,
-        "triangles": _rounded((bodies.triangles - middle) / size),
-        "normals": _rounded(bodies.normals[bodies.triangle_faces]),
+        "corners": _packed(corners / step, "<i2"),
+        "step": step,
+        "normals": _packed(127 * bodies.normals[bodies.triangle_faces], "i1"),
         "edges": edges,
         "lights": [scene.lights[i].kind for i in scene.free],
         "camera": [scene.camera.width, scene.camera.height],
@@ -263,6 +282,11 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
         "asks": scene.camera.width * scene.camera.height > _QUICK_PIXELS,
         "state": state.to_message(),
     }
+
+
+def _packed(values: np.ndarray, kind: str) -> str:
+    """Rounded to integers of that kind, base64."""
+    return base64.b64encode(np.rint(values).astype(kind).tobytes()).decode()
 
 
 def _rounded(values: np.ndarray) -> list:

@@ -16,7 +16,7 @@ from scenes import InvalidInput, Pose, Scene
 from validation.explore.state import SENSOR, State
 
 STEP_DEG = 7.5
-_AT_ONCE = 32  # poses between looks at whether the sphere is still wanted
+_AT_ONCE = 16  # poses between looks at whether the sphere is still wanted
 
 
 @dataclass(frozen=True, eq=False)

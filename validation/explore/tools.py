@@ -27,18 +27,32 @@ class Tools:
         One thread: answers are given one after the other.
     slow : Executor
         Processes, started when first asked.
+    free : asyncio.Semaphore
+        How many of them are free.
     """
 
     quick: Executor
     slow: Executor
+    free: asyncio.Semaphore
 
     async def quickly(self, work: Callable, *arguments: Any) -> Any:
         """What ``work`` gives, in the one thread."""
         return await asyncio.get_running_loop().run_in_executor(self.quick, work, *arguments)
 
     async def slowly(self, work: Callable, *arguments: Any) -> Any:
-        """What ``work`` gives, in a process; both must be such that they can be sent there."""
-        return await asyncio.get_running_loop().run_in_executor(self.slow, work, *arguments)
+        """What ``work`` gives, in a process; both must be such that they can be sent there.
+
+        What is no longer wanted before a process is free never begins; what has begun holds its process to the end.
+        """
+        await self.free.acquire()
+        begun = asyncio.get_running_loop().run_in_executor(self.slow, work, *arguments)
+        begun.add_done_callback(self._done)
+        return await asyncio.shield(begun)
+
+    def _done(self, begun: asyncio.Future) -> None:
+        self.free.release()
+        if not begun.cancelled():
+            begun.exception()  # nobody may be left to ask for it
 
     async def perform(self, task: Task) -> Found:
         """A piece of rendering or measuring."""
@@ -62,8 +76,9 @@ def open_tools() -> Iterator[Tools]:
     """The tools; at the end work that is under way is not waited for."""
     with ThreadPoolExecutor(1) as quick:
         try:
-            with pool.local(max(_WORKERS, pool.cores())) as crew:
-                yield Tools(quick, crew.executor)
+            workers = max(_WORKERS, pool.cores())
+            with pool.local(workers) as crew:
+                yield Tools(quick, crew.executor, asyncio.Semaphore(workers))
                 raise _Left  # the pool ends its processes at once when an error leaves it
         except _Left:
             pass

@@ -2,6 +2,7 @@
 
 import { View, colour, range } from "./view.js";
 import { Picture } from "./picture.js";
+import { Solid } from "./solid.js";
 import * as panel from "./panel.js";
 import { History } from "./history.js";
 import * as address from "./address.js";
@@ -112,7 +113,7 @@ function measurand(index) {
 
 const take = {
   scene(message) {
-    scene = message;
+    scene = { ...message, solid: new Solid(message) };
     if (state === null) state = message.state;
     Object.assign(view, { scene, state });
     $("title").textContent = `${scene.name}: ${scene.title}`;
@@ -130,7 +131,7 @@ const take = {
   answer(message) {
     if (message.number < window.explore.answered) return;
     window.explore.answered = message.number;
-    window.explore.ms = message.ms;
+    window.explore.core_s = message.core_s;
     latest = message;
     view.limiting = message.limiting;
     panel.answer(message, state, measurand);

@@ -15,7 +15,9 @@ export function element(name, text = "", kind = "") {
   return made;
 }
 
-const mood = (status) => (status === "ok" || status === "clutter" ? status : "bad");
+const mood = (status) => (["ok", "clutter", "glanced"].includes(status) ? status : "bad");
+const fine = (status) => status === "ok" || status === "glanced";
+const shown = (status) => (status === "glanced" ? "being computed" : status); // a close look follows and says
 
 function row(cells, kind = "") {
   const made = element("tr", "", kind);
@@ -43,29 +45,29 @@ export function answer(message, state, choose) {
   $("sigma").textContent = chosen.sigma === null ? "cannot be measured" : `${rough}σ ${number(chosen.sigma)} ${chosen.unit}`;
   $("sigma").dataset.sigma = chosen.sigma ?? "";
   $("sigma").dataset.closely = message.closely;
-  status.textContent = chosen.status;
+  status.textContent = shown(chosen.status);
   status.className = mood(chosen.status);
   const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
-  const glance = message.closely ? "" : " Rims of holes are glanced at while it moves; the close look follows.";
-  const about = chosen.reason || (chosen.status !== "ok" ? blamed : "");
-  $("why").textContent = `${chosen.why}${about ? ` (${about})` : ""}.${glance}${together(chosen)}`;
+  const glance = message.closely || chosen.status === "glanced" ? "" : " Bias and close look follow when nothing moves.";
+  const about = chosen.reason || (fine(chosen.status) ? "" : blamed);
+  $("why").textContent = `${chosen.why}${about ? ` (${about})` : ""}.${glance}${message.closely || !state.views.length ? together(chosen) : " What all views tell together follows, too."}`;
   $("remedy").hidden = !chosen.remedy;
   $("remedy").lastElementChild.textContent = chosen.remedy.replaceAll("`", "");
-  $("connection").textContent = `${$("sigma").textContent}, ${chosen.status}`;
+  $("connection").textContent = `${$("sigma").textContent}, ${shown(chosen.status)}`;
   shares(message);
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
     const off = each.tolerance && each.bias !== null ? Math.abs(each.bias) / each.tolerance : null;
     const sigma = each.together ? `${number(each.sigma)} (${number(each.together.sigma)}) ${each.unit}` : `${number(each.sigma)} ${each.unit}`;
-    const made = row([each.name, sigma, part(each.ratio), off === null ? `${number(each.bias, 2)}` : part(off),
-      element("span", each.status, `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
-    made.title = `bias ${number(each.bias, 2)} ${each.unit}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
+    const made = row([each.name, sigma, part(each.ratio), off === null ? (message.closely ? number(each.bias, 2) : "...") : part(off),
+      element("span", shown(each.status), `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
+    made.title = `bias ${message.closely ? `${number(each.bias, 2)} ${each.unit}` : "being computed"}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
     made.onclick = () => choose(i);
     return made;
   }));
   $("edges").tBodies[0].replaceChildren(...message.edges.map((edge) => row([edge.name, number(edge.length), number(edge.contrast),
-    element("span", edge.status, `status ${mood(edge.status)}`)])));
-  const bad = message.edges.filter((edge) => edge.status !== "ok");
-  $("worst-edge").textContent = bad.length ? `${bad.length} of ${message.edges.length} not ok` : "all ok";
+    element("span", shown(edge.status), `status ${mood(edge.status)}`)])));
+  const bad = message.edges.filter((edge) => !fine(edge.status));
+  $("worst-edge").textContent = bad.length ? `${bad.length} of ${message.edges.length} not ok` : message.closely ? "all ok" : shown("glanced");
 }
 
 // What the kept views add.

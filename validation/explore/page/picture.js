@@ -2,7 +2,7 @@
 
 import { Labels } from "./labels.js";
 
-const STATUS = { ok: "#27c26c", clutter: "#f2b01e" }, RARE = "#ff5a4f";
+const STATUS = { ok: "#27c26c", clutter: "#f2b01e", glanced: "#f4f4f4" }, RARE = "#ff5a4f";
 const CHI2 = Math.sqrt(5.991); // of 95 % with two degrees of freedom
 const NICE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000];
 
@@ -68,7 +68,8 @@ export class Picture {
   tell(factor) {
     const kind = this.shown.kind === "preview" ? "Drawn from the model at once, without cast shadows" : "Rendered by Mitsuba";
     const ellipses = factor ? ` Blue: 95 % ellipses of the measurand's points, enlarged ${factor} times.` : "";
-    this.caption.textContent = `${kind}. Green: edges that are ok; thick: the one that limits.${ellipses}`;
+    const lines = this.overlay?.lines.some(({ status }) => status === "glanced") ? "White: edges not yet looked at closely" : "Green: edges that are ok";
+    this.caption.textContent = `${kind}. ${lines}; thick: the one that limits.${ellipses}`;
   }
 }
 

@@ -169,21 +169,9 @@ export class View {
   }
 
   object(pen, axes) {
-    const { triangles, normals, edges } = this.scene, lamp = direction(this.state.lights[0] || this.state.sensor);
-    triangles.map((corners, i) => ({ corners, i, depth: corners.reduce((sum, c) => sum + dot(c, axes[2]), 0) }))
-      .filter(({ i }) => dot(normals[i], axes[2]) > 0).sort((a, b) => a.depth - b.depth)
-      .forEach(({ corners, i }) => {
-        const grey = Math.round(95 + 145 * Math.max(0, dot(normals[i], lamp)));
-        pen.fillStyle = pen.strokeStyle = `rgb(${grey},${grey},${grey})`;
-        pen.lineWidth = 0.7;
-        pen.beginPath();
-        corners.forEach((c) => pen.lineTo(...this.place(c.map((v) => OBJECT * v), axes).slice(0, 2)));
-        pen.closePath();
-        pen.fill();
-        pen.stroke();
-      });
+    const { edges } = this.scene, lamp = direction(this.state.lights[0] || this.state.sensor);
+    this.scene.solid.draw(pen, axes, lamp, [this.cx, this.cy], OBJECT * this.scale);
     for (const { name, ends } of edges) {
-      if (!name) continue;
       pen.strokeStyle = name === this.limiting ? "#d1342b" : "#0b5cad";
       pen.lineWidth = name === this.limiting ? 3 : 2;
       pen.beginPath();
