@@ -60,6 +60,11 @@ class ViewSet:
     exhaustive: float | None
     bound: float | None
 
+    def why(self, m: int) -> str:
+        """What decided the status of the m-th quantity, of the first picture of which it is known; empty where not."""
+        told = (view.prediction.measurands[m].why(self.combination.status[m]) for view in self.views)
+        return next(filter(None, told), "")
+
     @property
     def worst_ratio(self) -> float | None:
         """Largest combined sigma over tolerance of what is measured; None without tolerances."""

@@ -43,6 +43,15 @@ def number(value: float | None, form: str = ".3g") -> str:
     return "-" if value is None or not math.isfinite(value) else format(value, form)
 
 
+def percent(part: float) -> str:
+    """A part of one in per cent, two digits; from 1000 % on how many times.
+
+    >>> percent(0.0871), percent(1.704), percent(12.34)
+    ('8.7 %', '170 %', '12 x')
+    """
+    return f"{float(f'{100 * part:.2g}'):g} %" if part < 10 else f"{part:.2g} x"
+
+
 def sigma(variance: float | None) -> str:
     """Standard deviation of a variance."""
     return number(variance if variance is None else math.sqrt(variance))

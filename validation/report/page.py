@@ -29,7 +29,8 @@ from validation.report import (
 from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
 from validation.report.requirements import next_step, sentence, what, wrong
-from validation.report.station import Station, halves_of
+from validation.report.run_cells import far
+from validation.report.station import Station, halves_of, reasons
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
         Plot(proof_figures.distributions(found, store),
              "All measured values of each requirement (bars) against what is predicted (line)."),
     ]  # fmt: skip
-    folded = [page_tables.ratios(found), page_tables.units(found), page_tables.variances(found),
+    why = reasons(campaign, far(found)[0])
+    folded = [page_tables.ratios(found, why), page_tables.units(found, why), page_tables.variances(found),
               page_tables.estimators(found)]  # fmt: skip
     answer = guide.plain_verdict(found)
     return Section("Are these uncertainties true?", answer, found.verdict.text, plots, folded=folded)

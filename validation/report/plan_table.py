@@ -227,9 +227,9 @@ def _reading(found: planner.Plan) -> str:
 def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
     """The rendered settings, and what follows from them."""
     if checked.proposed is None:
-        lines = [f"\nNot checked by rendering: {checked.reason}."]
-        return Group(*([_checked_table(found, checked)] if checked.settings else []), Text("\n".join(lines)))
-    lines = [_order(checked), _proposal(checked)]
+        table = [_checked_table(found, checked), *map(Text, _statuses(checked))] if checked.settings else []
+        return Group(*table, Text(f"\nNot checked by rendering: {checked.reason}."))
+    lines = [*_statuses(checked), _order(checked), _proposal(checked)]
     if checked.without_formula:
         many = sum(bool(row.without_formula) for row in checked.settings)
         names = ", ".join(checked.without_formula)
@@ -264,6 +264,12 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
         names = ", ".join(row.without_formula)
         table.add_row(str(row.rank_before), now, _pose(row.sensor), _pose(row.light), *values, ratio, row.status, names)
     return table
+
+
+def _statuses(checked: PlanCheck) -> list[str]:
+    """What each status of the table means, what decided it in the first place that has it, and what to do."""
+    reasons = (f"place {row.rank_before}, {row.reason}" if row.reason else "" for row in checked.settings)
+    return [f"  {line}" for line in legend((row.status for row in checked.settings), reasons)]
 
 
 def _order(checked: PlanCheck) -> str:

@@ -64,13 +64,12 @@ def requirements(found: planner.ViewSet) -> tuple[Requirement, ...]:
     made = []
     for m, each in enumerate(told):
         sigma, state = math.sqrt(both.variances[m]), both.status[m]
-        why = (view.prediction.measurands[m].why(state) for view in found.views)
         used = [str(v + 1) for v in range(len(found.views)) if both.used[v, m]]
         made.append(Requirement(
             number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance, sigma=sigma,
             bias=finite(both.bias[m]), u_bias=None, U=finite(k * sigma), status=state, kind=each.kind,
             limits=f"picture{'s' * (len(used) > 1)} {', '.join(used)}" if used else "",
-            reason=next(filter(None, why), ""),
+            reason=found.why(m),
         ))  # fmt: skip
     return tuple(made)
 

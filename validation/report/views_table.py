@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
 from validation.report.cells import sigma as _sigma
@@ -16,7 +17,8 @@ from validation.views_check import CheckedQuantity, ViewsCheck
 
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
     """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
-    parts = [Text(_head(found)), _numbers(found), _poses(found), _quantities(found), Text(_searched(found, seconds))]
+    parts = [Text(_head(found)), _numbers(found), _poses(found), _quantities(found), *_statuses(found.sets[-1]),
+             Text(_searched(found, seconds))]  # fmt: skip
     if check:
         parts += [_checked(check)] if check.rows else []
         said = check.verdict.text if check.verdict else f"Nothing is judged: {check.reason}."
@@ -79,6 +81,14 @@ def _quantities(found: planner.Views) -> Table:
         taken = "no. " + " ".join(used) if used else "-"
         table.add_row(forecast.name, forecast.unit, *sigmas, jointly, taken, last.combination.status[m])
     return table
+
+
+def _statuses(last: planner.ViewSet) -> list[Text]:
+    """What each status of the table means, what decided it, and what to do."""
+    told = [forecast.name for forecast in last.views[0].prediction.measurands]
+    reasons = [f"{name}: {why}" if (why := last.why(m)) else "" for m, name in enumerate(told)]
+    lines = legend(last.combination.status, reasons)
+    return [Text("\n".join(f"  {line}" for line in lines))] if lines else []
 
 
 def _searched(found: planner.Views, seconds: float) -> str:
