@@ -4,15 +4,16 @@ import pytest
 
 import scenes
 import validation
+from render import Quality
 from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at, needs_a_browser
 from tests.parts import newcomers_plate
 from tests.proofs.large import fabricate
 from validation.cli.main import app
-from validation.report.gallery import coarser
 
 pytestmark = [pytest.mark.render, needs_a_browser]
 
 _RENDERS = 60
+_QUICK = Quality(supersample=2, edge_samples=16, random_samples=16)
 _LARGEST = 3_000_000  # bytes of a page
 _ASKED = (
     ("length", "width", ({"edge": "e4"}, {"edge": "e16"}), 0.1),
@@ -48,8 +49,9 @@ def write(name, folder):
     if name == "campaign":
         fabricate(2000, folder)
     else:
-        scene = newcomers(folder) if name == "newcomer" else coarser(scenes.load(name))
-        validation.run(scene, renders=_RENDERS, seed=1, out=folder, workers=1)
+        scene = newcomers(folder) if name == "newcomer" else scenes.load(name)
+        scene = scene.with_(camera={"pixel_pitch_um": 4 * 3.45}) if name == "bracket_mm" else scene
+        validation.run(scene, renders=_RENDERS, seed=1, out=folder, workers=1, quality=_QUICK)
     with pytest.raises(SystemExit) as ended:
         app(["report", str(folder)])
     assert ended.value.code == 0

@@ -12,6 +12,14 @@ from scenes import Tolerance
 from scenes.pose import several
 
 
+MODELS = {
+    "calibrated": "the formula of camera, light, surface and noise (model calibrated)",
+    "paper": "the paper's formula (model paper), which is right up to one factor",
+    "bound": "what no unbiased measurement can beat (model bound)",
+}
+PLACES = "sensor, light: (angle from the vertical, azimuth), degrees."
+
+
 def table(
     title: str,
     *columns: str,

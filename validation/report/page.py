@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -69,9 +70,9 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     return paths
 
 
-def write_station(station: Station, title: str, path: Path) -> Path:
-    """Write the page of a station that was not rendered: its first screen, and its budget."""
-    sections = _budget(station.budget)
+def write_station(station: Station, title: str, path: Path, more: Sequence[Section] = ()) -> Path:
+    """Write the page of a station that was not rendered: its first screen, sections of one's own, and its budget."""
+    sections = [*more, *_budget(station.budget)]
     return write_page(first_screen(station), station.picture.scene.name, title, sections, path)
 
 

@@ -202,13 +202,21 @@ def sentence(found: Sequence[Requirement]) -> str:
     for grade, words in (
         (Grade.WITHIN, f"measured within tolerance, with an uncertainty U above {100 * _WELL:.0f} % of it"),
         (Grade.OVER, "measured with an uncertainty U that is larger than the tolerance"),
-        (Grade.OPEN, "measured; no tolerance is given to compare with"),
+        (Grade.OPEN, f"measured{_known(found)}; no tolerance is given to compare with"),
         (Grade.DOUBT, "not proven: its value must not be relied on"),
     ):
         if some := [each for each in found if each.grade == grade]:
             words = words if len(some) == 1 else words.replace("its value", "their values")
             parts.append(f"{_which(some, len(found))} {words}")
     return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
+
+
+def _known(found: Sequence[Requirement]) -> str:
+    """The uncertainty of what has no tolerance, where that is one number."""
+    each = [one for one in found if one.grade == Grade.OPEN]
+    if len(each) != 1 or each[0].U is None:
+        return ""
+    return f" with an expanded uncertainty U (95 %) of {each[0].U:.2g} {each[0].unit}"
 
 
 def wrong(found: Sequence[Requirement]) -> list[str]:
@@ -267,4 +275,4 @@ def next_step(found: Sequence[Requirement]) -> str:
         return f"Improve {worst.name} first{_mostly(worst)}."
     if found and all(each.grade == Grade.OPEN for each in found):
         return "Give each requirement its tolerance in the scene, then U can be compared with it."
-    return "Nothing has to be changed: set camera and lamp up as they are drawn here."
+    return "Nothing has to be changed: set camera and lamp up at these places."

@@ -15,10 +15,16 @@ from validation.report.cells import table as _table
 from validation.views_check import CheckedQuantity, ViewsCheck
 
 
+_TERMS = """\
+  minimised: square of the worst sigma over tolerance, or what else is said above. one / it, repeats / it: how many times
+  as large it is of the best single picture, and of that one taken as often, which takes as long. over exhaustive: how far
+  above the best of all sets of what was looked at. over grid's bound: over what no pictures of the grid stay below."""
+
+
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
     """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
-    parts = [Text(_head(found)), _numbers(found), _poses(found), _quantities(found), *_statuses(found.sets[-1]),
-             Text(_searched(found, seconds))]  # fmt: skip
+    parts = [Text(_head(found)), _numbers(found), Text(_TERMS), _poses(found), _quantities(found),
+             *_statuses(found.sets[-1]), Text(_searched(found, seconds))]  # fmt: skip
     if check:
         parts += [_checked(check)] if check.rows else []
         said = check.verdict.text if check.verdict else f"Nothing is judged: {check.reason}."
