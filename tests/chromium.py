@@ -60,9 +60,7 @@ class Page:
 
     async def value(self, script: str, seconds: float = 30) -> Any:
         """What an expression is worth; promises are waited for."""
-        told = await self.call(
-            "Runtime.evaluate", seconds, expression=script, returnByValue=True, awaitPromise=True
-        )
+        told = await self.call("Runtime.evaluate", seconds, expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in told, (script, told["exceptionDetails"])
         return told["result"].get("value")
 

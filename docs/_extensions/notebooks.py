@@ -1,4 +1,4 @@
-"""Notebooks as pages: cells and their stored outputs become Markdown, so that nothing is run and nothing more installed."""
+"""Notebooks as pages: cells and their stored outputs become Markdown, so that nothing is run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from docutils import nodes
-from myst_parser.sphinx_ import MystParser
+from myst_parser.parsers.sphinx_ import MystParser
 from sphinx.application import Sphinx
 
 

@@ -1,4 +1,4 @@
-"""Pages of stations as they are met: many requirements, many settings, a long campaign; in a browser, at three widths."""
+"""Pages of stations as they are met, in a browser: many requirements, many settings, a long campaign."""
 
 import pytest
 

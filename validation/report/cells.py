@@ -11,7 +11,6 @@ from rich.table import Table
 from scenes import Tolerance
 from scenes.pose import several
 
-
 MODELS = {
     "calibrated": "the formula of camera, light, surface and noise (model calibrated)",
     "paper": "the paper's formula (model paper), which is right up to one factor",

@@ -78,8 +78,8 @@ def report(scene: Scene) -> Group:
 
 
 _TERMS = """
-inner: an edge as at the foot of a step. hole, outer: of which side a circle is the rim. residual: how far the mesh is from the
-exact surface. mount: free, with the camera, or fixed. Names are what [[measurands]] of a scene file refer to."""
+inner: an edge as at the foot of a step. hole, outer: of which side a circle is the rim. residual: how far the mesh is
+from the exact surface, rms. mount: free, with the camera, or fixed. [[measurands]] of a scene file refer to names."""
 _WORDS = ("name", "kind", "of", "mount", "")
 
 
@@ -168,9 +168,7 @@ def _material(scene: Scene, face: int) -> str | None:
 def _smooth(scene: Scene) -> str:
     left = len(scene.solid.edges) - len(scene.solid.sharp)
     return (
-        f"{left} more edges stand for curved surfaces and their rims: nothing can be measured by them."
-        if left
-        else ""
+        f"{left} more edges stand for curved surfaces and their rims: nothing can be measured by them." if left else ""
     )
 
 

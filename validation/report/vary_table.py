@@ -24,8 +24,8 @@ HELD = {
 
 COLUMNS = ("", "sensor", "light", "analyser", "polarisation", "band", "time", "minimised", "status")
 TERMS = """\
-  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of exposure,
-  in that of the scene. minimised: variance. fixed: the scene's own choice, at the best poses for it."""
+  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of
+  exposure, 1 is that of the scene. minimised: variance. fixed: the scene's own choice, at the best poses for it."""
 
 
 def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
@@ -68,8 +68,8 @@ def proposed(varied: Varied) -> str:
     angles = (("analyser at", choice.analyser_deg), ("polariser before the lamp at", choice.polarisation_deg))
     parts = [choice.band, *(f"{what} {angle:.1f} degrees" for what, angle in angles if angle is not None)]
     return (
-        f"{', '.join(parts)}; sensor {_pose(best.sensor)}, light {_pose(best.light)}. The variance is "
-        f"{varied.gain:.2f} times smaller than with the scene's own choice at its best places"
+        f"{', '.join(parts)}; sensor {_pose(best.sensor)}, light {_pose(best.light)}. The scene's own choice has "
+        f"{varied.gain:.2f} times the variance at its best places"
     )
 
 

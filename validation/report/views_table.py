@@ -14,11 +14,10 @@ from validation.report.cells import sigma as _sigma
 from validation.report.cells import table as _table
 from validation.views_check import CheckedQuantity, ViewsCheck
 
-
 _TERMS = """\
-  minimised: square of the worst sigma over tolerance, or what else is said above. one / it, repeats / it: how many times
-  as large it is of the best single picture, and of that one taken as often, which takes as long. over exhaustive: how far
-  above the best of all sets of what was looked at. over grid's bound: over what no pictures of the grid stay below."""
+  minimised: what is said above, of all pictures together. one / it, repeats / it: how many times as large it is of the
+  best single picture, and of that one taken as often, which takes as long. over exhaustive: how far above the best of
+  all sets of what was looked at. over grid's bound: over what no pictures of the grid can stay below."""
 
 
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
