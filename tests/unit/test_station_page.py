@@ -75,6 +75,15 @@ def test_a_requirement_without_a_tolerance_is_told_with_its_uncertainty():
     assert "U (95 %)" not in requirements.sentence([one, dataclasses.replace(one, number=2)])
 
 
+@pytest.mark.parametrize("name", ["plate", "copper", "task1"])
+def test_what_is_predicted_is_of_one_estimator(name):
+    """U is not of another one than sigma, which it would be too small for."""
+    scene = scenes.load(name)
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    for each in (*requirements.predicted(picture), *station.of_picture(picture).requirements):
+        assert each.U >= 1.959 * each.sigma  # margin: k is 1.96
+
+
 def test_parts_above_one_have_no_exponent():
     cells = station_table.lines([required(u=0.0341)])[0].cells
     assert cells[6] == "170 %"

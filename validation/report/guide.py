@@ -90,7 +90,8 @@ def verdict_terms() -> list[str]:
     """What the last paragraph compares."""
     return [
         f"p-value: chance of so large a difference if the prediction is right. Each is compared with a limit that makes"
-        f" a false alarm {100 * LEVEL:g} % likely over all rows (Sidak) and tests (Bonferroni)."
+        f" a false alarm {100 * LEVEL:g} % likely over all rows (Sidak) and tests (Bonferroni).",
+        "u: standard uncertainty of one value.",
     ]
 
 

@@ -93,13 +93,13 @@ class Requirement:
 
 
 def predicted(picture: Picture, p: float = 0.95) -> tuple[Requirement, ...]:
-    """Of a picture, from its models alone."""
+    """Of a picture, from its models alone: by the classic locators, as plans are made and runs are judged."""
     told = planner.predict(picture).measurands
     return requirements(
         picture,
         sigmas=[math.sqrt(each.variance_object) for each in told],
         biases=[finite(each.bias_object) for each in told],
-        found=measurable_budget(picture, p=p),
+        found=measurable_budget(picture, p=p, biased=True),
     )
 
 
@@ -142,10 +142,11 @@ def measurable_budget(
     statuses: Sequence[str] | None = None,
     doubts: Sequence[float] | None = None,
     p: float = 0.95,
+    biased: bool | None = None,
 ) -> SceneBudget | None:
     """The budget of those measurands that can be measured in a picture; None where there are none.
 
-    ``variances``, ``biases`` and ``statuses`` of all M as of `planner.budgeting.budgets.budget`; ``doubts`` standard
+    ``variances``, ``biases``, ``statuses`` and ``biased`` of all M as of `planner.budgeting.budgets.budget`; ``doubts`` standard
     uncertainties of the biases where they are taken off.
     """
     forecasts, scene = planner.predict(picture).measurands, picture.scene
@@ -166,6 +167,7 @@ def measurable_budget(
         places = list(range(len(good)))
     told = {"variances": variances, "biases": biases, "doubts": doubts}
     known = {name: np.array([each[m] for m in places], float) for name, each in told.items() if each is not None}
+    known["biased"] = biased
     if doubts is not None:
         known["doubts"] = {_UNSURE: known["doubts"]}
     try:

@@ -41,7 +41,7 @@ def of_picture(picture: Picture, p: float = 0.95, *, simulated: bool = False) ->
     off."""
     told = planner.predict(picture).measurands
     if not simulated or budgets.formulas_do(picture, tuple(each.status for each in told)):
-        return Station(picture, predicted(picture, p), measurable_budget(picture, p=p))
+        return Station(picture, predicted(picture, p), measurable_budget(picture, p=p, biased=True))
     off = budgets.simulated(picture)
     known = measurable_budget(picture, off.sigma**2, statuses=off.status, doubts=off.u_bias, p=p)
     made = requirements(

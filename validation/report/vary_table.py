@@ -32,7 +32,7 @@ def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
     """Choices, gain, and what noisy pictures of both plans say."""
     varied = found.varied
     lines = [
-        f"\nProposed: {proposed(varied)}.",
+        f"\nProposed, with what was varied: {proposed(varied)}.",
         f"  Varied: {', '.join(varied.vary)} ({varied.evaluated} settings in {seconds:.1f} s with the plan)",
         f"  Equal: {HELD[varied.hold]}.",
         f"  Gain over the fixed choice: {varied.gain:.3f} in variance with poses of their own,"
