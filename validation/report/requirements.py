@@ -146,8 +146,8 @@ def measurable_budget(
 ) -> SceneBudget | None:
     """The budget of those measurands that can be measured in a picture; None where there are none.
 
-    ``variances``, ``biases``, ``statuses`` and ``biased`` of all M as of `planner.budgeting.budgets.budget`; ``doubts`` standard
-    uncertainties of the biases where they are taken off.
+    ``variances``, ``biases``, ``statuses`` and ``biased`` of all M as of `planner.budgeting.budgets.budget`; ``doubts``
+    standard uncertainties of the biases where they are taken off.
     """
     forecasts, scene = planner.predict(picture).measurands, picture.scene
     good = [math.isfinite(each.variance_object) for each in forecasts]
