@@ -56,8 +56,10 @@ def _executed(cell: dict[str, Any], number: int, change: Callable[[str], str], n
 
 def _value(source: str, names: dict[str, Any]) -> Any:
     """Run a cell; what its last line is worth, None where it is no expression."""
-    tree = ast.parse(source)
-    last = ast.Expression(tree.body.pop().value) if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    tree, last = ast.parse(source), None
+    if tree.body and isinstance(shown := tree.body[-1], ast.Expr):
+        tree.body.pop()
+        last = ast.Expression(shown.value)
     exec(compile(tree, "<cell>", "exec"), names)
     return None if last is None else eval(compile(last, "<cell>", "eval"), names)
 
