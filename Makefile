@@ -58,9 +58,10 @@ docs: $(VENV)/.docs-installed
 	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -W -n --keep-going -q -d build/docs/.doctrees docs build/docs
 	@echo build/docs/index.html
 
-# The pages that are made from the program.
-pages: $(VENV)/.installed
+# The pages that are made from the program; the notebook needs pandas.
+pages: $(VENV)/.test-installed
 	$(BIN)/python -m scenes.reference docs
+	$(BIN)/python -m validation.report.executed docs/notebook.ipynb
 	$(BIN)/python -m validation.cli.reference docs
 
 # Store the run and the documents that the tests compare with anew, after a change of the measurement that was wanted.

@@ -13,7 +13,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE / "_extensions")]
 
 project = "ICE"
 version = release = installed("ice-vision")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml", "notebooks"]
 exclude_patterns = ["_build", "_extensions"]
 default_role = "py:obj"
 highlight_language = "text"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from planner.combining import Combination
 from planner.prediction import Prediction
 from scenes import Pose, Scene
+from scenes.results import Shown, finite, poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +63,11 @@ class ViewSet:
     exhaustive: float | None
     bound: float | None
 
+    def why(self, m: int) -> str:
+        """What decided the status of the m-th quantity, of the first picture of which it is known; empty where not."""
+        told = (view.prediction.measurands[m].why(self.combination.status[m]) for view in self.views)
+        return next(filter(None, told), "")
+
     @property
     def worst_ratio(self) -> float | None:
         """Largest combined sigma over tolerance of what is measured; None without tolerances."""
@@ -82,8 +90,8 @@ class ViewSet:
         return None if self.exhaustive is None else self.minimised / self.exhaustive - 1
 
 
-@dataclass(frozen=True, eq=False)
-class Views:
+@dataclass(frozen=True, eq=False, repr=False)
+class Views(Shown):
     """For 1, 2, ... N pictures the best ones, and how they were found.
 
     Attributes
@@ -115,3 +123,25 @@ class Views:
     looked: int
     guarantee: str
     most_over_repeats: float | None
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a set, picture and quantity: poses, what the picture alone tells, and what all of them do."""
+        return [row for each in self.sets for row in self._rows(each)]
+
+    def _rows(self, found: ViewSet) -> Iterator[dict[str, Any]]:
+        both = found.combination
+        for v, view in enumerate(found.views):
+            for m, each in enumerate(view.prediction.measurands):
+                yield {
+                    "scene": self.scene.name, "pictures": len(found.views), "picture": v + 1,
+                    **poses(view.sensor, view.light), "name": each.name, "unit": each.unit,
+                    "sigma_alone": finite(math.sqrt(each.variance_object)), "status_alone": each.status,
+                    "is_used": bool(both.used[v, m]), "sigma": finite(math.sqrt(both.variances[m])),
+                    "status": both.status[m],
+                }  # fmt: skip
+
+    def _line(self) -> str:
+        last = self.sets[-1]
+        ratio = last.worst_ratio
+        worst = "" if ratio is None else f", sigma up to {ratio:.3g} of its tolerance ({last.limiting})"
+        return f"{self.scene.name}: {len(last.views)} pictures{worst}"

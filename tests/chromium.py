@@ -43,12 +43,12 @@ class Page:
             elif told["method"] == "Runtime.exceptionThrown":
                 self.errors.append(json.dumps(told["params"]["exceptionDetails"]))
 
-    async def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """A command of the protocol and its answer."""
+    async def call(self, method: str, seconds: float = 30, **parameters: Any) -> dict[str, Any]:
+        """A command of the protocol and its answer, which is waited for so long."""
         self._number += 1
         future = self._waiting[self._number] = asyncio.get_running_loop().create_future()
         await self._socket.send_str(json.dumps({"id": self._number, "method": method, "params": parameters}))
-        told = await asyncio.wait_for(future, 30)
+        told = await asyncio.wait_for(future, seconds)
         assert "error" not in told, (method, told)
         return told["result"]
 
@@ -58,9 +58,9 @@ class Page:
             await self.call(f"{domain}.enable")
         await self.call("Page.navigate", url=url)
 
-    async def value(self, script: str) -> Any:
+    async def value(self, script: str, seconds: float = 30) -> Any:
         """What an expression is worth; promises are waited for."""
-        told = await self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        told = await self.call("Runtime.evaluate", seconds, expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in told, (script, told["exceptionDetails"])
         return told["result"].get("value")
 

@@ -1,13 +1,18 @@
-"""What is wrong with how a page looks in a browser: cut off, covered, faint, small."""
+"""What is wrong with how a page looks in a browser: cut off, covered, faint, small, or not as WCAG AA asks."""
 
 from __future__ import annotations
 
 import asyncio
+from importlib.resources import files
 from pathlib import Path
 
-from tests.chromium import chromium
+import pytest
 
-NOTHING = {"outside": [], "clipped": [], "overlaps": [], "faint": [], "small": 0, "unexplained": 0}
+from tests.chromium import PROGRAM, Page, chromium
+
+needs_a_browser = pytest.mark.skipif(PROGRAM is None, reason="no Chromium is installed")
+WIDTHS = (390, 768, 1280)
+NOTHING = {"outside": [], "clipped": [], "overlaps": [], "cut": [], "faint": [], "small": 0, "unexplained": 0}
 LOOK = """(() => {
 const wide = document.documentElement.clientWidth;
 const unseen = e => e && (getComputedStyle(e).clipPath.startsWith('inset') || unseen(e.parentElement));
@@ -17,12 +22,15 @@ const size = e => parseFloat(getComputedStyle(e).fontSize);
 const box = e => e.getBoundingClientRect();
 const meet = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
   && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
-const overlaps = [];
+const overlaps = [], cut = [];
 for (const svg of document.querySelectorAll('svg')) {
   const texts = [...svg.querySelectorAll('text')].filter(e => e.textContent.trim() && e.checkVisibility());
   texts.forEach((a, i) => texts.slice(i + 1).forEach(b => {
     if (meet(box(a), box(b))) overlaps.push(a.textContent + ' | ' + b.textContent);
   }));
+  const [whole, near] = [box(svg), (a, b) => a.left > b.left - 1 && a.right < b.right + 1 && a.top > b.top - 1
+    && a.bottom < b.bottom + 1];
+  cut.push(...texts.filter(e => !near(box(e), whole)).map(e => e.textContent));
 }
 const grey = text => {
   const part = text.match(/[0-9.]+/g).slice(0, 3).map(c => c / 255);
@@ -36,20 +44,38 @@ const behind = e => {
   }
   return 'rgb(255, 255, 255)';
 };
+const below = e => {
+  const at = box(e);
+  for (const o of document.elementsFromPoint((at.left + at.right) / 2, (at.top + at.bottom) / 2)) {
+    if (o.closest('text')) continue;
+    if (!(o instanceof SVGElement) || o.matches('svg')) return behind(o);
+    if (o.matches('image')) return null;
+    const style = getComputedStyle(o);
+    if (style.fill.startsWith('rgb(') && style.fillOpacity * style.opacity > 0.9) return style.fill;
+  }
+  return 'rgb(255, 255, 255)';
+};
 const written = e => [...e.childNodes].some(n => n.nodeType == 3 && n.data.trim());
-const faint = all.filter(e => !(e instanceof SVGElement) && written(e)).filter(e => {
-    const [low, high] = [grey(getComputedStyle(e).color), grey(behind(e))].sort((a, b) => a - b);
+const faint = all.filter(e => written(e) && (e.matches('text') || !(e instanceof SVGElement))).filter(e => {
+    const drawn = e instanceof SVGElement, ground = drawn ? below(e) : behind(e);
+    if (ground == null) return true;
+    const [low, high] = [grey(getComputedStyle(e)[drawn ? 'fill' : 'color']), grey(ground)].sort((a, b) => a - b);
     return (high + 0.05) / (low + 0.05) < 4.5;
   });
 return {
   outside: free.filter(e => box(e).right > wide + 0.5).map(e => e.outerHTML.slice(0, 80)),
   clipped: all.filter(e => !(e instanceof SVGElement) && e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0
     && getComputedStyle(e).overflowX != 'auto').map(e => e.outerHTML.slice(0, 80)),
-  overlaps, faint: faint.map(e => e.outerHTML.slice(0, 80)),
+  overlaps, cut, faint: faint.map(e => e.outerHTML.slice(0, 80)),
   small: all.filter(e => e.matches('p, td, th, figcaption, li') && size(e) < 10).length,
   unexplained: [...document.querySelectorAll('.wide')].filter(e => e.checkVisibility()
     && !(e.nextElementSibling?.textContent.length > 40)).length,
 }})()"""
+
+
+_OPEN = "document.querySelectorAll('details').forEach(e => e.open = true)"
+_AXE = """axe.run({resultTypes: ['violations']}).then(found =>
+  found.violations.flatMap(rule => rule.nodes.map(node => rule.id + ': ' + node.html.slice(0, 80))))"""
 
 
 def looked_at(page: Path, width: int) -> tuple[dict, dict, list[str]]:
@@ -57,10 +83,33 @@ def looked_at(page: Path, width: int) -> tuple[dict, dict, list[str]]:
 
     async def look():
         async with chromium(width) as window:
-            await window.open(page.as_uri())
-            await window.until("document.readyState == 'complete'")
-            first = await window.value(LOOK)
-            await window.value("document.querySelectorAll('details').forEach(e => e.open = true)")
-            return first, await window.value(LOOK), window.errors
+            await _open(window, page)
+            first = await _whole(window, width)
+            await window.value(_OPEN)
+            return first, await _whole(window, width), window.errors
 
     return asyncio.run(look())
+
+
+def against_wcag(page: Path) -> list[str]:
+    """What axe-core finds wrong: contrast by WCAG 2.1 AA, names, headings, landmarks."""
+    pytest.importorskip("axe_core_python", reason="axe-core is not installed")
+
+    async def look():
+        async with chromium() as window:
+            await _open(window, page)
+            await window.value(f"{(files('axe_core_python') / 'axe.min.js').read_text()}; 0")
+            return await window.value(_AXE, seconds=300)
+
+    return asyncio.run(look())
+
+
+async def _open(window: Page, page: Path) -> None:
+    await window.open(page.as_uri())
+    await window.until("document.readyState == 'complete'")
+
+
+async def _whole(window: Page, width: int) -> dict:
+    """In a window as long as the page: what lies below a label is known only of what is inside."""
+    await window.resize(width, await window.value("document.documentElement.scrollHeight"))
+    return await window.value(LOOK)

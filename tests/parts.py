@@ -28,6 +28,34 @@ class Hole:
         x, y = self.x + self.radius * np.cos(self.angles), self.y + self.radius * np.sin(self.angles)
         return np.column_stack([x, y, np.full_like(x, height)])
 
+    def away(self, points: np.ndarray) -> np.ndarray:
+        """Distances of points (..., 2) from its axis."""
+        return np.hypot(points[..., 0] - self.x, points[..., 1] - self.y)
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A hole with straight sides of ``length`` along x and round ends of ``count`` facets, about (x, y)."""
+
+    x: float
+    y: float
+    radius: float
+    length: float
+    count: int
+    bottom: float
+    top: float
+
+    def rim(self, height: float) -> np.ndarray:
+        """Its vertices at a height, shape (n, 3)."""
+        turn = np.linspace(-np.pi / 2, np.pi / 2, self.count + 1)
+        x, y = self.length / 2 + self.radius * np.cos(turn), self.radius * np.sin(turn)
+        return np.column_stack([np.r_[x, -x] + self.x, np.r_[y, -y] + self.y, np.full(2 * len(x), height)])
+
+    def away(self, points: np.ndarray) -> np.ndarray:
+        """Distances of points (..., 2) from the line between the ends' axes."""
+        beyond = np.maximum(np.abs(points[..., 0] - self.x) - self.length / 2, 0)
+        return np.hypot(beyond, points[..., 1] - self.y)
+
 
 def evenly(count: int) -> np.ndarray:
     """Angles of a rim of equal steps."""
@@ -40,14 +68,13 @@ def unevenly(rng: np.random.Generator, count: int) -> np.ndarray:
     return rng.uniform(0, 2 * np.pi) + np.cumsum(steps) * 2 * np.pi / steps.sum()
 
 
-def _flat(corners: np.ndarray, holes: list[Hole], height: float, more: np.ndarray, up: bool) -> np.ndarray:
+def _flat(corners: np.ndarray, holes: list[Hole | Slot], height: float, more: np.ndarray, up: bool) -> np.ndarray:
     """Triangles of a horizontal convex face with holes, shape (n, 3, 3); ``more`` are further points (n, 2) in it."""
-    clear = [p for p in more if all(np.hypot(p[0] - h.x, p[1] - h.y) > 1.02 * h.radius for h in holes)]
+    clear = [p for p in more if all(h.away(p) > 1.02 * h.radius for h in holes)]
     points = np.concatenate([corners, *(hole.rim(0)[:, :2] for hole in holes), np.array(clear).reshape(-1, 2)])
     found = points[Delaunay(points).simplices]
     for hole in holes:
-        chord = hole.radius * (1 + 1e-9)
-        own = (np.hypot(found[..., 0] - hole.x, found[..., 1] - hole.y) <= chord).all(1)
+        own = (hole.away(found) <= hole.radius * (1 + 1e-9)).all(1)
         found = found[~own]
     one, two = found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]
     ways = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
@@ -57,14 +84,14 @@ def _flat(corners: np.ndarray, holes: list[Hole], height: float, more: np.ndarra
     return np.concatenate([found, np.full((*found.shape[:2], 1), height)], -1)
 
 
-def _wall(hole: Hole) -> np.ndarray:
+def _wall(hole: Hole | Slot) -> np.ndarray:
     """Triangles of a hole's wall, its normals towards the axis."""
     low, high = hole.rim(hole.bottom), hole.rim(hole.top)
     low2, high2 = np.roll(low, -1, 0), np.roll(high, -1, 0)
     return np.concatenate([np.stack([low, high, low2], 1), np.stack([low2, high, high2], 1)])
 
 
-def prism(profile: list[tuple[float, float]], width: float, holes: list[Hole] = (), seed: int | None = None):
+def prism(profile: list[tuple[float, float]], width: float, holes: list[Hole | Slot] = (), seed: int | None = None):
     """A profile (x, z), counter-clockwise and with flat stretches only where holes start and end, drawn along y.
 
     Parameters
@@ -73,7 +100,7 @@ def prism(profile: list[tuple[float, float]], width: float, holes: list[Hole] = 
         A fan of triangles about the first point has to cover it.
     width : float
         From y = 0.
-    holes : list of Hole
+    holes : list of Hole or Slot
         Through holes.
     seed : int, optional
         Of further points in the faces that have holes, so that triangles are unequal.
@@ -116,3 +143,10 @@ def bracket(count: int = 96, angles: np.ndarray | None = None, seed: int | None 
     around = evenly(count) if angles is None else angles
     holes = [Hole(18.0, 20.0, 4.0, around, 0.0, 12.0), Hole(48.0, 20.0, 5.0, around, 0.0, 6.0)]
     return prism(BRACKET, 40.0, holes, seed)
+
+
+def newcomers_plate() -> trimesh.Trimesh:
+    """50 x 30 x 8 mm, a step of 2 x 2 mm at x = 50, three holes of 6, 6 and 8 mm and a slot of 4 x 14 mm through it."""
+    bores = [Hole(x, y, radius, evenly(72), 0.0, 8.0) for x, y, radius in ((8, 8, 3), (8, 22, 3), (39, 15, 4))]
+    profile = [(0.0, 0.0), (50.0, 0.0), (50.0, 6.0), (48.0, 6.0), (48.0, 8.0), (0.0, 8.0)]
+    return prism(profile, 30.0, [*bores, Slot(23.0, 15.0, 2.0, 10.0, 24, 0.0, 8.0)])

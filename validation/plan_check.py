@@ -44,6 +44,8 @@ class CheckedSetting:
     with_bias : float or None
         ``propagated`` with what the correction of each value's bias is not sure of, so that both are what a user gets;
         None where that was not looked at.
+    reason : str
+        What decided a status that is not ``ok``, with its number; empty where no more is known than the status says.
     """
 
     sensor: Pose
@@ -56,6 +58,7 @@ class CheckedSetting:
     rank_before: int
     rank_after: int | None = None
     with_bias: float | None = None
+    reason: str = ""
 
     @property
     def minimised(self) -> float:
@@ -170,6 +173,9 @@ def _checked(
     in_object = found.objective == "object"
     joint = np.diag(measured.covariance if in_object else measured.covariance_image)
     doubt = off.u_bias if in_object else off.u_bias_image
+    worst = status.worst(*off.status)
+    m = off.status.index(worst)
+    why = calibrated[m].why(worst, float(off.u_bias[m]), float(np.sqrt(measured.covariance[m, m])))
     return CheckedSetting(
         sensor=sensor,
         light=light,
@@ -177,7 +183,8 @@ def _checked(
         calibrated=float(aim(np.array([e.variance_object if in_object else e.variance_image for e in calibrated]))),
         propagated=float(aim(joint)),
         with_bias=float(aim(joint + doubt**2)),
-        status=status.worst(*off.status),
+        status=worst,
+        reason=f"{calibrated[m].name}: {why}" if why else "",
         without_formula=without_formula(scene, sensor, light),
         rank_before=rank,
     )

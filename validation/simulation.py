@@ -90,7 +90,8 @@ def steadied(picture: Picture, image: np.ndarray, method: Method, how: How = How
         return (image,)
     pair = image, how.image(picture, _OTHERS)
     found = measure.correction(Images(pair), picture, method.locator, method.threshold)
-    noise = np.sqrt(2) * found.sources[RENDERING] / (_QUIET * found.sigma)
+    known = np.isfinite(found.sigma) & (found.sigma > 0)  # what can be measured
+    noise = np.sqrt(2) * found.sources[RENDERING][known] / (_QUIET * found.sigma[known])
     most = max(noise[np.isfinite(noise)], default=0.0)
     if most <= 1:
         return (image,)

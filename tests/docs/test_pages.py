@@ -31,7 +31,7 @@ def test_links_lead_somewhere(page):
 def test_every_page_is_in_the_contents():
     """And the contents name no other."""
     listed = re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.M)
-    assert sorted([*listed, "index"]) == sorted(page.stem for page in DOCS.glob("*.md"))
+    assert sorted([*listed, "index"]) == sorted(page.stem for page in [*DOCS.glob("*.md"), *DOCS.glob("*.ipynb")])
 
 
 def test_what_the_architecture_names_is_there():

@@ -12,7 +12,7 @@ import pytest
 
 import scenes
 import validation
-from tests.looking import NOTHING, looked_at
+from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at
 from validation.batch.campaign import Campaign
 from validation.cli.main import app
 
@@ -133,7 +133,7 @@ def test_in_a_browser(found, page, tmp_path):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
-@pytest.mark.parametrize("width", [390, 768, 1280])
+@pytest.mark.parametrize("width", WIDTHS)
 def test_nothing_is_cut_off_or_covered(page, width):
     """Wide tables scroll in their own box, all else fits; no label lies on another; text stands out as WCAG AA asks."""
     first, opened, errors = looked_at(page, width)
@@ -147,12 +147,29 @@ def test_the_look_sees_what_is_wrong(page, tmp_path):
     """Negative control: a line that fits nowhere, one label on another, grey on white, small print."""
     bad = (
         '<p style="white-space: nowrap">' + 300 * "wide " + '</p><p style="color: #999; font-size: 8px">faint</p>'
-        '<svg width="50" height="20"><text y="12">one</text><text y="14">two</text></svg></main>'
+        '<svg width="50" height="20"><text y="12">one</text><text y="14">two</text></svg>'
+        '<svg width="60" height="20"><rect width="60" height="20" fill="#333"/><text x="5" y="12">dark</text></svg>'
+        '<svg width="60" height="20"><text x="20" y="12">too long to be seen</text></svg></main>'
     )
     (tmp_path / "page.html").write_text(page.read_text().replace("</main>", bad))
     found = looked_at(tmp_path / "page.html", 390)[0]
     assert found["outside"] or found["clipped"]
-    assert (found["overlaps"], len(found["faint"]), found["small"]) == (["one | two"], 1, 1)
+    assert found["overlaps"] == ["one | two"]
+    assert found["cut"][-1] == "too long to be seen"
+    assert ["faint" in each or "dark" in each for each in found["faint"]] == [True, True]
+    assert found["small"] == 1
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
+def test_axe_core_has_nothing_to_say(page, tmp_path):
+    """Nor has it of what is folded; negative control: grey on white, a picture without a name."""
+    opened = page.read_text().replace("<details>", "<details open>")
+    assert "<details open>" in opened
+    (tmp_path / "page.html").write_text(opened)
+    assert against_wcag(tmp_path / "page.html") == []
+    bad = '<p style="color: #999">faint</p><img src="data:,"></main>'
+    (tmp_path / "page.html").write_text(page.read_text().replace("</main>", bad))
+    assert [each.split(":")[0] for each in against_wcag(tmp_path / "page.html")] == ["color-contrast", "image-alt"]
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")

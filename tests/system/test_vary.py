@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import sys
 
 import pytest
@@ -59,6 +60,26 @@ def test_a_wrong_prediction_is_contradicted(monkeypatch, capsys):
     assert code == 0
     assert "red LED" in out
     assert "noisy pictures" not in out
+
+
+@pytest.mark.render
+def test_the_page_shows_the_choice_that_is_proposed(monkeypatch, capsys, tmp_path):
+    """U and places on it are those of the best choice; the own one stands beside it; nothing is said of pictures."""
+    held = "--sensor", "50,278", "--light", "51,88"
+    code, out, _ = ice(
+        monkeypatch, capsys, "plan", "copper", *held, "--vary", "band", "--no-check", "--out", str(tmp_path)
+    )
+    assert code == 0
+    (line,) = (line for line in out.splitlines() if line.startswith("Proposed, with what was varied: red LED"))
+    gain = re.search(r"has ([\d.]+) times the variance", line)[1]
+    page = (tmp_path / "plan.html").read_text()
+    for told in ("What was varied: band", f"has {gain} times the variance", "Held equal: exposure time", "own lamp"):
+        assert told in page
+    assert "Rendered and measured" not in page
+    best = planner.plan(scenes.load("copper"), sensor=(50, 278), light=(51, 88), vary=("band",)).varied.best
+    sigma = planner.predict(best.scene, best.sensor, best.light).variance_object ** 0.5
+    u = float(re.search(r"uncertainty U \(95 %\) of ([\d.]+) cm".replace(" %", "\N{NO-BREAK SPACE}%"), page)[1])
+    assert u == pytest.approx(1.96 * sigma, rel=0.1)  # margin: two digits are told, and the model's error adds a little
 
 
 def test_errors_are_one_line(monkeypatch, capsys):

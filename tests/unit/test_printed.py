@@ -317,6 +317,33 @@ def test_the_plan_s_tables_are_its_json(planned):
     assert f"{pose(check.proposed.sensor)}, light {pose(check.proposed.light)}, ok: -3.8 % variance" in text
 
 
+def test_a_checked_place_says_what_decided_its_status(planned):
+    *others, last = of_three(planned).settings
+    told_ = replace(of_three(planned), settings=(*others, replace(last, reason="bore: edge e4 is 3 px long")))
+    line = "short: too little of an edge is left in the image (place 3, bore: edge e4 is 3 px long); come nearer"
+    assert line in words(plan_table.report(planned, told_, None, 1.0))
+    assert line in words(plan_table.report(planned, replace(told_, proposed=None), None, 1.0))
+    assert [row["reason"] for row in plan_json._checked(told_)["checked"]] == [None, None, "bore: edge e4 is 3 px long"]
+
+
+def test_several_pictures_say_what_decided_a_status():
+    """Of the first picture that knows; what is ok has no line."""
+    whys = [("", "edge e4 is 3 px long"), ("", "edge e4 is 5 px long"), ("", "")]
+    views = []
+    for picture in (2, 0, 1):
+        told_ = [SimpleNamespace(name=name, why=lambda _, why=why: why)
+                 for name, why in zip(("across", "bore"), whys[picture], strict=True)]  # fmt: skip
+        views.append(SimpleNamespace(prediction=SimpleNamespace(measurands=told_)))
+    both = SimpleNamespace(status=("ok", "short"))
+    found = planner.ViewSet(tuple(views), both, 1.0, (), None, None, None, None)
+    assert (found.why(0), found.why(1)) == ("", "edge e4 is 3 px long")
+    (line,) = views_table._statuses(found)
+    assert str(line).startswith(
+        "  short: too little of an edge is left in the image (bore: edge e4 is 3 px long); come"
+    )
+    assert views_table._statuses(replace(found, combination=SimpleNamespace(status=("ok", "ok")))) == []
+
+
 def test_the_plan_of_one_measurand_is_told_in_object_and_image(task1):
     found = planner.plan(task1, step_deg=30, refined=False)
     made = plan_table.report(found, None, None, 1.0)

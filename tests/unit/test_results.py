@@ -28,6 +28,7 @@ def results(task1):
         "Measurements": measure.measure(dark, task1, *POSES, "gradient"),
         "SceneBudget": planner.budget(task1.model_copy(update={"uncertainty": known}), *POSES),
         "Map": planner.pose_map(task1, sensor=POSES[0], space=planner.ViewingSpace(30), biased=False),
+        "Views": planner.plan_views(task1, 2, step_deg=30, refined=False),
         "Budget": budget("<b>", "um", 200.0, [Input("repeats", 0.0, 3.0)], {"repeats": 1.0}),
     }
 
@@ -112,6 +113,13 @@ def test_to_frame(results):
         assert isinstance(frame, pandas.DataFrame)
         assert frame.shape == (len(found.as_rows()), len(found.as_rows()[0]))
     assert results["Measurement"].to_frame()["value_px"].dtype == float
+    views = results["Views"].to_frame()
+    assert views.groupby("pictures").size().to_dict() == {1: 1, 2: 2}
+    assert views["sigma"].iloc[0] == views["sigma_alone"].iloc[0] > views["sigma"].iloc[1]
+    last = results["Views"].sets[-1].views[-1]
+    assert list(views.iloc[-1][["sensor_polar", "sensor_azimuth", "light_polar", "light_azimuth", "name"]]) == [
+        *last.sensor, *last.light, "distance",
+    ]  # fmt: skip
 
 
 def test_a_notebook_shows_pictures_once_validation_is_there(results, task1, monkeypatch):
@@ -126,6 +134,7 @@ def test_a_notebook_shows_pictures_once_validation_is_there(results, task1, monk
         assert shown.count('<svg role="img"') == 1
         assert "<table>" in shown
     assert "The part as the camera sees it. 1 distance: no tolerance given" in picture._repr_html_()
+    assert results["Views"]._repr_html_().count('<svg role="img"') == 3  # from above, and both pictures
     assert "<svg" not in results["Budget"]._repr_html_()
     assert "<svg" not in picture.unlit()._repr_html_()
     one, two = (re.findall(r'id="(n\d+)-', picture._repr_html_())[0] for _ in range(2))

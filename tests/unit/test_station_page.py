@@ -15,10 +15,12 @@ import planner
 import scenes
 from scenes import Picture, Tolerance
 from scenes.status import MEANINGS, MEASURED, REMEDIES, legend
+from validation.batch.campaign import Campaign
 from validation.explore import preview
 from validation.report import (
     budget_figure,
     canvas,
+    guide,
     page,
     proof_figures,
     requirements,
@@ -40,6 +42,52 @@ def required(number=1, u=0.001, status="ok", tolerance=TOLERANCE, name="bore"):
 def plate():
     scene = scenes.load("plate")
     return Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+
+def test_a_run_says_what_decided_each_status_once():
+    """Of the first requirement of the first row that has it, with the numbers of that row; of what is ok nothing."""
+
+    def row(index, *statuses):
+        names = ("hole to corner", "bore", "length", "square", "hole from front")
+        told = (SimpleNamespace(name=name, status=status, u_bias=0.03 * (index + 1), predicted=1e-4)
+                for name, status in zip(names, statuses, strict=True))  # fmt: skip
+        return SimpleNamespace(index=index, measurands=tuple(told))
+
+    rows = [
+        row(0, *5 * ["ok"]),
+        row(1, "ok", "clutter", "ok", "clutter", "ok"),
+        row(2, "clutter", *3 * ["ok"], "short"),
+    ]
+    found = station.reasons(Campaign.of(scenes.load("plate")), rows)
+    assert list(found) == ["clutter", "short"]
+    most = "at most 0.01 cm is allowed, the sigma of noise"
+    assert found["clutter"] == f"bore, setting 2: its bias is known to 0.06 cm (1 sigma); {most}"
+    assert found["short"] == ""  # it was not predicted to be
+    (line,) = guide.statuses(["ok", "clutter"], found)
+    assert f"biases the value (bore, setting 2: its bias is known to 0.06 cm (1 sigma); {most}); move" in line
+
+
+def test_a_requirement_without_a_tolerance_is_told_with_its_uncertainty():
+    one = required(tolerance=None, u=0.00284)
+    told = "measured with an expanded uncertainty U (95 %) of 0.0028 mm; no tolerance is given to compare with."
+    assert requirements.sentence([one]) == f"Bore is {told}"
+    assert requirements.sentence([one, required(2, name="slot")]).endswith(told)
+    assert "U (95 %)" not in requirements.sentence([one, dataclasses.replace(one, number=2)])
+
+
+@pytest.mark.parametrize("name", ["plate", "copper", "task1"])
+def test_what_is_predicted_is_of_one_estimator(name):
+    """U is not of another one than sigma, which it would be too small for."""
+    scene = scenes.load(name)
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    for each in (*requirements.predicted(picture), *station.of_picture(picture).requirements):
+        assert each.U / each.sigma > 1.959  # margin: k is 1.96
+
+
+def test_parts_above_one_have_no_exponent():
+    cells = station_table.lines([required(u=0.0341)])[0].cells
+    assert cells[6] == "170 %"
+    assert station_table.lines([required(u=0.246)])[0].cells[6] == "12 x"
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def validate_command(
         _print_json(found, reached, taken)
     else:
         one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
-        _print_tables(found, reached, station, out, one, explain)
+        _print_tables(loaded, found, reached, station, out, one, explain)
     shown = found.verdict.agrees and not (strict and (found.verdict.not_proven or found.verdict.not_measured))
     raise typer.Exit(0 if shown else 1)
 
@@ -178,14 +178,17 @@ def _print_json(found: Validation, goal: Reached | None, taken: photographs.Phot
 
 
 def _print_tables(
-    found: Validation, goal: Reached | None, station: Station, directory: Path, scene: str | None, explain: bool
-) -> None:
+    loaded: campaign.Campaign, found: Validation, goal: Reached | None, station: Station, directory: Path,
+    scene: str | None, explain: bool,
+) -> None:  # fmt: skip
     """The whole result as tables; ``scene`` as it was named, None of a campaign."""
     from validation.report import guide, station_text
+    from validation.report.run_cells import far
+    from validation.report.station import reasons
     from validation.report.table import report
 
     shown_on = console()
-    shown_on.print(report(found, explain))
+    shown_on.print(report(found, explain, reasons(loaded, far(found)[0])))
     shown_on.print(station_text.report(station.requirements, guide.station_title(found, station)), highlight=False)
     if goal:
         shown_on.print(goal.text, highlight=False)

@@ -176,7 +176,8 @@ def plan_command(
     scatter = _check_varied(found) if found.varied and count else None
     if target:
         _write(target, found, checked)
-    _show(found, checked, safe, seconds, _pictures(found, checked, map_file, out), target, as_json, scatter)
+    pictures = _pictures(found, checked, scatter, map_file, out)
+    _show(found, checked, safe, seconds, pictures, target, as_json, scatter)
     _say_unchecked(loaded, bool(count or no_check or as_json))
     if scatter and not scatter.agrees:
         raise typer.Exit(1)
@@ -313,23 +314,28 @@ def _tolerances(texts: list[str], scene: scenes.Scene) -> planner.Tolerances | N
     return tolerances
 
 
-def _pictures(found: planner.Plan, checked: PlanCheck | None, map_file: Path | None, out: Path | None) -> list[Path]:
+def _pictures(
+    found: planner.Plan, checked: PlanCheck | None, scatter: VaryCheck | None, map_file: Path | None, out: Path | None
+) -> list[Path]:
     if map_file is None and out is None:
         return []
     from validation.report import plan_figures  # matplotlib takes half a second to load
 
     if out is None:
         return [plan_figures.map_picture(found, map_file)]
-    return [*plan_figures.draw(found, out, map_file), _page(found, checked, out)]
+    return [*plan_figures.draw(found, out, map_file), _page(found, checked, scatter, out)]
 
 
-def _page(found: planner.Plan, checked: PlanCheck | None, out: Path) -> Path:
+def _page(found: planner.Plan, checked: PlanCheck | None, scatter: VaryCheck | None, out: Path) -> Path:
     """The setting that is proposed as one page; where pictures were checked, with biases as they are simulated."""
-    from validation.report import page, station
+    from validation.report import page, station, vary_section
 
-    scene, best = found.scene, checked.proposed if checked and checked.proposed else found
+    scene, best, more = found.scene, checked.proposed if checked and checked.proposed else found, []
+    if found.varied:
+        scene, best = found.varied.best.scene, found.varied.best
+        more = [vary_section.section(found.varied, scatter)]
     made = station.of_picture(scenes.Picture.of(scene, best.sensor, best.light), simulated=checked is not None)
-    return page.write_station(made, scene.title or scene.name, out / "plan.html")
+    return page.write_station(made, found.scene.title or found.scene.name, out / "plan.html", more)
 
 
 def _show(

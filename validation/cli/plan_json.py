@@ -125,6 +125,7 @@ def _setting(row: CheckedSetting) -> dict:
         "with_bias": row.with_bias,
         "ratio": row.ratio,
         "status": row.status,
+        "reason": row.reason or None,
         "without_formula": list(row.without_formula),
         "rank_before": row.rank_before,
         "rank_after": row.rank_after,

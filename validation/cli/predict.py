@@ -10,6 +10,7 @@ import scenes
 from scenes import InvalidInput, Pose, several
 from scenes.status import is_trusted, legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
+from validation.report.cells import PLACES
 from validation.report.terminal import console
 from validation.strict_json import plain
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from planner import Prediction
 
 commands = commands()
+_TERMS = (
+    "sigma: standard deviation of one picture's value by noise, of the object and, px or degrees, in the image. bias: "
+    "mean error."
+)
 _MOST_TOLD = 8  # pictures whose doubtful edges are told of
 
 
@@ -42,6 +47,7 @@ def predict_command(
         say({"scene": loaded.name, "model": model, "settings": rows}, True, "")
     else:
         console().print(_table(loaded, model, rows))
+        console().print(f" {PLACES} {_TERMS}", highlight=False)
         every = [each for row in rows for each in row["measurands"]]
         for line in legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every]):
             console().print(f" {line}", highlight=False)
@@ -95,10 +101,10 @@ def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
 
 
 def _table(scene: scenes.Scene, model: str, rows: list[dict[str, Any]]) -> Table:
-    from validation.report.cells import number, pose, sigma, table
+    from validation.report.cells import MODELS, number, pose, sigma, table
 
     columns = ("sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma", "status")
-    made = table(f"{scene.name}: predicted ({model}, +- 1 sigma)", *columns, words=("measurand", "unit", "status"))
+    made = table(f"{scene.name}: predicted by {MODELS[model]}", *columns, words=("measurand", "unit", "status"))
     for row in rows:
         for each in row["measurands"]:
             made.add_row(

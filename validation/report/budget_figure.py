@@ -17,6 +17,7 @@ from planner.uncertainty.budget import Budget
 from planner.uncertainty.improve import improvements
 from scenes.status import is_trusted
 from validation.report.canvas import TEXT, WIDTH, inline, save
+from validation.report.cells import percent
 
 _SOURCES = 6  # that have a colour of their own; the others are one
 _LONGEST = 26  # letters of a name
@@ -86,8 +87,11 @@ def _drawn(found: SceneBudget):
                   label=name)  # fmt: skip
         left += part
     for m, (each, state) in enumerate(zip(found, found.statuses, strict=True)):
-        words = f" {left[m]:.2g} %" if halves[m] is not None else f" U {each.U:.2g} {each.unit}"
-        axis.text(left[m], m, words if is_trusted(state) else f"{words}, {state}", va="center", fontsize=TEXT)
+        words = percent(left[m] / 100) if halves[m] is not None else f"U {each.U:.2g} {each.unit}"
+        axis.annotate(
+            words if is_trusted(state) else f"{words}, {state}", (left[m], m), (4, 0), textcoords="offset points",
+            va="center", fontsize=TEXT,
+        )  # fmt: skip
     _finished(axis, [each.name for each in found], left, any(half is not None for half in halves))
     return figure
 

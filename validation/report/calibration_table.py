@@ -14,6 +14,10 @@ def facts(found: Calibration) -> dict:
 
 def table(found: Calibration) -> Table:
     caption = (
+        "kappa^2: variance of an edge point across its edge, px^2, over (noise / contrast)^2.\n"
+        "correlation: over how many px along the edge errors are alike.\n"
+        "product: of the two, which decides how well a line is found. efficiency: the bound over it.\n"
+        "linear to: noise / contrast up to which that holds.\n"
         f"closed form of gradient: kappa^2 {found.closed_kappa2:.3f} over {found.closed_correlation_px:.2f} px; the "
         f"calibrated model uses it. Bound of kappa^2 x length: {found.bound:.3f} px.\n"
         f"The paper's kappa^2 is {found.paper_kappa2}; the closed form gives that at a lens blur of "

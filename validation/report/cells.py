@@ -11,6 +11,13 @@ from rich.table import Table
 from scenes import Tolerance
 from scenes.pose import several
 
+MODELS = {
+    "calibrated": "the formula of camera, light, surface and noise (model calibrated)",
+    "paper": "the paper's formula (model paper), which is right up to one factor",
+    "bound": "what no unbiased measurement can beat (model bound)",
+}
+PLACES = "sensor, light: (angle from the vertical, azimuth), degrees."
+
 
 def table(
     title: str,
@@ -41,6 +48,15 @@ def number(value: float | None, form: str = ".3g") -> str:
     ('0.123', '-', '-')
     """
     return "-" if value is None or not math.isfinite(value) else format(value, form)
+
+
+def percent(part: float) -> str:
+    """A part of one in per cent, two digits; from 1000 % on how many times.
+
+    >>> percent(0.0871), percent(1.704), percent(12.34)
+    ('8.7 %', '170 %', '12 x')
+    """
+    return f"{float(f'{100 * part:.2g}'):g} %" if part < 10 else f"{part:.2g} x"
 
 
 def sigma(variance: float | None) -> str:

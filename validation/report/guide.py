@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,6 +52,12 @@ def _locators(methods: Iterable[str]) -> str:
     return ". ".join(f"{name}: {_LOCATORS[name]}" for name in known if name in _LOCATORS)
 
 
+def statuses(found: Iterable[str], reasons: Mapping[str, str]) -> list[str]:
+    """What each status means that is not trusted, what decided it by ``reasons`` where they know it, and what to do."""
+    states = list(found)
+    return legend(states, (reasons.get(state, "") for state in states))
+
+
 def ratio_terms(main: str, methods: int) -> list[str]:
     """The columns of ratios and errors, one line each."""
     none = " ".join(["0"] * methods)
@@ -65,14 +71,13 @@ def ratio_terms(main: str, methods: int) -> list[str]:
     ]  # fmt: skip
 
 
-def unit_terms(statuses: Iterable[str], judged: bool) -> list[str]:
+def unit_terms(judged: bool) -> list[str]:
     """The columns of the table in the scene's unit, one line each; ``judged``: whether the verdict is about them."""
     which = "all are judged" if judged else "that of the image is judged"
     return [
         "value: of the object itself. sigma: standard deviation of one picture's; compare it with your tolerance.",
         f"ratio: of variances, measured / propagated, with its 95 % interval; {which}. bias: mean less value,",
         "once what a simulation told is taken off; u(bias): standard uncertainty of that.",
-        *legend(statuses),
     ]
 
 
@@ -85,7 +90,8 @@ def verdict_terms() -> list[str]:
     """What the last paragraph compares."""
     return [
         f"p-value: chance of so large a difference if the prediction is right. Each is compared with a limit that makes"
-        f" a false alarm {100 * LEVEL:g} % likely over all rows (Sidak) and tests (Bonferroni)."
+        f" a false alarm {100 * LEVEL:g} % likely over all rows (Sidak) and tests (Bonferroni).",
+        "u: standard uncertainty of one value.",
     ]
 
 

@@ -11,7 +11,7 @@ import planner
 from planner.budgeting.budgets import SceneBudget
 from scenes import InvalidInput, Picture, Scene
 from validation.batch.result import Validation
-from validation.report import budget_figure, proof_figures, station_view
+from validation.report import budget_figure, proof_figures, station_view, views_page
 from validation.report.requirements import predicted
 
 _NUMBER = itertools.count(1)  # keeps the identifiers of a notebook's pictures apart
@@ -51,6 +51,14 @@ def _(found: Any) -> str:
 @drawn.register
 def _(found: planner.Plan) -> str:
     return drawn(Picture.of(found.scene, found.sensor, found.light))
+
+
+@drawn.register
+def _(found: planner.Views) -> str:
+    """Where the pictures of the largest set are taken from, and each of them."""
+    last = found.sets[-1]
+    pictures = (drawn(Picture.of(found.scene, view.sensor, view.light)) for view in last.views)
+    return f'<div style="max-width: 20em">{views_page.sky(last, f"n{next(_NUMBER)}")}</div>{"".join(pictures)}'
 
 
 @drawn.register

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,8 @@ from validation.report import (
 from validation.report.grades import LOOKS
 from validation.report.page_tables import Table
 from validation.report.requirements import next_step, sentence, what, wrong
-from validation.report.station import Station, halves_of
+from validation.report.run_cells import far
+from validation.report.station import Station, halves_of, reasons
 
 
 @dataclass(frozen=True)
@@ -68,9 +70,9 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     return paths
 
 
-def write_station(station: Station, title: str, path: Path) -> Path:
-    """Write the page of a station that was not rendered: its first screen, and its budget."""
-    sections = _budget(station.budget)
+def write_station(station: Station, title: str, path: Path, more: Sequence[Section] = ()) -> Path:
+    """Write the page of a station that was not rendered: its first screen, sections of one's own, and its budget."""
+    sections = [*more, *_budget(station.budget)]
     return write_page(first_screen(station), station.picture.scene.name, title, sections, path)
 
 
@@ -165,7 +167,8 @@ def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
         Plot(proof_figures.distributions(found, store),
              "All measured values of each requirement (bars) against what is predicted (line)."),
     ]  # fmt: skip
-    folded = [page_tables.ratios(found), page_tables.units(found), page_tables.variances(found),
+    why = reasons(campaign, far(found)[0])
+    folded = [page_tables.ratios(found, why), page_tables.units(found, why), page_tables.variances(found),
               page_tables.estimators(found)]  # fmt: skip
     answer = guide.plain_verdict(found)
     return Section("Are these uncertainties true?", answer, found.verdict.text, plots, folded=folded)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
-from scenes.status import legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
@@ -48,7 +49,8 @@ def _key(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[
     return ["setting", *headings], {index: [str(index + 1), *row] for index, row in cells.items()}
 
 
-def ratios(found: Validation) -> Table:
+def ratios(found: Validation, reasons: Mapping[str, str] = MappingProxyType({})) -> Table:
+    """Ratios and errors of the first measurand in the image; ``reasons`` as of `validation.report.station.reasons`."""
     rows, which = far(found)
     key, cells = _key(found, rows)
     columns = [
@@ -57,7 +59,7 @@ def ratios(found: Validation) -> Table:
     ]  # fmt: skip
     lines = [[*cells[row.index], ratio(row.main), str(row.main.n), failed(row), *of_errors(row)] for row in rows]
     terms = guide.ratio_terms(rows[0].main.method, 1 + len(rows[0].classic))
-    note = " ".join([*terms, *legend(row.main.status for row in rows), which])
+    note = " ".join([*terms, *guide.statuses((row.main.status for row in rows), reasons), which])
     return Table("Measured over predicted variance, by setting", columns, lines, note, advice=_advice(found, "ratios"))
 
 
@@ -73,8 +75,8 @@ def variances(found: Validation) -> Table:
     return Table(title, columns, lines, " ".join([*terms, which]), advice=_advice(found, "variances"))
 
 
-def units(found: Validation) -> Table:
-    """Every measurand in the scene's unit."""
+def units(found: Validation, reasons: Mapping[str, str] = MappingProxyType({})) -> Table:
+    """Every measurand in the scene's unit; ``reasons`` as of `validation.report.station.reasons`."""
     rows, which = far(found)
     key, cells = _key(found, rows)
     columns = [
@@ -82,8 +84,8 @@ def units(found: Validation) -> Table:
         "bias left", "u(bias)", "status",
     ]  # fmt: skip
     lines = [[*cells[row.index], *of_measurand(each)] for row in rows for each in row.measurands]
-    statuses = (each.status for row in rows for each in row.measurands)
-    note = " ".join([*guide.unit_terms(statuses, any(len(row.measurands) > 1 for row in rows)), which])
+    statuses = guide.statuses((each.status for row in rows for each in row.measurands), reasons)
+    note = " ".join([*guide.unit_terms(any(len(row.measurands) > 1 for row in rows)), *statuses, which])
     return Table("All measurands in the scene's unit, by setting", columns, lines, note, advice=_advice(found, "units"))
 
 

@@ -15,14 +15,15 @@ from render import Tolerance
 from scenes import Scene
 from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
+from validation.report.cells import MODELS
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
 
-_MODELS = {
-    "calibrated": "the formula of camera, light, surface and noise (model calibrated)",
-    "paper": "the paper's formula (model paper), which is right up to one factor",
-    "bound": "what no unbiased measurement can beat (model bound)",
-}
+_TERMS = (
+    "  place, now: in the plan, and by the pictures. calibrated: variance by the formula; propagated: by the rendered",
+    "  picture; with u(bias): with what is not known of its bias, by which places are compared. ratio: propagated /",
+    "  calibrated. not in formulas: effects that only the picture shows.",
+)
 _WHERE = {"object": "on the object", "image": "in the image"}
 
 
@@ -51,7 +52,7 @@ def _head(found: planner.Plan, units: tuple[str, str], seconds: float) -> str:
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {_state(p)}\n"
         f"  One picture's sigma is {p.variance_object**0.5:.3g} {units[0]} of {p.value_object:.4g} {units[0]};"
         f" in the image {p.variance_image**0.5:.3g} {units[1]} of {p.value_image:.4g} {units[1]}.\n"
-        f"  Least variance {_WHERE[found.objective]}, by {_MODELS[found.model]}; measured from {edges}.\n"
+        f"  Least variance {_WHERE[found.objective]}, by {MODELS[found.model]}; measured from {edges}.\n"
         + "".join(f"{line}\n" for line in _textures(p))
         + _searched(found, seconds)
     )
@@ -65,7 +66,7 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
         found.scene.title or found.scene.name,
         "The best place of sensor and light, as (angle from the vertical, azimuth) in degrees:",
         f"  sensor {_pose(found.sensor)}, light {_pose(found.light)}: {state}",
-        f"  Least {how} of sigma to tolerance, by {_MODELS[found.model]}; measured from {edges}.",
+        f"  Least {how} of sigma to tolerance, by {MODELS[found.model]}; measured from {edges}.",
         f"  Limited by {found.limiting}, whose sigma is {100 * p.worst_ratio:.3g} % of its tolerance.",
     ]
     for each in p.measurands:
@@ -227,9 +228,9 @@ def _reading(found: planner.Plan) -> str:
 def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
     """The rendered settings, and what follows from them."""
     if checked.proposed is None:
-        lines = [f"\nNot checked by rendering: {checked.reason}."]
-        return Group(*([_checked_table(found, checked)] if checked.settings else []), Text("\n".join(lines)))
-    lines = [_order(checked), _proposal(checked)]
+        table = [_checked_table(found, checked), *map(Text, [*_TERMS, *_statuses(checked)])] if checked.settings else []
+        return Group(*table, Text(f"\nNot checked by rendering: {checked.reason}."))
+    lines = [*_TERMS, *_statuses(checked), _order(checked), _proposal(checked)]
     if checked.without_formula:
         many = sum(bool(row.without_formula) for row in checked.settings)
         names = ", ".join(checked.without_formula)
@@ -264,6 +265,12 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
         names = ", ".join(row.without_formula)
         table.add_row(str(row.rank_before), now, _pose(row.sensor), _pose(row.light), *values, ratio, row.status, names)
     return table
+
+
+def _statuses(checked: PlanCheck) -> list[str]:
+    """What each status of the table means, what decided it in the first place that has it, and what to do."""
+    reasons = (f"place {row.rank_before}, {row.reason}" if row.reason else "" for row in checked.settings)
+    return [f"  {line}" for line in legend((row.status for row in checked.settings), reasons)]
 
 
 def _order(checked: PlanCheck) -> str:

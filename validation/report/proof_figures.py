@@ -193,9 +193,9 @@ def bias_told(lines: Sequence[Line]) -> str:
 def distributions(found: Validation, store: RunFile) -> Markup:
     """Of each requirement all measured values, less their setting's mean, over the predicted sigma, as small panels."""
     counts = standardised(found, store)
-    names = list(counts)[:_PANELS]
-    across = min(3, len(names))
-    down = -(-len(names) // across)
+    names = [name for name, count in counts.items() if count.any()][:_PANELS]
+    across = min(3, max(len(names), 1))
+    down = max(-(-len(names) // across), 1)
     figure, panels = plt.subplots(
         down, across, figsize=(WIDTH, 0.5 + 1.35 * down), squeeze=False, sharex=True, layout="constrained"
     )
@@ -251,7 +251,7 @@ def _label(line: Line, every: Sequence[Line]) -> str:
     """Requirement, and the setting where there are several; of one requirement the setting alone."""
     several = any(other.setting != every[0].setting for other in every)
     if not several:
-        return f"{_short(line.name)} {line.number}"
+        return f"{line.number}: {_short(line.name)}"
     if all(other.number == 1 for other in every):
         return f"setting {line.setting}"
     return f"{_short(line.name)}, setting {line.setting}"

@@ -93,13 +93,13 @@ class Requirement:
 
 
 def predicted(picture: Picture, p: float = 0.95) -> tuple[Requirement, ...]:
-    """Of a picture, from its models alone."""
+    """Of a picture, from its models alone: by the classic locators, as plans are made and runs are judged."""
     told = planner.predict(picture).measurands
     return requirements(
         picture,
         sigmas=[math.sqrt(each.variance_object) for each in told],
         biases=[finite(each.bias_object) for each in told],
-        found=measurable_budget(picture, p=p),
+        found=measurable_budget(picture, p=p, biased=True),
     )
 
 
@@ -142,11 +142,12 @@ def measurable_budget(
     statuses: Sequence[str] | None = None,
     doubts: Sequence[float] | None = None,
     p: float = 0.95,
+    biased: bool | None = None,
 ) -> SceneBudget | None:
     """The budget of those measurands that can be measured in a picture; None where there are none.
 
-    ``variances``, ``biases`` and ``statuses`` of all M as of `planner.budgeting.budgets.budget`; ``doubts`` standard
-    uncertainties of the biases where they are taken off.
+    ``variances``, ``biases``, ``statuses`` and ``biased`` of all M as of `planner.budgeting.budgets.budget`; ``doubts``
+    standard uncertainties of the biases where they are taken off.
     """
     forecasts, scene = planner.predict(picture).measurands, picture.scene
     good = [math.isfinite(each.variance_object) for each in forecasts]
@@ -166,6 +167,7 @@ def measurable_budget(
         places = list(range(len(good)))
     told = {"variances": variances, "biases": biases, "doubts": doubts}
     known = {name: np.array([each[m] for m in places], float) for name, each in told.items() if each is not None}
+    known["biased"] = biased
     if doubts is not None:
         known["doubts"] = {_UNSURE: known["doubts"]}
     try:
@@ -202,13 +204,21 @@ def sentence(found: Sequence[Requirement]) -> str:
     for grade, words in (
         (Grade.WITHIN, f"measured within tolerance, with an uncertainty U above {100 * _WELL:.0f} % of it"),
         (Grade.OVER, "measured with an uncertainty U that is larger than the tolerance"),
-        (Grade.OPEN, "measured; no tolerance is given to compare with"),
+        (Grade.OPEN, f"measured{_known(found)}; no tolerance is given to compare with"),
         (Grade.DOUBT, "not proven: its value must not be relied on"),
     ):
         if some := [each for each in found if each.grade == grade]:
             words = words if len(some) == 1 else words.replace("its value", "their values")
             parts.append(f"{_which(some, len(found))} {words}")
     return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
+
+
+def _known(found: Sequence[Requirement]) -> str:
+    """The uncertainty of what has no tolerance, where that is one number."""
+    each = [one for one in found if one.grade == Grade.OPEN]
+    if len(each) != 1 or each[0].U is None:
+        return ""
+    return f" with an expanded uncertainty U (95 %) of {each[0].U:.2g} {each[0].unit}"
 
 
 def wrong(found: Sequence[Requirement]) -> list[str]:
@@ -267,4 +277,4 @@ def next_step(found: Sequence[Requirement]) -> str:
         return f"Improve {worst.name} first{_mostly(worst)}."
     if found and all(each.grade == Grade.OPEN for each in found):
         return "Give each requirement its tolerance in the scene, then U can be compared with it."
-    return "Nothing has to be changed: set camera and lamp up as they are drawn here."
+    return "Nothing has to be changed: set camera and lamp up at these places."

@@ -74,9 +74,12 @@ def report(scene: Scene) -> Group:
         )
     ]
     found = (table(f"\n{title}, {unit}", *columns, rows=rows, words=_WORDS) for title, columns, rows in _tables(scene))
-    return Group(*parts, *(made for made in found if made.row_count), Text(_smooth(scene)))
+    return Group(*parts, *(made for made in found if made.row_count), Text(_TERMS), Text(_smooth(scene)))
 
 
+_TERMS = """
+inner: an edge as at the foot of a step. hole, outer: of which side a circle is the rim. residual: how far the mesh is
+from the exact surface, rms. mount: free, with the camera, or fixed. [[measurands]] of a scene file refer to names."""
 _WORDS = ("name", "kind", "of", "mount", "")
 
 
@@ -165,9 +168,7 @@ def _material(scene: Scene, face: int) -> str | None:
 def _smooth(scene: Scene) -> str:
     left = len(scene.solid.edges) - len(scene.solid.sharp)
     return (
-        f"\n{left} more edges stand for curved surfaces and their rims: nothing can be measured by them."
-        if left
-        else ""
+        f"{left} more edges stand for curved surfaces and their rims: nothing can be measured by them." if left else ""
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +41,7 @@ def of_picture(picture: Picture, p: float = 0.95, *, simulated: bool = False) ->
     off."""
     told = planner.predict(picture).measurands
     if not simulated or budgets.formulas_do(picture, tuple(each.status for each in told)):
-        return Station(picture, predicted(picture, p), measurable_budget(picture, p=p))
+        return Station(picture, predicted(picture, p), measurable_budget(picture, p=p, biased=True))
     off = budgets.simulated(picture)
     known = measurable_budget(picture, off.sigma**2, statuses=off.status, doubts=off.u_bias, p=p)
     made = requirements(
@@ -94,6 +95,22 @@ def _biases(row: Row, store: RunFile) -> list[float]:
     """Of each measurand in the noise-free image."""
     values = (store.propagated(row.index, column(row.main.method, k))[1] for k in range(len(row.measurands)))
     return [value - each.value for value, each in zip(values, row.measurands, strict=True)]
+
+
+def reasons(campaign: Campaign, rows: Sequence[Row]) -> dict[str, str]:
+    """By status that is not trusted what decided it at the first requirement of some rows that has it, with its number;
+    empty where no more is known than the status says."""
+    told: dict[str, str] = {}
+    for row in rows:
+        doubtful = [m for m, each in enumerate(row.measurands) if not is_trusted(each.status)]
+        if all(row.measurands[m].status in told for m in doubtful):
+            continue
+        forecasts = planner.predict(campaign.case(row.index).picture).measurands
+        for m in doubtful:
+            each = row.measurands[m]
+            why = forecasts[m].why(each.status, each.u_bias, math.sqrt(each.predicted))
+            told.setdefault(each.status, why and f"{each.name}, setting {row.index + 1}: {why}")
+    return told
 
 
 def halves_of(campaign: Campaign) -> dict[str, float]:

@@ -49,13 +49,13 @@ def table(found: Sequence[Requirement]) -> Table:
 
 def _cells(each: Requirement) -> tuple[str, ...]:
     places = decimals(each.sigma) if math.isfinite(each.sigma) else 3
-    percent = "-" if each.ratio is None else f"{100 * each.ratio:.2g} %" if each.ratio < 10 else f"{each.ratio:.2g} x"
+    part = "-" if each.ratio is None else cells.percent(each.ratio)
     result = f"{each.grade}: {each.status}" if each.grade == Grade.DOUBT else str(each.grade)
     return (
         each.name, _nominal(each), cells.zone(each.tolerance),
         "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}",
         _bias(each, places), "-" if each.U is None or each.grade == Grade.DOUBT else f"{each.U:.{decimals(each.U)}f}",
-        percent, result, each.limits or "-",
+        part, result, each.limits or "-",
     )  # fmt: skip
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenes.status import legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report import guide
@@ -28,9 +30,13 @@ from validation.report.run_cells import (
 )
 
 
-def report(found: Validation, explained: bool = False) -> Group:
-    """Everything that ``ice validate`` prints, each table with its terms; ``explained``: all of them at length."""
-    parts = [Text(found.title, style="bold"), *_variances(found), *_ratios(found), *_measurands(found)]
+def report(found: Validation, explained: bool = False, reasons: Mapping[str, str] = MappingProxyType({})) -> Group:
+    """Everything that ``ice validate`` prints, each table with its terms; ``explained``: all of them at length.
+
+    ``reasons`` says by status what decided it, as of `validation.report.station.reasons`.
+    """
+    parts = [Text(found.title, style="bold"), *_variances(found), *_ratios(found, reasons)]
+    parts += _measurands(found, reasons)
     if found.search:
         parts.append(_search(found))
     if found.refused:
@@ -93,7 +99,7 @@ _PARTS = (
 )
 
 
-def _ratios(found: Validation) -> list[Table | Text]:
+def _ratios(found: Validation, reasons: Mapping[str, str]) -> list[Table | Text]:
     rows, which = far(found)
     headings, cells = names(found, rows)
     main, others = rows[0].main.method, other_methods(rows)
@@ -108,11 +114,11 @@ def _ratios(found: Validation) -> list[Table | Text]:
         each = [ratio(judged[name]) if name in judged else "-" for name in (main, *others)]
         parts = [small_sigma(row.texture)] * uneven
         table.add_row(*cells[row.index], *each, str(row.main.n), failed(row), *parts, *of_errors(row))
-    terms = guide.ratio_terms(main, 1 + len(others)) + legend(row.main.status for row in rows)
+    terms = guide.ratio_terms(main, 1 + len(others)) + guide.statuses((row.main.status for row in rows), reasons)
     return [table, _lines([*terms, *(_PARTS if uneven else ()), which])]
 
 
-def _measurands(found: Validation) -> list[Table | Text]:
+def _measurands(found: Validation, reasons: Mapping[str, str]) -> list[Table | Text]:
     """Every measurand of the rows that are shown, in the scene's unit."""
     rows, which = far(found)
     headings, cells = names(found, rows)
@@ -124,8 +130,8 @@ def _measurands(found: Validation) -> list[Table | Text]:
     for row in rows:
         for each in row.measurands:
             table.add_row(*cells[row.index], *of_measurand(each))
-    statuses = (each.status for row in rows for each in row.measurands)
-    return [table, _lines([*guide.unit_terms(statuses, _several(found)), which])]
+    statuses = guide.statuses((each.status for row in rows for each in row.measurands), reasons)
+    return [table, _lines([*guide.unit_terms(_several(found)), *statuses, which])]
 
 
 def _search(found: Validation) -> Table:

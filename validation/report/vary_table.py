@@ -14,7 +14,7 @@ from validation.report.cells import table as _table
 from validation.strict_json import plain
 from validation.vary_check import Scatter, VaryCheck
 
-_HELD = {
+HELD = {
     "time": "exposure time: a polariser before the lamp and one before the lens each pass half of unpolarised light,"
     " lamps bring their power, filters what they pass",
     "white": "the grey level of a white diffuse surface: what polarisers, lamps and filters take is made up for by"
@@ -22,32 +22,55 @@ _HELD = {
 }
 
 
+COLUMNS = ("", "sensor", "light", "analyser", "polarisation", "band", "time", "minimised", "status")
+TERMS = """\
+  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of
+  exposure, 1 is that of the scene. minimised: variance. fixed: the scene's own choice, at the best poses for it."""
+
+
 def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
     """Choices, gain, and what noisy pictures of both plans say."""
     varied = found.varied
     lines = [
-        f"\nVaried: {', '.join(varied.vary)} ({varied.evaluated} settings in {seconds:.1f} s with the plan)",
-        f"  Equal: {_HELD[varied.hold]}.",
+        f"\nProposed, with what was varied: {proposed(varied)}.",
+        f"  Varied: {', '.join(varied.vary)} ({varied.evaluated} settings in {seconds:.1f} s with the plan)",
+        f"  Equal: {HELD[varied.hold]}.",
         f"  Gain over the fixed choice: {varied.gain:.3f} in variance with poses of their own,"
         f" {varied.gain_same_poses:.3f} at its poses.",
         f"  Guarantee: {varied.guarantee}.",
     ]
-    parts = [Text("\n".join(lines)), _choices(varied)]
+    parts = [Text("\n".join(lines)), _choices(varied), Text(TERMS)]
     if checked:
         parts += [_scatters(checked), Text(_judgement(checked))]
     return Group(*parts)
 
 
 def _choices(varied: Varied) -> Table:
-    columns = ("", "sensor", "light", "analyser", "polarisation", "band", "time", "minimised", "status")
-    table = _table("\nFixed and best choice", *columns)
+    return _table("\nFixed and best choice", *COLUMNS, rows=choices(varied))
+
+
+def choices(varied: Varied) -> list[list[str]]:
+    """Cells of the fixed choice, of the best at its poses, and of the best, as `COLUMNS`."""
     names = ("fixed", "best at its poses", "best")
-    for name, chosen in zip(names, (varied.fixed, varied.same_poses, varied.best), strict=True):
-        choice = chosen.choice
-        angles = (_angle(choice.analyser_deg), _angle(choice.polarisation_deg))
-        last = f"{chosen.exposure_time:.3g}", f"{chosen.variance:.4g}", chosen.status
-        table.add_row(name, _pose(chosen.sensor), _pose(chosen.light), *angles, choice.band, *last)
-    return table
+    return [_chosen(*each) for each in zip(names, (varied.fixed, varied.same_poses, varied.best), strict=True)]
+
+
+def _chosen(name: str, chosen: Chosen) -> list[str]:
+    choice = chosen.choice
+    angles = (_angle(choice.analyser_deg), _angle(choice.polarisation_deg))
+    last = f"{chosen.exposure_time:.3g}", f"{chosen.variance:.4g}", chosen.status
+    return [name, _pose(chosen.sensor), _pose(chosen.light), *angles, choice.band, *last]
+
+
+def proposed(varied: Varied) -> str:
+    """The best choice and its poses, and what it gains, in words."""
+    best, choice = varied.best, varied.best.choice
+    angles = (("analyser at", choice.analyser_deg), ("polariser before the lamp at", choice.polarisation_deg))
+    parts = [choice.band, *(f"{what} {angle:.1f} degrees" for what, angle in angles if angle is not None)]
+    return (
+        f"{', '.join(parts)}; sensor {_pose(best.sensor)}, light {_pose(best.light)}. The scene's own choice has "
+        f"{varied.gain:.2f} times the variance at its best places"
+    )
 
 
 def _scatters(checked: VaryCheck) -> Table:

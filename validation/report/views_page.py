@@ -64,18 +64,17 @@ def requirements(found: planner.ViewSet) -> tuple[Requirement, ...]:
     made = []
     for m, each in enumerate(told):
         sigma, state = math.sqrt(both.variances[m]), both.status[m]
-        why = (view.prediction.measurands[m].why(state) for view in found.views)
         used = [str(v + 1) for v in range(len(found.views)) if both.used[v, m]]
         made.append(Requirement(
             number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance, sigma=sigma,
             bias=finite(both.bias[m]), u_bias=None, U=finite(k * sigma), status=state, kind=each.kind,
             limits=f"picture{'s' * (len(used) > 1)} {', '.join(used)}" if used else "",
-            reason=next(filter(None, why), ""),
+            reason=found.why(m),
         ))  # fmt: skip
     return tuple(made)
 
 
-def sky(found: planner.ViewSet) -> Markup:
+def sky(found: planner.ViewSet, key: str = "sky") -> Markup:
     """Where cameras and lamps stand, numbered, seen from above the part."""
     poses = [pose for view in found.views for pose in (view.sensor, view.light)]
     reach = 90.0 if max(pose.polar_deg for pose in poses) <= 90 else 180.0
@@ -87,7 +86,7 @@ def sky(found: planner.ViewSet) -> Markup:
         for (x, y), marker, colour in zip(ends, "so", (_CAMERA, _LAMP), strict=True):
             axis.plot(x, y, marker, color=colour, ms=15, mec="white")
             axis.text(x, y, str(number), color="white", fontsize=TEXT, ha="center", va="center_baseline", weight="bold")
-    return inline(figure, "sky", f"Seen from above: squares cameras, circles lamps. {_told(found)}.")
+    return inline(figure, key, f"Seen from above: squares cameras, circles lamps. {_told(found)}.")
 
 
 def _told(found: planner.ViewSet) -> str:

@@ -7,16 +7,23 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
 from validation.report.cells import sigma as _sigma
 from validation.report.cells import table as _table
 from validation.views_check import CheckedQuantity, ViewsCheck
 
+_TERMS = """\
+  minimised: what is said above, of all pictures together. one / it, repeats / it: how many times as large it is of the
+  best single picture, and of that one taken as often, which takes as long. over exhaustive: how far above the best of
+  all sets of what was looked at. over grid's bound: over what no pictures of the grid can stay below."""
+
 
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
     """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
-    parts = [Text(_head(found)), _numbers(found), _poses(found), _quantities(found), Text(_searched(found, seconds))]
+    parts = [Text(_head(found)), _numbers(found), Text(_TERMS), _poses(found), _quantities(found),
+             *_statuses(found.sets[-1]), Text(_searched(found, seconds))]  # fmt: skip
     if check:
         parts += [_checked(check)] if check.rows else []
         said = check.verdict.text if check.verdict else f"Nothing is judged: {check.reason}."
@@ -79,6 +86,14 @@ def _quantities(found: planner.Views) -> Table:
         taken = "no. " + " ".join(used) if used else "-"
         table.add_row(forecast.name, forecast.unit, *sigmas, jointly, taken, last.combination.status[m])
     return table
+
+
+def _statuses(last: planner.ViewSet) -> list[Text]:
+    """What each status of the table means, what decided it, and what to do."""
+    told = [forecast.name for forecast in last.views[0].prediction.measurands]
+    reasons = [f"{name}: {why}" if (why := last.why(m)) else "" for m, name in enumerate(told)]
+    lines = legend(last.combination.status, reasons)
+    return [Text("\n".join(f"  {line}" for line in lines))] if lines else []
 
 
 def _searched(found: planner.Views, seconds: float) -> str:
