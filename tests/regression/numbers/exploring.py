@@ -1,6 +1,7 @@
 """The interactive page: a visitor's whole conversation, with work done at once in this process; who may come in."""
 
 import asyncio
+import base64
 import json
 import tempfile
 from concurrent.futures import BrokenExecutor
@@ -97,12 +98,18 @@ def _shorter(message):
             if isinstance(value, list) and value and not isinstance(value[0], list | dict | str)
         }
     if kept["type"] == "scene":
-        kept |= {key: np.array(kept[key]) for key in ("triangles", "normals")}
+        kept["corners"] = kept["step"] * _integers(kept["corners"], "<i2")
+        kept["normals"] = _integers(kept["normals"], "i1") / 127
     if kept["type"] == "proof":  # a histogram's counts are ties of rounding
         kept["rows"] = [
             {key: value for key, value in row.items() if key not in ("counts", "edges")} for row in kept["rows"]
         ]
     return kept
+
+
+def _integers(packed, kind):
+    """Rows of three that a page unpacks."""
+    return np.frombuffer(base64.b64decode(packed), kind).reshape(-1, 3).astype(float)
 
 
 def _moved(name, rest, **how):
