@@ -134,6 +134,12 @@ EQUIVALENT: dict[str, str] = {
     "imaging/sensor.py: _QUIETEST = 6  # grey levels that less noise reaches": "one level more has no probability",
     "render/build.py: _BLOCK = 33  # fine pixels that share a stream of random numbers in scalar variants; else it "
     "depends on the processor": "which random numbers are whose",
+    "measure/photo/lens.py: "
+    "points = lens.straighten(place[inside] + found.offset[-1][:, None] * toward[inside])":
+        "of one image the first is the last",
+    "validation/hard/measure_cases.py: image = picture(scene, contrast= 59.0, background=100.0)":
+        "a case of a little less contrast",
+    "validation/report/station_sketch.py: for side in []:": "how dark a sketch's frame is drawn",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",
