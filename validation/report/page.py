@@ -33,6 +33,8 @@ from validation.report.requirements import next_step, sentence, what, wrong
 from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
 
+SIMULATED = "How well is told by simulation: no camera was used"
+
 
 @dataclass(frozen=True)
 class Plot:
@@ -63,7 +65,8 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     if found.refused:
         sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
     sections.append(_done(found, store))
-    context = _context(station, found.title or found.scene, sections) | {"agrees": found.verdict.agrees}
+    first = first_screen(station, not store.identity().get("photos"))
+    context = _context(station, first, found.title or found.scene, sections) | {"agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
     paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
@@ -90,26 +93,27 @@ def _environment(escaped: bool) -> jinja2.Environment:
     return made
 
 
-def _context(station: Station, title: str, sections: list[Section]) -> dict[str, Any]:
+def _context(station: Station, first: dict[str, Any], title: str, sections: list[Section]) -> dict[str, Any]:
     return {
         "name": station.picture.scene.name,
         "title": title,
         "sections": sections,
-        "station": first_screen(station),
+        "station": first,
     }
 
 
-def first_screen(station: Station) -> dict[str, Any]:
-    """What the template of a page's first screen takes."""
+def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
+    """What the template of a page's first screen takes; of photographs nothing is simulated."""
     found, picture = station.requirements, station.picture
     told = station_sketch.told(picture)
+    simulated = f". {SIMULATED}" if is_simulated else ""
     number = f"Setting {station.number}. " if station.number else ""
     how = "" if station.image is not None else " Drawn from the model: no shadows, no light between surfaces."
     named = "; ".join(f"{each.number} {each.name}: {each.grade}" for each in found)
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
-        "what": f"{what(found)} on this part, numbered in the picture, from one picture of one camera",
+        "what": f"{what(found)} on this part, numbered in the picture, from one picture of one camera{simulated}",
         "sentence": sentence(found),
         "wrong": wrong(found),
         "next": next_step(found),

@@ -36,7 +36,8 @@ def write(found: planner.Views, path: Path) -> Path:
     scene, last = found.scene, found.sets[-1]
     asked = requirements(last)
     first = {
-        "what": f"{what(asked)} on this part, numbered in the pictures, from {_pictures(len(last.views))} together",
+        "what": f"{what(asked)} on this part, numbered in the pictures, from {_pictures(len(last.views))} together. "
+        f"{page.SIMULATED}",
         "sentence": sentence(asked), "wrong": wrong(asked), "next": next_step(asked),
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
