@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from imaging.light.emitters import reach_of
 from scenes import InvalidInput, Scene
 from validation.batch import pool
 from validation.batch.work import Found, Task
@@ -253,7 +254,7 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
     """
     bodies, solid = scene.bodies, scene.solid
     middle = np.array(scene.camera.look_at)
-    size = float(np.linalg.norm(solid.vertices - middle, axis=1).max())
+    size = reach_of(scene)
     needed = {name for quantity in scene.quantities for name in quantity.edges}
     edges = [
         {"name": edge.name, "ends": _rounded((solid.vertices[list(edge.ends)] - middle) / size)}
