@@ -101,7 +101,7 @@ def differences(stored, found, rel, where="", size=0.0) -> Iterator[str]:
 def _spread(row: dict) -> float:
     """One standard deviation of what a row is about, which its biases are small against."""
     variances = [row.get(key) for key in ("empirical", "variance", "variance_object") if _is_size(row.get(key))]
-    sigmas = [row.get(key) for key in ("sigma", "u") if _is_size(row.get(key))]
+    sigmas = [row.get(key) for key in ("sigma", "u", "measured") if _is_size(row.get(key))]
     return max([*(math.sqrt(v) for v in variances), *sigmas], default=0.0)
 
 
