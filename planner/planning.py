@@ -206,7 +206,7 @@ def plan(
         check_choice(name, value, get_args(choices))
     if vary:
         check_vary(scene, vary, hold)
-    report, limits = report or (lambda *_: None), constraints or Constraints()
+    report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
     tasks = required_edges(scene) if edges == "best" else ()
     searches = []
     for world in [scene.model_copy(update={"task": task}) for task in tasks] or [scene]:

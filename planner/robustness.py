@@ -171,7 +171,7 @@ def robust(plan: Plan, tolerances: Tolerances, constraints: Constraints | None =
 
 def _problem(plan: Plan, constraints: Constraints | None) -> SearchProblem:
     aim = Aim.of(plan.scene.quantities, plan.objective, plan.over)
-    return SearchProblem(plan.scene, plan.model, aim, constraints or Constraints())
+    return SearchProblem(plan.scene, plan.model, aim, (constraints or Constraints()).on_side_of(plan.scene))
 
 
 def _with_pose_errors(sensor: np.ndarray, light: np.ndarray, tolerances: Tolerances) -> tuple[np.ndarray, np.ndarray]:

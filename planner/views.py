@@ -95,7 +95,8 @@ def plan_views(
     aim = _aim(scene, count, objective, over, model, share)
     if len(scene.lights) != 1 or not scene.free:
         raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
-    report, problem = report or (lambda *_: None), SearchProblem(scene, model, aim, constraints or Constraints())
+    report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
+    problem = SearchProblem(scene, model, aim, limits)
     fast = has_bound(scene, model) and share is None
     step = (_FINE_STEP if fast else COARSE_STEP) if step_deg is None else step_deg
     grid = Grid.of(scene, problem.constraints, step, sensor, light)

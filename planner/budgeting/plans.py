@@ -99,7 +99,7 @@ def plan_capability(
     InvalidInput
         If no allowed setting can measure, or a tolerance is missing.
     """
-    problem = SearchProblem.of(scene, "calibrated", "object", constraints or Constraints())
+    problem = SearchProblem.of(scene, "calibrated", "object", (constraints or Constraints()).on_side_of(scene))
     report = report or (lambda *_: None)
     if len(scene.free) > 1 and light is None:
         raise InvalidInput(f"light must be given for a scene of {len(scene.free)} free lights, got nothing")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,18 +12,20 @@ from imaging.geometry.projection import direction, light_position, project
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Scene
 
+WHOLE = (0.0, 180.0)  # polar angles of the sphere
 _BODY = 0.05  # of the distance: radius of a body of which nothing is said
 Region = tuple[float, float, float]  # polar, azimuth, radius, degrees
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """Limits on a plan; the default is the upper hemisphere, camera and lamp clear of each other.
+    """Limits on a plan; by default camera and lamp stay clear of each other, each on its side of the part.
 
     Attributes
     ----------
-    sensor_polar_deg, light_polar_deg : pair of float
-        Least and greatest polar angle.
+    sensor_polar_deg, light_polar_deg : pair of float, optional
+        Least and greatest polar angle. Where not given, those of the hemisphere in which the scene's first setting has
+        it, the upper one without any (`on_side_of`).
     sensor_azimuth_deg, light_azimuth_deg : pair of float, optional
         From one azimuth to another, growing: (350, 20) are 30 degrees. All where not given.
     camera_body, light_body : float, optional
@@ -43,8 +45,8 @@ class Constraints:
         Whether the light is mounted at the sensor: both in the same direction. Their bodies are then one.
     """
 
-    sensor_polar_deg: tuple[float, float] = (0.0, 90.0)
-    light_polar_deg: tuple[float, float] = (0.0, 90.0)
+    sensor_polar_deg: tuple[float, float] | None = None
+    light_polar_deg: tuple[float, float] | None = None
     sensor_azimuth_deg: tuple[float, float] | None = None
     light_azimuth_deg: tuple[float, float] | None = None
     camera_body: float | None = None
@@ -59,7 +61,7 @@ class Constraints:
 
     def __post_init__(self) -> None:
         for role in ("sensor", "light"):
-            low, high = getattr(self, f"{role}_polar_deg")
+            low, high = getattr(self, f"{role}_polar_deg") or WHOLE
             _check(0 <= low <= high <= 180, f"{role}_polar_deg", "two rising angles between 0 and 180", (low, high))
             limits = getattr(self, f"{role}_azimuth_deg")
             told = limits is None or (np.isfinite(limits).all() and abs(limits[1] - limits[0]) <= 360)
@@ -75,6 +77,13 @@ class Constraints:
             _check(0 <= value <= most, name, f"at {f'most {most:g}' if value > most else 'least 0'}", value)
         _check(not (self.same_mount and self.min_separation_deg > 0), "min_separation_deg", "0 with same_mount",
                self.min_separation_deg)  # fmt: skip
+
+    def on_side_of(self, scene: Scene) -> Constraints:
+        """The same, with the polar angles that are not given: a part that is seen from below is planned from below."""
+        first = scene.settings[:1]
+        sensor = self.sensor_polar_deg or same_side(each.sensor for each in first)
+        light = self.light_polar_deg or same_side(pose for each in first for pose in each.lights)
+        return replace(self, sensor_polar_deg=sensor, light_polar_deg=light)
 
     @property
     def on_pairs(self) -> bool:
@@ -169,8 +178,9 @@ def same_side(poses: Iterable[Pose]) -> tuple[float, float]:
     return (0.0 if min(polar, default=0.0) <= 90 else 90.0), (180.0 if max(polar, default=0.0) > 90 else 90.0)
 
 
-def _polar(poses: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    return (poses[:, 0] >= limits[0] - 1e-9) & (poses[:, 0] <= limits[1] + 1e-9)
+def _polar(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray:
+    low, high = limits or WHOLE
+    return (poses[:, 0] >= low - 1e-9) & (poses[:, 0] <= high + 1e-9)
 
 
 def _outside(poses: np.ndarray, regions: tuple[Region, ...]) -> np.ndarray:
@@ -212,4 +222,4 @@ def _to_segment(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)
 
 
-UNCONSTRAINED = Constraints((0.0, 180.0), (0.0, 180.0), camera_body=0.0, light_body=0.0)
+UNCONSTRAINED = Constraints(WHOLE, WHOLE, camera_body=0.0, light_body=0.0)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
-from planner.search.constraints import Constraints
+from planner.search.constraints import WHOLE, Constraints
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given
@@ -194,8 +194,8 @@ class Grid:
         if constraints.same_mount:  # the one says the other
             sensor, light = (light if sensor is None else sensor), (sensor if light is None else light)
         held = sensor is not None, light is not None
-        sensors = ViewingSpace(step_deg, constraints.sensor_polar_deg).poses
-        lights = ViewingSpace(step_deg, constraints.light_polar_deg).poses if scene.free else np.zeros((1, 0))
+        sensors = ViewingSpace(step_deg, constraints.sensor_polar_deg or WHOLE).poses
+        lights = ViewingSpace(step_deg, constraints.light_polar_deg or WHOLE).poses if scene.free else np.zeros((1, 0))
         if held[0]:
             sensors = np.array([list(scene.check_pose("sensor", sensor))])
         if held[1]:

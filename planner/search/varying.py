@@ -16,6 +16,7 @@ import numpy as np
 
 from imaging.geometry.projection import direction
 from planner.search.candidates import DEAREST, RayTraced
+from planner.search.constraints import WHOLE
 from planner.search.design import (
     Choice,
     Chosen,
@@ -154,7 +155,7 @@ class Variation:
     def _pairs(self, poses, others) -> tuple[np.ndarray, np.ndarray]:
         """Allowed pairs of a coarse grid, and those that are given, shape (n, 2) each."""
         limits, scene = self.problem.constraints, self.scene
-        polars = limits.sensor_polar_deg, limits.light_polar_deg
+        polars = limits.sensor_polar_deg or WHOLE, limits.light_polar_deg or WHOLE
         sensors, lights = (
             pose[None] if held else ViewingSpace(POSE_STEP, polar).poses
             for held, pose, polar in zip(self.held, poses, polars, strict=True)

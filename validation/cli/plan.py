@@ -148,12 +148,11 @@ def plan_command(
     loaded = scenes.load(scene)
     import planner
 
-    stand = loaded.settings[:1]
     limits = planner.Constraints(
-        sensor_polar_deg=_range("--sensor-polar", sensor_polar, *(each.sensor for each in stand)),
-        light_polar_deg=_range("--light-polar", light_polar, *(at for each in stand for at in each.lights)),
-        sensor_azimuth_deg=_azimuths("--sensor-azimuth", sensor_azimuth),
-        light_azimuth_deg=_azimuths("--light-azimuth", light_azimuth), camera_body=camera_body, light_body=light_body,
+        sensor_polar_deg=_range("--sensor-polar", sensor_polar),
+        light_polar_deg=_range("--light-polar", light_polar),
+        sensor_azimuth_deg=_range("--sensor-azimuth", sensor_azimuth),
+        light_azimuth_deg=_range("--light-azimuth", light_azimuth), camera_body=camera_body, light_body=light_body,
         min_edge_px=min_edge, min_clearance_px=min_clearance, min_separation_deg=separation,
         light_out_of_view=light_out_of_view, same_mount=same_mount,
     )  # fmt: skip
@@ -274,18 +273,9 @@ def _check_varied(found: planner.Plan) -> VaryCheck:
         return check_varied(found, report=shown)
 
 
-def _range(option: str, text: str | None, *poses: scenes.Pose) -> tuple[float, float]:
-    """What is asked for; where nothing is, the hemisphere in which a scene's poses stand."""
-    from planner.search.constraints import same_side
-
-    return same_side(poses) if text is None else _two(option, text)
-
-
-def _azimuths(option: str, text: str | None) -> tuple[float, float] | None:
-    return None if text is None else _two(option, text)
-
-
-def _two(option: str, text: str) -> tuple[float, float]:
+def _range(option: str, text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
