@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import camera_frame, frame
+from imaging.geometry.projection import frame, rays
 from imaging.light.backlight import backlights
 from render.texture import pointed
 from scenes import Picture
@@ -65,10 +65,8 @@ def _lone(picture: Picture, which: int) -> Picture:
 def within_cone(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
     """Fine pixels of a crop (rows, columns) whose rays run within the cone in which the picture's backlight shines."""
     camera, light = picture.scene.camera, picture.scene.lights[0]
-    sensor = camera_frame(camera, np.array(list(picture.sensor)))
     towards = frame(np.array(list(picture.lights[0]))).forward
     y, x = (((np.arange(part.start, part.stop) + 0.5) / supersample - 0.5) for part in crop)
-    middle = image_centre(camera)
-    right, down = np.meshgrid((x - middle[0]) / camera.focal_px, (y - middle[1]) / camera.focal_px)
-    rays = right[..., None] * sensor.right + down[..., None] * sensor.down + sensor.forward
-    return -(rays @ towards) > np.cos(light.cone) * np.linalg.norm(rays, axis=-1)
+    places = np.stack(np.meshgrid(x, y), -1) - image_centre(camera)
+    seen = rays(places, np.array(list(picture.sensor)), camera)
+    return -(seen @ towards) > np.cos(light.cone) * np.linalg.norm(seen, axis=-1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from imaging.contours.limb import Strand
-from imaging.geometry.projection import camera_frame, sensor_position
+from imaging.geometry.projection import rays, sensor_position
 from scenes import Camera
 from scenes.parts.surfaces import Surface
 
@@ -58,9 +58,9 @@ def levels_inside(
 ) -> np.ndarray:
     """Exact level at distances (J,) px inside a strand's n points along the image's normal, (n, J); 0 past the body."""
     pose = np.array(list(sensor), float)
-    axes, eye = camera_frame(camera, pose), sensor_position(camera, pose)
+    eye = sensor_position(camera, pose)
     at = strand.at[:, None] - np.asarray(inside)[None, :, None] * strand.outward[:, None]
-    way = at[..., :1] * axes.right + at[..., 1:] * axes.down + camera.focal_px * axes.forward
+    way = rays(at, pose, camera)
     met = surface.intersections(eye, way)
     first = np.where(met > 0, met, np.inf).min(-1)
     hit = np.isfinite(first)

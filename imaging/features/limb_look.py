@@ -17,7 +17,7 @@ from imaging.features.locator import edge_blur, reach
 from imaging.features.rim_sides import equal_angles, radials, steady, to_curve
 from imaging.features.sampling import sampled_places
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import camera_frame, from_axis
+from imaging.geometry.projection import from_axis, rays
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, has_background, signal
 from imaging.light.revolved import light_around, passes, rings_of
@@ -172,9 +172,8 @@ def _profile(
     places = np.sort((chebyshev.chebpts1(_NODES) + 1) / 2)
     away = (far * places**2)[:, None]
     at = np.nan_to_num(outline.at)[..., None, :] - away * np.nan_to_num(outline.outward)[..., None, :]
-    axes, eye = camera_frame(pictures.scene.camera, pictures.sensors), pictures.sensor_at[..., None, None, :]
-    right, down, forward = (axis[..., None, None, :] for axis in (axes.right, axes.down, axes.forward))
-    way = at[..., :1] * right + at[..., 1:] * down + camera.focal_px * forward
+    eye = pictures.sensor_at[..., None, None, :]
+    way = rays(at, pictures.sensors[..., None, None, :], camera)
     met = curved.surface.intersections(np.broadcast_to(eye, way.shape), way)
     first = np.where(met > 0, met, np.inf).min(-1)
     hit = np.isfinite(first) & outline.seen[..., None]

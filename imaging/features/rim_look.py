@@ -16,7 +16,7 @@ from imaging.features.locator import edge_blur
 from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
 from imaging.features.rim_sides import RIM_POINTS, equal_angles, outward_normals, radials
 from imaging.geometry.lens import image_centre, lens_jacobian
-from imaging.geometry.projection import camera_frame, from_axis
+from imaging.geometry.projection import from_axis, rays
 from imaging.light.appearance import seen_by_rays
 from imaging.pictures import Pictures
 from scenes import Circle
@@ -169,13 +169,11 @@ def _uneven(levels: np.ndarray) -> np.ndarray:
 
 def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     """Signal at image points (k, 2) from the image's middle, ideal px."""
-    axes = camera_frame(pictures.scene.camera, pictures.sensors)
-    across = np.stack([axes.right, axes.down])
     found = np.empty(len(points))
     for k in range(0, len(points), _AT_ONCE):
         part = slice(k, k + _AT_ONCE)
-        rays = pictures.scene.camera.focal_px * axes.forward + np.nan_to_num(points[part]) @ across
-        found[part] = seen_by_rays(pictures, rays)
+        seen = rays(np.nan_to_num(points[part]), pictures.sensors, pictures.scene.camera)
+        found[part] = seen_by_rays(pictures, seen)
     return found
 
 

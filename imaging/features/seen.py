@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.geometry.projection import Frame, camera_frame, sensor_position
+from imaging.geometry.projection import Frame, camera_frame, rays, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
 from scenes.measurands.evaluated import Line, Moves, Point
 from scenes.measurands.features import place_of, point_of
@@ -172,11 +172,11 @@ class Seen:
 
     def onto(self, image: Point, plane: np.ndarray, place: np.ndarray) -> Point:
         """Where the ray of an image point meets the plane of a unit normal through a place; moves go along."""
-        axes, focal, at = self.axes, self.camera.focal_px, image.at
+        axes, focal = self.axes, self.camera.focal_px
         if self.expected:
             ray = place - self.eye
         else:
-            toward = focal * axes.forward + at[..., :1] * axes.right + at[..., 1:] * axes.down
+            toward = rays(image.at, self.sensors, self.camera)
             reach = np.einsum("...i,...i->...", plane, place - self.eye)
             ray = toward * (reach / np.einsum("...i,...i->...", plane, toward))[..., None]
         z = np.einsum("...i,...i->...", ray, axes.forward)[..., None]

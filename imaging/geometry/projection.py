@@ -146,6 +146,15 @@ def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.
     return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)
 
 
+def rays(image: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Vectors (..., 3) from the sensor through ideal image points (..., 2), px from the middle; `from_axis` back.
+
+    Along the axis they are ``focal_px`` long. Poses (..., 2) are broadcast against the points.
+    """
+    axes = camera_frame(camera, poses)
+    return image[..., :1] * axes.right + image[..., 1:] * axes.down + camera.focal_px * axes.forward
+
+
 def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:
     """Which faces turn towards a position (scene units, shape (..., 3)); bool, shape (..., F)."""
     return above(positions, solid.normals, solid.offsets)

@@ -19,7 +19,7 @@ from imaging.blurred.boundaries import sided
 from imaging.features.locator import edge_blur
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import camera_frame, edge_points, facing, jacobian_ideal
+from imaging.geometry.projection import edge_points, facing, jacobian_ideal, rays
 from imaging.light.appearance import diffuse_signal, side_signals
 from imaging.light.sheets import Sheet, sheets
 from imaging.models.along import place_nodes, used_trims
@@ -250,12 +250,11 @@ def _finest(pictures: Pictures, name: str, faces: list[int]) -> float:
 def _on_face(pictures: Pictures, view, e: int, along: np.ndarray, across: np.ndarray, face: int) -> np.ndarray:
     """Points (j, k, 3) of a face's plane that are seen at distances along (k,) and across (j,) an edge, ideal px."""
     camera, solid = pictures.scene.camera, pictures.scene.solid
-    axes = camera_frame(camera, pictures.sensors)
     tangent, normal = view.along[e] / view.lengths[e], normals(view)[e]
     image = view.ends[e, 0] + along[:, None] * tangent + across[:, None, None] * normal - image_centre(camera)
-    rays = image @ np.stack([axes.right, axes.down]) / camera.focal_px + axes.forward
+    way = rays(image, pictures.sensors, camera)
     height = solid.offsets[face] - solid.normals[face] @ pictures.sensor_at
-    return pictures.sensor_at + (height / (rays @ solid.normals[face]))[..., None] * rays
+    return pictures.sensor_at + (height / (way @ solid.normals[face]))[..., None] * way
 
 
 def _covariance(sheet: Sheet, parts, count: int) -> np.ndarray:

@@ -62,6 +62,7 @@ def test_the_lower_face_of_a_box(tmp_path):
             with about:
                 search(scene, step_deg=30)
     document = json.loads(found[160.0].stdout)
+    # margin: on the lower side, by their kind
     assert min(document["sensor"][0], document["light"][0]) > 90
     assert found[20.0].returncode == 2
     assert "constraints must leave a setting that can measure" in found[20.0].stderr

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 import planner
-from imaging.geometry.projection import camera_frame, frame, from_axis, light_position
+from imaging.geometry.projection import (
+    camera_frame,
+    depth,
+    frame,
+    from_axis,
+    light_position,
+    rays,
+    sensor_position,
+)  # fmt: skip
 from scenes import Ring
 
 POSE = np.array([40.0, 120.0])
@@ -21,6 +29,19 @@ def test_projection_turns(task1):
     plain, turned = (from_axis(task1.solid.vertices, POSE, rolled(task1, roll).camera) for roll in (0.0, 25.0))
     np.testing.assert_allclose(turned, plain @ back.T, atol=1e-9)
     assert np.abs(turned - plain).max() > 10
+
+
+@pytest.mark.parametrize("roll", [0.0, 25.0, -80.0])
+def test_rays_are_the_projection_back(task1, roll):
+    """Every point of the ray of an image point is seen there; its end is as deep as the focal length is long."""
+    camera, at = rolled(task1, roll).camera, np.array([[-133.0, 71.0], [20.0, 118.0], [0.0, 0.0]])
+    poses = np.array([POSE, (0.0, 30.0), (117.0, -50.0)])
+    for share in (0.003, 0.11):
+        points = sensor_position(camera, poses) + share * rays(at, poses, camera)
+        seen = np.array([from_axis(p[None], pose, camera)[0] for p, pose in zip(points, poses, strict=True)])
+        deep = [depth(p[None], pose, camera)[0] for p, pose in zip(points, poses, strict=True)]
+        np.testing.assert_allclose(seen, at, atol=1e-8)
+        np.testing.assert_allclose(deep, share * camera.focal_px, rtol=1e-9)
 
 
 def test_axes_stay_a_right_handed_frame(task1):

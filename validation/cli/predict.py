@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import scenes
 from scenes import InvalidInput, Pose, several
-from scenes.status import is_trusted, legend
-from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
+from scenes.status import CLUTTER, is_trusted, legend, worst
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, progress, say
 from validation.report.cells import PLACES
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -17,6 +18,7 @@ from validation.strict_json import plain
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from measure import Correction
     from planner import Prediction
 
 commands = commands()
@@ -24,6 +26,11 @@ _TERMS = (
     "sigma: standard deviation of one picture's value by noise, of the object and, px or degrees, in the image. bias: "
     "mean error."
 )
+_SIMULATED = (
+    "sigma: standard deviation of one picture's value by noise. bias: mean error in a simulated picture, ± its "
+    "standard uncertainty; `ice measure` takes it off."
+)
+_RENDER = "`--render` simulates these pictures and finds the biases, which `ice measure` takes off."
 _MOST_TOLD = 8  # pictures whose doubtful edges are told of
 
 
@@ -33,9 +40,14 @@ def predict_command(
     sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; the settings if left out.")] = None,
     light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
     model: Annotated[str, typer.Option(help="calibrated, paper or bound.")] = "calibrated",
+    render: Annotated[
+        bool, typer.Option("--render", help="Noise and bias by simulation, the bias as measuring takes it off.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Predict how precisely every measurand is measured, for the scene's settings or a given pose."""
+    if render and model != "calibrated":
+        raise InvalidInput(f"--render must be left out with --model {model}, got both")
     poses = None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
     loaded = scenes.load(scene)
     pictures = _pictures(loaded, *poses)
@@ -43,16 +55,20 @@ def predict_command(
 
     found = [planner.predict(picture, model=model) for picture in pictures]
     rows = [_facts(picture, each) for picture, each in zip(pictures, found, strict=True)]
+    if render:
+        rows = _simulated(pictures, found, rows)
     if as_json:
-        say({"scene": loaded.name, "model": model, "settings": rows}, True, "")
+        say({"scene": loaded.name, "model": model, "rendered": render, "settings": rows}, True, "")
     else:
-        console().print(_table(loaded, model, rows))
-        console().print(f" {PLACES} {_TERMS}", highlight=False)
+        console().print(_table(loaded, model, rows, render))
+        console().print(f" {PLACES} {_SIMULATED if render else _TERMS}", highlight=False)
         every = [each for row in rows for each in row["measurands"]]
         for line in legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every]):
             console().print(f" {line}", highlight=False)
-        for line in doubtful_edges(found):
+        for line in doubtful_edges(found) if not render else ():
             console().print(f" {line}", highlight=False)
+        if not render and model == "calibrated" and any(each["status"] == CLUTTER for each in every):
+            console().print(f" {_RENDER}", highlight=False)
     good = all(each["variance"] is not None for row in rows for each in row["measurands"])
     raise typer.Exit(0 if good else 1)
 
@@ -93,23 +109,59 @@ def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
                 "name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object,
                 "variance": each.variance_object, "bias": each.bias_object, "value_image": each.value_image,
                 "variance_image": each.variance_image, "bias_image": each.bias_image, "status": each.status,
-                "reason": each.reason,
+                "reason": each.reason, "u_bias": None,
             }
             for each in found.measurands
         ],
     })  # fmt: skip
 
 
-def _table(scene: scenes.Scene, model: str, rows: list[dict[str, Any]]) -> Table:
+def _simulated(
+    pictures: list[scenes.Picture], found: list[Prediction], rows: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """The same with noise and bias as simulated pictures have them, and the statuses that values have without it."""
+    from validation import budgets
+
+    with progress("simulating pictures for their bias", "pictures", at_once=True) as report:
+        made = []
+        for number, (picture, predicted, row) in enumerate(zip(pictures, found, rows, strict=True)):
+            made.append(_of_correction(budgets.simulated(picture), predicted, row))
+            report("rendering and measuring", number + 1, len(pictures))
+    return made
+
+
+def _of_correction(off: Correction, predicted: Prediction, row: dict[str, Any]) -> dict[str, Any]:
+    measurands = []
+    for m, (forecast, state) in enumerate(zip(predicted.measurands, off.status, strict=True)):
+        sigma, u = float(off.sigma[m]), float(off.u_bias[m])
+        told = {
+            "variance": sigma**2, "bias": off.bias[m], "u_bias": u, "status": state,
+            "variance_image": off.covariance_image[m, m], "bias_image": off.bias_image[m],
+            "reason": forecast.why(state, u if math.isfinite(off.bias[m]) else None, sigma),
+        }  # fmt: skip
+        measurands.append(row["measurands"][m] | plain(told))
+    return row | {"status": worst(*off.status), "measurands": measurands}
+
+
+def _table(scene: scenes.Scene, model: str, rows: list[dict[str, Any]], render: bool) -> Table:
     from validation.report.cells import MODELS, number, pose, sigma, table
 
     columns = ("sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma", "status")
-    made = table(f"{scene.name}: predicted by {MODELS[model]}", *columns, words=("measurand", "unit", "status"))
+    by = "by simulated pictures" if render else f"predicted by {MODELS[model]}"
+    made = table(f"{scene.name}: {by}", *columns, words=("measurand", "unit", "status"))
     for row in rows:
         for each in row["measurands"]:
             made.add_row(
                 pose(row["sensor"]), pose(row["light"]), each["name"], number(each["value"], ".6g"),
-                sigma(each["variance"]), number(each["bias"], ".2g"), each["unit"], number(each["value_image"], ".6g"),
+                sigma(each["variance"]), _bias(each), each["unit"], number(each["value_image"], ".6g"),
                 sigma(each["variance_image"]), each["status"],
             )  # fmt: skip
     return made
+
+
+def _bias(row: dict[str, Any]) -> str:
+    """With what a simulation leaves open of it."""
+    from validation.report.cells import number
+
+    beside = "" if row["u_bias"] is None else f" ± {row['u_bias']:.1g}"
+    return number(row["bias"], ".2g") + beside

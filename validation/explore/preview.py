@@ -11,7 +11,7 @@ import numpy as np
 
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.lens import image_centre, undistorted
-from imaging.geometry.projection import camera_frame, depth, facing, frame, project
+from imaging.geometry.projection import depth, facing, project, rays
 from imaging.geometry.rays import first_face, has_embree
 from imaging.light.appearance import face_signal, seen_by_rays
 from imaging.pictures import Pictures
@@ -91,21 +91,20 @@ def sketched(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
         return drawn(scene, picture, part)
     pictures, scale = glanced(picture), part.scale / _COARSE
     shape = max(1, round(part.height * scale)), max(1, round(part.width * scale))
-    rays = _rays(pictures, part, shape)
-    face, away = first_face(scene.bodies, np.broadcast_to(pictures.sensor_at, rays.shape), rays, ())
+    seen = _seen(pictures, part, shape)
+    face, away = first_face(scene.bodies, np.broadcast_to(pictures.sensor_at, seen.shape), seen, ())
     met = face >= 0
     canvas = np.full(shape, _beside(pictures, scene), np.float32)
-    canvas[met] = face_signal(pictures, pictures.sensor_at + away[met][:, None] * rays[met], face[met], 1)
+    canvas[met] = face_signal(pictures, pictures.sensor_at + away[met][:, None] * seen[met], face[met], 1)
     return shades(scene, _blurred(canvas, scene.camera.blur_px * scale) + scene.noise.dark_level)
 
 
-def _rays(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarray:
+def _seen(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarray:
     """Directions in which one picture's sensor looks through pixels of so many rows and columns, shape (h, w, 3)."""
-    camera, axes = pictures.scene.camera, camera_frame(pictures.scene.camera, pictures.sensors)
+    camera = pictures.scene.camera
     y, x = ((np.arange(n) + 0.5) * size / n - 0.5 for n, size in zip(shape, (part.height, part.width), strict=True))
     places = np.stack(np.meshgrid(part.left + x, part.top + y), -1)
-    places = (undistorted(places, camera) - image_centre(camera)) / camera.focal_px
-    return axes.forward + places[..., :1] * axes.right + places[..., 1:] * axes.down
+    return rays(undistorted(places, camera) - image_centre(camera), pictures.sensors, camera)
 
 
 def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
@@ -115,9 +114,8 @@ def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
 
 def _beside(pictures: Pictures, scene: Scene) -> float:
     """Signal of what lies beside the object: that of the image's first corner."""
-    camera, axes = scene.camera, frame(pictures.sensors)
-    ray = axes.forward - (camera.width * axes.right + camera.height * axes.down) / 2 / camera.focal_px
-    return float(seen_by_rays(pictures, ray[None] * camera.distance)[0])
+    corner = rays(-image_centre(scene.camera), pictures.sensors, scene.camera)
+    return float(seen_by_rays(pictures, corner[None])[0])
 
 
 def rendered(scene: Scene, image: np.ndarray, part: Window) -> np.ndarray:
