@@ -52,6 +52,9 @@ class ViewSet:
     bound : float or None
         What no K pictures of the grid can stay below, if a glance is right and nothing is clutter; None where some
         quantity cannot be measured anywhere, or what is shared is not free.
+    hard : tuple of str
+        Names of the quantities that every picture of the set that tells them cannot measure around its poses
+        (`planner.search.setting_up`): they are hard to set up.
     """
 
     views: tuple[View, ...]
@@ -62,6 +65,7 @@ class ViewSet:
     over_repeats: float | None
     exhaustive: float | None
     bound: float | None
+    hard: tuple[str, ...] = ()
 
     def why(self, m: int) -> str:
         """What decided the status of the m-th quantity, of the first picture of which it is known; empty where not."""

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from imaging.models import DEFAULT_MODEL, ModelName
-from planner.combining import combine
+from planner.combining import Combination, combine
 from planner.planning import COARSE_STEP
 from planner.search.constraints import Constraints
 from planner.search.exhaustive import has_bound
@@ -30,8 +30,9 @@ from planner.search.sets import (
     undominated,
     undominated_shared,
 )
+from planner.search.setting_up import SettingUp
 from planner.view_sets import View, Views, ViewSet
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Pose, Quantity, Scene
 
 Share = Literal["sensor", "light"]
 MOST_VIEWS = 12
@@ -143,7 +144,8 @@ def _pool(
     aim = problem.objective
     rows = undominated(told, aim) if share is None else undominated_shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
-    pool = Pool(problem, np.concatenate([grid.sensors[s], grid.lights[k]], 1), told.reshape(-1, told.shape[-1])[rows])
+    poses = np.concatenate([grid.sensors[s], grid.lights[k]], 1)
+    pool = Pool(SettingUp(problem, grid.held), poses, told.reshape(-1, told.shape[-1])[rows])
     return pool, None if share is None else s if share == "sensor" else k
 
 
@@ -229,9 +231,17 @@ def _sets(pool: Pool, groups: np.ndarray | None, count: int, bounds: list[float 
                 over_repeats=None if over_one is None else over_one / len(members),
                 exhaustive=_exhaustive(table, rows, own, len(members)),
                 bound=bound,
+                hard=_hard(quantities, combination, [pool.steady[int(seen[member])] for member in members]),
             )
         )  # fmt: skip
     return tuple(made)
+
+
+def _hard(quantities: tuple[Quantity, ...], combination: Combination, steady: list[np.ndarray]) -> tuple[str, ...]:
+    """Names of the quantities that no picture tells that measures them around its poses, too."""
+    firm = (combination.used & np.array(steady)).any(0)
+    told = zip(quantities, combination.used.any(0), firm, strict=True)
+    return tuple(each.name for each, used, is_firm in told if used and not is_firm)
 
 
 def _exhaustive(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> float | None:

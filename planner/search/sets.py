@@ -18,6 +18,7 @@ from planner.prediction import Prediction, predict
 from planner.search.candidates import DEAREST
 from planner.search.local import refine
 from planner.search.objective import Aim, Report, SearchProblem
+from planner.search.setting_up import SettingUp
 from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one
@@ -306,27 +307,34 @@ class Pool:
 
     Attributes
     ----------
-    problem : SearchProblem
+    ways : SettingUp
+        Of the search problem's sensor and light.
     poses : ndarray, shape (P, 4)
-        Sensor and light, each polar angle and azimuth, degrees.
+        Sensor and light, each polar angle and azimuth, degrees, to the digits at which they are set up.
     told : ndarray, shape (P, M)
         Their information by fast evaluation (`information`).
     traced : dict
         Predictions of the rows that were ray-traced.
+    steady : dict
+        Of these rows which quantities are measured around them, too, shape (M,).
     """
 
-    def __init__(self, problem: SearchProblem, poses: np.ndarray, told: np.ndarray) -> None:
-        self.problem, self.poses, self.told = problem, poses, told
+    def __init__(self, ways: SettingUp, poses: np.ndarray, told: np.ndarray) -> None:
+        self.ways, self.problem, self.told = ways, ways.problem, told
+        self.poses = np.concatenate(ways.to_digits(*np.split(poses, 2, axis=1)), axis=1)
         self.traced: dict[int, Prediction] = {}
+        self.steady: dict[int, np.ndarray] = {}
 
     def trace(self, row: int) -> None:
         """Ray-traced evaluation of a row, once."""
         if row not in self.traced:
             sensor, light = (tuple(map(float, part)) for part in np.split(self.poses[row], 2))
             self.traced[row] = predict(self.problem.scene, sensor, light, self.problem.model)
+            self.steady[row] = self.ways.steady(*np.split(self.poses[row], 2))
 
     def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
-        """A further row; its number."""
+        """A further row, poses to their digits; its number."""
+        sensor, light = (each[0] for each in self.ways.to_digits(sensor[None], light[None]))
         self.poses = np.concatenate([self.poses, np.concatenate([sensor, light])[None]])
         self.told = np.concatenate([self.told, told[None]])
         return len(self.poses) - 1
@@ -337,9 +345,11 @@ class Pool:
         return np.array(sorted(self.traced), int)
 
     def known(self) -> Information:
-        """What the rows `seen` tell."""
+        """What the rows `seen` tell, of what is measured around them, too, where any of them does."""
         told = [self.traced[row].measurands for row in self.seen]
         values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.objective)
+        steady = np.array([self.steady[row] for row in self.seen])
+        values = np.where(steady | ~steady.any(0), values, 0.0)
         fine = np.array([[is_trusted(each.status) for each in row] for row in told])
         return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
 

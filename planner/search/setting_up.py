@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from imaging.models.errors import Errors
 from planner.ranks import quantity_ranks
 from planner.search.local import shifted
 from planner.search.objective import SearchProblem
@@ -61,10 +62,23 @@ class SettingUp:
     def is_steady(self, sensor: np.ndarray, lights: np.ndarray) -> bool:
         """Whether all is measurable there and around it, with a variance not more than four times as large."""
         sensors, places = self._around(sensor, lights)
-        errors = self.problem.errors(sensors, places)
-        edges = np.zeros((len(sensors), len(errors.measurands.view.names)), bool)
         values = self.problem.values(sensors, places)
-        return bool((quantity_ranks(errors, edges) >= _DOUBTFUL).all() and values.max() <= _STEEPEST * values[0])
+        return bool(_measurable(self.problem.errors(sensors, places)).all() and values.max() <= _STEEPEST * values[0])
+
+    def steady(self, sensor: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """The same of each quantity, for one picture of several need not measure all; bool, shape (M,)."""
+        errors = self.problem.errors(*self._around(sensor, lights))
+        variances = errors.variances_object
+        return _measurable(errors).all(0) & (variances.max(0) <= _STEEPEST * variances[0])
+
+    def to_digits(self, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Settings (n, 2) and (n, 2 F) to the digits of poses, where that keeps the constraints; what is held stays."""
+        scene, limits = self.problem.scene, self.problem.constraints
+        near = sensors if self.held[0] else rounded(sensors), lights if self.held[1] else rounded(lights)
+        keeps = limits.sensors(scene, near[0]) & limits.pairs(scene, *near)
+        keeps &= limits.lights(near[1].reshape(-1, 2)).reshape(len(lights), -1).all(-1)
+        kept = [np.where(keeps[:, None], one, other) for one, other in zip(near, (sensors, lights), strict=True)]
+        return kept[0], kept[1]
 
     def _nearest(self, sensor: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The setting with its angles rounded up or down, (n, 2) and (n, 2 F)."""
@@ -101,6 +115,12 @@ class SettingUp:
             places = np.tile(sensors, (1, lights.size // 2))
         both = np.unique(np.concatenate([sensors, places], axis=1), axis=0)
         return both[:, :2], both[:, 2:]
+
+
+def _measurable(errors: Errors) -> np.ndarray:
+    """Whether each quantity is measured at n settings, though it may be biased, bool (n, M)."""
+    edges = np.zeros((len(errors.variances), len(errors.measurands.view.names)), bool)
+    return quantity_ranks(errors, edges) >= _DOUBTFUL
 
 
 def how_far(scene: Scene, role: str) -> float:

@@ -93,7 +93,8 @@ def test_json_and_picture(monkeypatch, capsys, tmp_path):
     found = json.loads(printed)
     assert code == 0
     one, two = found["views"]
-    assert {"count", "poses", "minimised", "worst_ratio", "limiting", "lost", "over_one", "over_repeats", "exhaustive",
+    assert {"count", "poses", "minimised", "worst_ratio", "limiting", "lost", "hard", "over_one", "over_repeats",
+            "exhaustive",
             "gap", "bound", "measurands", "covariance", "covariance_least_squares"} == set(two)  # fmt: skip
     assert len(one["lost"]) == 1
     assert sum(row[k] is None for k, row in enumerate(one["covariance"])) == 1

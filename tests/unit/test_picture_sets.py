@@ -106,7 +106,10 @@ def pool():
     """Of five pictures two were ray-traced; only the third is beside the first, by sensor and by light."""
     poses = np.array([[30.0, 10, 40, 200], [60, 10, 40, 200], [36, 15, 45, 205], [33, 10, 40, 230], [50, 10, 41, 200]])
     told = np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12], [13, 14, 15]])
-    found = sets.Pool(SimpleNamespace(objective=aim("sum")), poses, told)
+    problem = SimpleNamespace(objective=aim("sum"))
+    ways = SimpleNamespace(problem=problem, to_digits=lambda *pair: pair)
+    found = sets.Pool(ways, poses, told)
+    found.steady = {0: np.array([True] * 3), 1: np.array([True] * 3)}
     found.traced[1] = prediction((2.0, "ok"), (np.inf, "short"), (0.5, "clutter"))
     found.traced[0] = prediction((5.0, "clutter"), (4.0, "ok"), (np.inf, "clutter"))
     return found
@@ -120,6 +123,16 @@ def test_what_is_known_of_pictures_that_were_ray_traced():
     assert known.ok.tolist() == [[0, 1 / 2, 0], [1 / 4, 0, 0]]
     assert known.clutter.tolist() == [[1 / 10, 0, 0], [0, 0, 1 / 1.5]]
     assert known.over == "sum"
+
+
+def test_what_is_lost_a_little_off_counts_only_where_nothing_else_does():
+    """The first quantity of the second picture is not steady, and the first one tells it; nothing steady tells the
+    second."""
+    found = pool()
+    found.steady = {0: np.array([True, False, True]), 1: np.array([False, False, True])}
+    known = found.known()
+    assert known.ok.tolist() == [[0, 1 / 2, 0], [0, 0, 0]]
+    assert known.clutter.tolist() == [[1 / 10, 0, 0], [0, 0, 1 / 1.5]]
 
 
 def test_clutter_is_expected_beside_clutter():

@@ -91,7 +91,7 @@ def test_predictions_are_printed_by_their_names(several):
             "name": each.name, "kind": each.kind, "unit": each.unit,
         }  # fmt: skip
         assert {key: row[key] for key in keys} == {key: getattr(each, name) for key, name in keys.items()}
-    headings, rows = cells(predict_cli._table(several, "calibrated", [told_]))
+    headings, rows = cells(predict_cli._table(several, "calibrated", [told_], False))
     assert headings == ["sensor", "light", "measurand", "value", "sigma", "bias", "unit", "in the image", "sigma",
                         "status"]  # fmt: skip
     for row, each in zip(rows, found.measurands, strict=True):

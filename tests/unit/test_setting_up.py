@@ -63,7 +63,10 @@ class Cliff:
 
     def errors(self, sensors, lights):
         view = SimpleNamespace(names=("e1",))
-        return SimpleNamespace(measurands=SimpleNamespace(view=view), polar=sensors[:, 0])
+        told = self.values(sensors, lights)[:, None] * [1.0, 2.0]
+        return SimpleNamespace(
+            measurands=SimpleNamespace(view=view), polar=sensors[:, 0], variances=told, variances_object=told
+        )
 
 
 def test_what_cannot_be_set_up_is_not_proposed(monkeypatch):
@@ -99,6 +102,38 @@ def test_a_cliff_is_seen_on_either_side_and_by_any_quantity(side, monkeypatch):
     ways, light = SettingUp(Cliff(), (False, False)), np.array([20.0, 300.0])
     assert not ways.is_steady(np.array([30 + 0.15 * side, 40.0]), light)
     assert ways.is_steady(np.array([30 + 0.21 * side, 40.0]), light)
+
+
+def test_a_picture_of_several_is_steady_for_some_quantities(monkeypatch):
+    """The second is lost beyond the cliff; of steep variances neither is steady."""
+
+    def ranks(errors, _):
+        return np.stack([np.full(len(errors.polar), 11), np.where(errors.polar < 30, 0, 11)], -1)
+
+    monkeypatch.setattr(setting_up, "quantity_ranks", ranks)
+    cliff, light = Cliff(), np.array([20.0, 300.0])
+    ways = SettingUp(cliff, (False, False))
+    assert ways.steady(np.array([30.15, 40.0]), light).tolist() == [True, False]
+    assert ways.steady(np.array([30.21, 40.0]), light).tolist() == [True, True]
+    cliff.values = lambda sensors, lights: 1 + 80 * (sensors[:, 0] - 31) ** 2
+    assert ways.steady(np.array([31.0, 40.0]), light).tolist() == [False, False]
+
+
+@pytest.mark.parametrize("held", [(False, False), (True, False), (False, True)])
+def test_settings_to_their_digits(held):
+    """What is held stays, and what would leave the allowed polar angles, or come too near to the other, by rounding."""
+    limits = planner.Constraints((20.03, 60.0), (0.0, 180.0), camera_body=0, light_body=0, min_separation_deg=10.03)
+    problem = SearchProblem.of(scenes.load("task1"), "calibrated", "object", limits)
+    sensors = np.array([[31.26, 40.04], [20.04, 359.97], [30.06, 50.0], [45.0, 12.0]])
+    lights = np.array([[17.11, 200.06], [50.0, 100.0], [40.12, 50.0], [60.06, 300.0]])
+    found = SettingUp(problem, held).to_digits(sensors, lights)
+    rounded = [[31.3, 40.0], [20.0, 0.0], [30.1, 50.0], [45.0, 12.0]], [[17.1, 200.1], [50, 100], [40.1, 50], [60.1, 300]]
+    for each, given, near, stays in zip(found, (sensors, lights), rounded, held, strict=True):
+        for row in (0, 3):
+            assert each[row] == pytest.approx(given[row] if stays else near[row], abs=1e-9)
+    if not any(held):
+        assert found[0][1].tolist() == [20.04, 359.97]  # 20.0 is not allowed
+        assert (found[0][2].tolist(), found[1][2].tolist()) == ([30.06, 50.0], [40.12, 50.0])
 
 
 def test_sensor_and_lights_are_moved_by_what_each_may_be_off():

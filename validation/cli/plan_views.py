@@ -104,6 +104,7 @@ def _set(each: planner.ViewSet) -> dict:
         "worst_ratio": each.worst_ratio,
         "limiting": each.limiting,
         "lost": list(each.lost),
+        "hard": list(each.hard),
         "over_one": each.over_one,
         "over_repeats": each.over_repeats,
         "exhaustive": each.exhaustive,

@@ -98,10 +98,13 @@ def _statuses(last: planner.ViewSet) -> list[Text]:
 
 def _searched(found: planner.Views, seconds: float) -> str:
     most = found.most_over_repeats
+    hard = [f"{', '.join(each.hard)} of {len(each.views)}" for each in found.sets if each.hard]
     lines = [
         f"  {found.pairs} pairs glanced at, {found.looked} settings looked at closely, in {seconds:.1f} s",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if hard:
+        lines.append(f"  Hard to set up: a little off the poses these cannot be measured any more: {'; '.join(hard)}.")
     if most is not None:
         lines.append(
             "  By a glance at the grid, were nothing clutter: no pictures, however many, are more than"
