@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy as np
 import measure
 import planner
 import render
+from measure import Correction
 from render import Quality
-from scenes import Picture, Pose
+from scenes import Picture, Pose, status
 from scenes.status import counted, is_trusted
-from validation import statistics
+from validation import simulation, statistics
 from validation.batch.measurands import independent
 from validation.defaults import DEFAULT_SEED
 from validation.remeasured import GRADIENT, Sample, batches, propagated, remeasured
@@ -41,10 +43,16 @@ class CheckedQuantity:
     n, failed : int
         Combined values, and those for which a picture gave none.
     ratio : float or None
-        empirical / predicted, and its 95 % chi-square interval; the same of the least-squares combination.
+        empirical / predicted (propagated, where the plan doubts it), and its 95 % chi-square interval; the same of the
+        least-squares combination.
     ratio_least_squares : float or None
-    bias, predicted_bias : float
-        Mean less the object's value, and what the plan says of it.
+    bias : float or None
+        Mean of the corrected values less the object's.
+    correction, u_bias : float
+        What was taken off, by the plan's weights, as renders of other rays tell it, and its standard uncertainty;
+        infinite where it is not known.
+    render_noise : float
+        Standard deviation of ``bias`` by the renderer's own noise.
     judged : bool
         Whether the verdict is about it: its status is trusted.
     """
@@ -63,7 +71,9 @@ class CheckedQuantity:
     ratio_least_squares: float | None
     interval_least_squares: tuple[float, float] | None
     bias: float | None
-    predicted_bias: float
+    correction: float
+    u_bias: float
+    render_noise: float
     judged: bool
 
 
@@ -88,10 +98,12 @@ class ViewsCheck:
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
-    """A picture measured: values (repeats, images, M) and the noise-free picture's joint covariance (M, M)."""
+    """A picture measured: values (repeats, images, M) less their bias, the noise-free picture's joint covariance
+    (M, M), and what was taken off."""
 
     values: np.ndarray
     covariance: np.ndarray
+    off: Correction
 
 
 def check_views(
@@ -101,9 +113,10 @@ def check_views(
     quality: Quality = Quality(),
     report: Callable[[str, int, int], None] = lambda *_: None,
 ) -> ViewsCheck:
-    """Render every picture of a plan once, add noise many times, measure, combine by the plan's weights, and compare.
+    """Render every picture of a plan, add noise many times, measure, combine by the plan's weights, and compare.
 
-    Pictures that a set has several times get noise of their own each time.
+    Pictures that a set has several times get noise of their own each time. Biases are taken off as renders of other
+    rays tell them; a quantity's status is what that leaves of its combination (`scenes.status.corrected`).
 
     Parameters
     ----------
@@ -132,42 +145,74 @@ def _key(view: planner.View) -> tuple[Pose, Pose]:
 
 
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
-    (clean, known), rng = propagated(picture, quality), np.random.default_rng(seed)
+    rng, how = np.random.default_rng(seed), simulation.How(quality)
+    renders = simulation.steadied(picture, propagated(picture, quality)[0], GRADIENT, how)
+    clean = simulation.mean_of(picture, renders)
+    known = measure.propagate(clean, picture, estimator=GRADIENT.locator).measurands
+    (off,) = simulation.independent(picture, (GRADIENT,), renders, (known,), how)
     size, where = max(1, _PIXELS // clean.size), measure.region_of_interest(picture, estimators=(GRADIENT.locator,))
     noise, counts = picture.scene.noise, batches(repeats * images, size)
     (values,) = remeasured(picture, (render.expose(clean, noise, rng, count, where) for count in counts))
-    return _Shot(values.object.reshape(repeats, images, -1), known.covariance)
+    return _Shot(values.object.reshape(repeats, images, -1) - np.nan_to_num(off.bias), known.covariance, off)
 
 
 def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[CheckedQuantity, np.ndarray]]:
     """The quantities of one set of pictures, each with its combined values (images,)."""
     times: dict[tuple[Pose, Pose], int] = {}
-    values, covariances = [], []
-    for view in chosen.views:
-        shot, again = shots[_key(view)], times.get(_key(view), 0)
+    values, own = [], [shots[_key(view)] for view in chosen.views]
+    for view, shot in zip(chosen.views, own, strict=True):
+        again = times.get(_key(view), 0)
         times[_key(view)] = again + 1
         values.append(shot.values[again])
-        covariances.append(np.diag(shot.covariance))
-    both = chosen.combination
-    stack = np.stack(values)
+    both, stack = chosen.combination, np.stack(values)
     weighted, jointly = both.weighted(stack), both.least_squares(stack)
     with np.errstate(invalid="ignore"):
-        expected = np.where(both.used, both.weights**2 * np.stack(covariances), 0.0).sum(0)
+        noise = np.stack([np.diag(shot.covariance) for shot in own])
+        expected = np.where(both.used, both.weights**2 * noise, 0.0).sum(0)
+    off = _taken_off(chosen, own)
     for m, forecast in enumerate(chosen.views[0].prediction.measurands):
         if not both.used[:, m].any():
             continue
         sample = Sample.of(weighted[:, m])
         n = sample.n - sample.failed
-        ratio, interval = _ratio(sample, both.variances[m])
+        known = float(both.variances[m] if is_trusted(both.status[m]) else expected[m])
+        ratio, interval = _ratio(sample, known)
         ratio_jointly, interval_jointly = _ratio(Sample.of(jointly[:, m]), both.covariance_least_squares[m, m])
+        half = 0.0 if forecast.tolerance is None else forecast.tolerance.half
+        told = status.worst(*(shot.off.simulated[m] for shot, used in zip(own, both.used[:, m], strict=True) if used))
+        state = status.corrected(told, told, float(off["u_bias"][m]), math.sqrt(known), half)
         yield CheckedQuantity(
-            pictures=len(chosen.views), name=forecast.name, unit=forecast.unit, status=both.status[m],
+            pictures=len(chosen.views), name=forecast.name, unit=forecast.unit, status=state,
             predicted=float(both.variances[m]), propagated=float(expected[m]),
             empirical=sample.variance if n > 1 else None, n=n, failed=sample.failed, ratio=ratio,
             ratio_interval=interval, ratio_least_squares=ratio_jointly, interval_least_squares=interval_jointly,
-            bias=sample.mean - forecast.value_object if n else None,
-            predicted_bias=float(both.bias[m]), judged=is_trusted(both.status[m]),
+            bias=sample.mean - forecast.value_object if n else None, judged=is_trusted(state),
+            **{name: float(column[m]) for name, column in off.items()},
         ), weighted[:, m]  # fmt: skip
+
+
+def _taken_off(chosen: planner.ViewSet, own: list[_Shot]) -> dict[str, np.ndarray]:
+    """Of each quantity (M,), by the plan's weights: correction, its standard uncertainty, and the renderer's noise.
+
+    What is not known of a part or of lamps moves all pictures alike, so uncertainties add; noise of renders does where
+    they are the same one.
+    """
+    weights = np.where(chosen.combination.used, chosen.combination.weights, 0.0)
+
+    def summed(columns: Iterable[np.ndarray]) -> np.ndarray:
+        return np.where(weights > 0, weights * np.stack(list(columns)), 0.0).sum(0)
+
+    with np.errstate(invalid="ignore"):
+        square = np.zeros(weights.shape[1])
+        for key in {_key(view) for view in chosen.views}:
+            alike = [_key(view) == key for view in chosen.views]
+            whole = weights[alike].sum(0)
+            square += np.where(whole > 0, (whole * own[alike.index(True)].off.beside) ** 2, 0.0)
+        return {
+            "correction": summed(np.nan_to_num(shot.off.bias) for shot in own),
+            "u_bias": summed(shot.off.u_bias for shot in own),
+            "render_noise": np.sqrt(square),
+        }
 
 
 def _ratio(sample: Sample, predicted: float) -> tuple[float | None, tuple[float, float] | None]:
@@ -185,7 +230,8 @@ def judge(told: list[tuple[CheckedQuantity, np.ndarray]], seconds: float) -> Vie
         )
     verdict = statistics.verdict(
         _column(rows, "ratio"), _column(rows, "n"), lost=_column(rows, "failed"), bias_px=_column(rows, "bias"),
-        predicted_bias_px=_column(rows, "predicted_bias"), sigma_px=np.sqrt(_column(rows, "predicted")),
+        sigma_px=np.sqrt(_column(rows, "predicted")), u_bias_px=_column(rows, "u_bias"),
+        render_noise_px=_column(rows, "render_noise"),
         status=[row.status for row in rows], independent=independent([values for row, values in told if row.judged]),
     )  # fmt: skip
     return ViewsCheck(rows, verdict, "", seconds)

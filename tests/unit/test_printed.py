@@ -377,7 +377,8 @@ def checked_views(found):
             2, name, "cm", "ok", predicted, predicted * (1.05 + 0.01 * i) if known else math.inf,
             ratio * predicted if known else None, n, 300 - n, ratio if known else None,
             ratio_interval(ratio, n) if known else None, other if known else None,
-            ratio_interval(other, n) if known else None, 1e-3 * (i + 1) if known else None, 2e-4 * i, i != 1,
+            ratio_interval(other, n) if known else None, 1e-3 * (i + 1) if known else None,
+            3e-4 * (1 - i), (1e-4, 7e-4, math.inf)[i], 5e-5 * i, i != 1,
         ))  # fmt: skip
     return ViewsCheck(tuple(rows), None, "made up", 2.0)
 
@@ -417,8 +418,8 @@ def test_measured_pictures_are_beside_what_was_predicted_of_them(viewed):
     """The bias in standard deviations; ratios with their intervals; what is not there is -."""
     check = checked_views(viewed)
     headings, rows = titled(views_table.report(viewed, check, 1.0), "Each picture rendered, 300")
-    assert headings == ["pictures", "name", "predicted sigma", "measured / predicted", "least squares", "bias",
-                        "propagated /", "failed", "status"]  # fmt: skip
+    assert headings == ["pictures", "name", "measured / predicted", "least squares",
+                        "bias taken off", "left", "propagated /", "failed", "status"]  # fmt: skip
     for i, (row, one) in enumerate(zip(rows[:2], check.rows, strict=False)):
         intervals = []
         for ratio, (low, high) in (
@@ -426,10 +427,11 @@ def test_measured_pictures_are_beside_what_was_predicted_of_them(viewed):
             (one.ratio_least_squares, one.interval_least_squares),
         ):
             intervals.append(f"{ratio:.3f} [{low:.3f}, {high:.3f}]{'' if low <= 1 <= high else ' *'}")
-        sigmas = 1e-3 * (i + 1) / (1e-6 * (4 + i)) ** 0.5
-        assert row == ["2", one.name, f"{(1e-6 * (4 + i)) ** 0.5:.3g}", *intervals, f"{sigmas:+.2f} sigma",
+        sigma = (1e-6 * (4 + i)) ** 0.5
+        off = f"{3e-4 * (1 - i) / sigma:+.2f} ± {(1e-4, 7e-4)[i] / sigma:.2f} sigma"
+        assert row == ["2", one.name, *intervals, off, f"{1e-3 * (i + 1) / sigma:+.2f} sigma",
                        f"{1.05 + 0.01 * i:.3f}", str(10 + i), ["ok", "ok, not judged"][i]]  # fmt: skip
-    assert rows[2][3:] == ["-", "-", "-", "-", "12", "ok"]
+    assert rows[2][2:] == ["-", "-", "not known", "-", "-", "12", "ok"]
 
 
 def test_the_json_of_several_pictures_is_what_they_combine(viewed):

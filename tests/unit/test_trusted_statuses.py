@@ -126,7 +126,7 @@ def test_of_several_pictures_only_what_is_ok_is_judged():
         known = dict.fromkeys(("ratio_least_squares", "interval_least_squares"))
         return views_check.CheckedQuantity(
             pictures=2, name=name, unit="mm", status=state, predicted=1.0, propagated=1.0, empirical=ratio, n=300,
-            failed=0, ratio=ratio, ratio_interval=(0.8, 1.2), bias=0.0, predicted_bias=0.0,
+            failed=0, ratio=ratio, ratio_interval=(0.8, 1.2), bias=0.0, correction=0.0, u_bias=0.0, render_noise=0.0,
             judged=status.is_trusted(state), **known,
         )  # fmt: skip
 

@@ -44,7 +44,12 @@ def test_a_picture_is_measured_in_batches(monkeypatch, pixels):
     known = SimpleNamespace(covariance=np.diag([4.0, 9.0]))
     clean = SimpleNamespace(size=pixels)
     picture = SimpleNamespace(scene=SimpleNamespace(noise=None))
+    off = SimpleNamespace(bias=np.array([0.5, np.nan]))
     monkeypatch.setattr(views_check, "propagated", lambda picture, quality: (clean, known))
+    monkeypatch.setattr(views_check.simulation, "steadied", lambda picture, image, method, how: (image,))
+    monkeypatch.setattr(views_check.simulation, "independent", lambda picture, methods, renders, told, how: (off,))
+    propagated = SimpleNamespace(measurands=known)
+    monkeypatch.setattr(views_check.measure, "propagate", lambda clean, picture, estimator: propagated)
     monkeypatch.setattr(views_check.measure, "region_of_interest", lambda picture, estimators: None)
     monkeypatch.setattr(views_check.render, "expose", lambda clean, noise, rng, count, where: count)
 
@@ -56,5 +61,23 @@ def test_a_picture_is_measured_in_batches(monkeypatch, pixels):
     found = views_check._shot(picture, 3, 5, (1, 2), None)
     assert sizes == ([15] if pixels == 6 else [2] * 7 + [1])
     assert found.values.shape == (3, 5, 2)
-    assert found.values[1, 0].tolist() == [10.0, 11.0]
+    assert found.values[1, 0].tolist() == [9.5, 11.0]  # less what is known of the bias
     assert found.covariance is known.covariance
+    assert found.off is off
+
+
+def test_what_is_taken_off_is_weighted_as_the_values_are():
+    """Of one picture twice and another: unsure parts add, the renderer's noise does of one render; by hand."""
+    off = {
+        A: SimpleNamespace(
+            bias=np.array([1.0, np.nan]), u_bias=np.array([0.3, np.inf]), beside=np.array([0.2, np.inf])
+        ),
+        B: SimpleNamespace(bias=np.array([-2.0, 5.0]), u_bias=np.array([0.7, 0.4]), beside=np.array([0.5, 0.6])),
+    }
+    used = np.array([[True, False], [True, True], [True, False]])
+    weights = np.array([[0.25, 0.0], [0.5, 1.0], [0.25, 0.0]])
+    chosen = SimpleNamespace(views=of(A, B, A).views, combination=SimpleNamespace(used=used, weights=weights))
+    found = views_check._taken_off(chosen, [SimpleNamespace(off=off[key]) for key in (A, B, A)])
+    assert found["correction"] == pytest.approx([0.5 * 1 - 0.5 * 2, 5.0])
+    assert found["u_bias"] == pytest.approx([0.5 * 0.3 + 0.5 * 0.7, 0.4])
+    assert found["render_noise"] == pytest.approx([np.hypot(0.5 * 0.2, 0.5 * 0.5), 0.6])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -124,20 +126,26 @@ def _all_told(found: planner.Views):
 def _checked(check: ViewsCheck) -> Table:
     images = check.rows[0].n + check.rows[0].failed
     title = f"\nEach picture rendered, {images} noisy images of it measured, their values combined by these weights"
-    columns = ("pictures", "name", "predicted sigma", "measured / predicted", "least squares", "bias", "propagated /",
-               "failed", "status")  # fmt: skip
+    columns = ("pictures", "name", "measured / predicted", "least squares", "bias taken off", "left",
+               "propagated /", "failed", "status")  # fmt: skip
     table = _table(title, *columns)
     for row in check.rows:
         table.add_row(
-            str(row.pictures), row.name, _sigma(row.predicted), _interval(row.ratio, row.ratio_interval),
-            _interval(row.ratio_least_squares, row.interval_least_squares), _bias(row),
+            str(row.pictures), row.name, _interval(row.ratio, row.ratio_interval),
+            _interval(row.ratio_least_squares, row.interval_least_squares), _taken_off(row), _left(row),
             _number(row.propagated / row.predicted, ".3f"), str(row.failed),
             row.status if row.judged else f"{row.status}, not judged",
         )  # fmt: skip
     return table
 
 
-def _bias(row: CheckedQuantity) -> str:
+def _taken_off(row: CheckedQuantity) -> str:
+    """The correction and its standard uncertainty, in sigmas."""
+    sigma = row.predicted**0.5
+    return f"{row.correction / sigma:+.2f} ± {row.u_bias / sigma:.2f} sigma" if row.u_bias < math.inf else "not known"
+
+
+def _left(row: CheckedQuantity) -> str:
     """Mean error in sigmas."""
     return "-" if row.bias is None else f"{row.bias / row.predicted**0.5:+.2f} sigma"
 
