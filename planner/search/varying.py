@@ -31,6 +31,7 @@ from planner.search.design import (
 from planner.search.grid import APART, ViewingSpace, distinct
 from planner.search.local import Start, descend
 from planner.search.objective import Report, SearchProblem, cut_off, minimised
+from planner.search.setting_up import SettingUp
 from scenes import Pose, Scene
 
 ANGLE_STEP = 30.0  # degrees, of either polariser
@@ -41,6 +42,7 @@ _BANDS_WITH = 3  # angles with which all bands are tried
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
+_OFFERS = 4  # places that can be set up, tried near one that cannot
 _AT_ONCE = 8192  # pairs
 
 
@@ -117,12 +119,14 @@ class Variation:
         whole = (len(angles) + bands) * (len(pairs[0]) + 1)
         there = tried(angles, *pairs)
         fixed, most = self._fixed(self._place(own_choice(self.scene), sensor, light), there)
+        fixed = self._set_up(fixed, most)
         here = fixed.sensor[None], fixed.light[None]
         at_poses = tried(angles, *here)
         there += tried(self._bands(there), *pairs)
         at_poses += tried(self._bands(at_poses), *here)
         same = self._lowest(at_poses, fixed, most, 2, poses=False)
-        best = self._lowest([*there, same], same, most, _STARTS)
+        best = self._set_up(self._lowest([*there, same], same, most, _STARTS), most)
+        best = min(best, same, key=_value)
         if best.choice == fixed.choice:  # what is gained then, better poses gain
             fixed = same = best
         return Varied(self.vary, self.hold, *map(self._told, (fixed, same, best)), count, _GUARANTEE)
@@ -141,6 +145,12 @@ class Variation:
             if wrong < most:
                 least, most = place, wrong
         return self._lowest([least, *own], least, most, _STARTS, angles=False), most
+
+    def _set_up(self, place: Place, most: int) -> Place:
+        """The nearest place of poses that can be set up and trusted as much; where there is none the place itself."""
+        ways = SettingUp(self._with(place.choice), self.held)
+        offers = (self._place(place.choice, *pair) for pair in ways.offers(place.sensor, place.light))
+        return next((each for each in islice(offers, _OFFERS) if self._untrusted(each) <= most), place)
 
     def _bands(self, found: list[Place]) -> list[Choice]:
         """The other bands with those angles that were best so far."""

@@ -220,3 +220,15 @@ def test_a_plan_tells_the_variance_of_its_poses():
     """The refinement ends where it is not trusted, so the grid's poses stay, with their variance."""
     found = planner.plan(scenes.load("polarised"), step_deg=15)
     assert found.variance == pytest.approx(found.prediction.variance_object)
+
+
+def test_what_is_varied_is_set_up_too():
+    """Poses that were moved with the angles are to a tenth of a degree, and so are those that were not."""
+    found = planner.plan(scenes.load("polarised"), sensor=(30, 135), step_deg=45, vary=("polarisation",)).varied
+    assert tuple(found.best.sensor) == (30, 135)
+    assert found.best.light != found.fixed.light
+    for each in (found.fixed, found.same_poses, found.best):
+        angles = np.array(list(each.light))
+        assert np.abs(angles - angles.round(1)).max() < 1e-9
+        told = variances(each.scene, np.array(list(each.sensor)), angles)
+        assert each.variance == pytest.approx(told)
