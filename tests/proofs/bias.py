@@ -4,7 +4,9 @@ The part that is measured reflects otherwise than its scene says, each surface b
 to 1 % of its distance elsewhere; it is rendered with rays of its own. Who measures it knows nothing of that: the bias
 of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures scatters by 1
 where that tells it (the true picture's own render has noise, too, which a camera's has not: it is allowed for), and
-over the combined uncertainty single noisy values have to scatter by 1 within 10 %, beyond chance.
+over the combined uncertainty single noisy values have to scatter by 1 within 10 %, beyond chance. Where trials are
+many and `--images 1`, each is another station: of the intervals value +- U, 95 %, 93 to 97 % have to hold the true
+value, beyond chance (`--stations`). Statistical textures are another part's in each.
 """
 
 from __future__ import annotations
@@ -22,13 +24,15 @@ import measure
 import render
 import scenes
 from measure.correction import RENDERING
-from scenes import Picture, Pose, Scene
+from scenes import Picture, Pose, Scene, StatisticalTexture
 from scenes.status import is_trusted
 from validation import simulation
 from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = 0.1, 0.01  # largest deviations, uniformly drawn
 WITHIN = 0.1  # of 1, the spread of pulls
+LEAST, MOST = 0.93, 0.97  # of stated 95 % intervals
+_K = float(stats.norm.ppf(0.975))
 _SCENES = ("bracket", "plate", "grey_floor")
 _SEEDS = 1000  # renders of true pictures begin here, corrections at 0
 
@@ -57,6 +61,10 @@ def deviating(scene: Scene, rng: np.random.Generator) -> Scene:
     if scene.floor is not None:
         update["floor"] = scene.floor.tried(reflectance=(1 - _factor(rng)) * scene.floor.reflectance)
     lights = tuple(light.tried(distance=(1 + rng.uniform(-LIGHT, LIGHT)) * light.distance) for light in scene.lights)
+    update["textures"] = tuple(
+        each.tried(seed=int(rng.integers(1 << 62))) if isinstance(each, StatisticalTexture) else each
+        for each in scene.textures
+    )
     update |= {"light": lights[0]} if scene.light is not None else {"several_lights": lights}
     return scene.tried(**update)
 
@@ -113,6 +121,7 @@ def bias(
     trials: Annotated[int, typer.Option()] = 15,
     images: Annotated[int, typer.Option(help="Noisy images a trial.")] = 20,
     seed: Annotated[int, typer.Option()] = 1,
+    stations: Annotated[bool, typer.Option("--stations", help="Ask for the coverage of intervals.")] = False,
 ) -> None:
     """Pulls of corrected values where reflectances are off by up to 10 % and lights by 1 %; half an hour."""
     quiet, noisy = [], []
@@ -121,7 +130,8 @@ def bias(
         for m, name in enumerate(found.names):
             print(
                 f"{found.scene} {picture.sensor} {name}: {found.status[m]}, bias {found.off[m]:+.2f} sigma taken off, "
-                f"left over u(bias) {rms(found.quiet[:, m]):.2f} rms, pull of values {rms(found.noisy[:, m]):.2f}",
+                f"left over u(bias) {rms(found.quiet[:, m]):.2f} rms, pull of values {rms(found.noisy[:, m]):.2f}, "
+                f"held by 95 % intervals {held(found.noisy[:, m]):.3f}",
                 flush=True,
             )
         quiet.append(found.quiet[:, found.trusted].ravel())
@@ -129,7 +139,19 @@ def bias(
     spread, count = rms(np.concatenate(noisy)), sum(each.size for each in noisy)
     low, high = np.sqrt(stats.chi2.ppf((0.005, 0.995), count) / count)
     print(f"All: left over u(bias) {rms(np.concatenate(quiet)):.3f}, pulls {spread:.3f}; 1 within 10 % is asked.")
+    if stations:
+        values = np.concatenate(noisy)
+        inside, count = int(np.sum(np.abs(values) <= _K)), int(np.isfinite(values).sum())
+        low, high = stats.binomtest(inside, count).proportion_ci(0.99)
+        print(f"{inside} of {count} intervals hold the true value: {inside / count:.3f} [{low:.3f}, {high:.3f}]")
+        raise typer.Exit(0 if low <= MOST and high >= LEAST else 1)
     raise typer.Exit(0 if (1 - WITHIN) * low <= spread <= (1 + WITHIN) * high else 1)
+
+
+def held(pulls: np.ndarray) -> float:
+    """Part of the known pulls within the coverage factor of 95 %."""
+    good = pulls[np.isfinite(pulls)]
+    return float(np.mean(np.abs(good) <= _K)) if good.size else math.nan
 
 
 def rms(values: np.ndarray) -> float:
