@@ -134,6 +134,36 @@ def test_an_end_is_smooth_that_bends_little_more_than_the_curve():
         assert some.smooth.tolist() == [is_smooth] + [True] * 4
 
 
+def bends(*parts):
+    return np.radians(np.concatenate(parts))
+
+
+@pytest.mark.parametrize(("width", "is_round"), [(1.2, True), (1.3, False)])
+def test_a_coarse_surface_is_a_polygon_beside_finer_ones(width, is_round):
+    """Five times as high over its chords as they: 20 degrees on so wide faces beside 5 degrees on faces of 1."""
+    some = found([9, 1, 1, 1, 1, 90, *[width] * 4, 90], bends([5.0] * 5, [20.0] * 5))
+    assert (some.region[1:5] >= 0).all()
+    assert (some.region[6:10] >= 0).tolist() == [is_round] * 4
+    assert some.smooth.tolist() == [True] * 5 + [is_round] * 5
+    alone = found([90, *[width] * 4, 90], bends([20.0] * 5))
+    assert (alone.region[1:5] >= 0).all()
+
+
+@pytest.mark.parametrize(("bend", "is_round"), [(19.0, True), (21.0, False)])
+def test_two_bends_that_are_much_higher_than_their_surface_are_edges(bend, is_round):
+    """Ten times as high over their chords as three quarters of the others, and of more than 12 degrees."""
+    some = found([9, *[1.0] * 17, 9], bends([2.0] * 8, [bend] * 2, [2.0] * 8))
+    assert some.smooth.tolist() == [True] * 8 + [is_round] * 2 + [True] * 8
+    assert (len(set(some.region[1:18].tolist())) == 1) is is_round
+
+
+@pytest.mark.parametrize(("bend", "is_round"), [(10.8, True), (11.2, False)])
+def test_one_bend_that_stands_out_by_ten_times_is_an_edge(bend, is_round):
+    """However little it is: 1.1 degrees before and behind."""
+    some = found([9, *[1.0] * 15, 9], bends([1.1] * 8, [bend], [1.1] * 7))
+    assert some.smooth.tolist() == [True] * 8 + [is_round] + [True] * 7
+
+
 def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
     """Where two of its walls meet in an edge; what belongs to both is no rim."""
     loop = (0, 1, 2)
