@@ -74,6 +74,42 @@ def test_glb(glb):
     assert sorted(round(height) for height in numbers.values()) == [20, 30]
 
 
+@pytest.mark.parametrize(
+    "primitives", [((1, {}), (2, {})), ((1, {"material": 0}), (2, {"material": 1}))], ids=["", "red"]
+)
+def test_pieces_of_one_body_in_a_glb_are_one(tmp_path, primitives):
+    """Exporters write a primitive for each colour: two halves of a block of 2 x 3 x 4 m, whose node is one body."""
+    low = np.array([[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [0, 0, 4], [2, 0, 4], [2, 3, 4], [0, 3, 4]], "<f4")
+    quads = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    triangles = np.array([half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))], "<u2")
+    data = low.tobytes() + triangles.tobytes()
+    views = [(0, 96), (96, 36), (132, 36)]
+    facts = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "materials": [{"name": "red"}, {"name": "blue"}],
+        "nodes": [{"name": "block", "mesh": 0, "translation": [0, 0, 7]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": half, **more} for half, more in primitives]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [2, 3, 4]},
+            *({"bufferView": half, "componentType": 5123, "count": 18, "type": "SCALAR"} for half in (1, 2)),
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in views],
+        "buffers": [{"byteLength": len(data)}],
+    }  # fmt: skip
+    text = json.dumps(facts).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(len(c).to_bytes(4, "little") + k + c for c, k in ((text, b"JSON"), (data, b"BIN\0")))
+    sizes = [each.to_bytes(4, "little") for each in (2, 12 + len(chunks))]
+    (tmp_path / "halves.glb").write_bytes(b"glTF" + b"".join(sizes) + chunks)
+    for body in (None, "block", 1):
+        solid = mesh.read(tmp_path / "halves.glb", None, "mm", body)
+        assert solid.vertices.min(0) == pytest.approx([0, 0, 7000])
+        assert solid.vertices.max(0) == pytest.approx([2000, 3000, 11000])
+        assert (len(solid.faces), len(solid.sharp)) == (6, 12)
+    with pytest.raises(InvalidInput, match=r"object.body must be one of 1 'block', got 2"):
+        mesh.read(tmp_path / "halves.glb", None, "mm", 2)
+
+
 @lxml
 @pytest.mark.parametrize(("unit", "millimetres"), [("millimeter", 1), ("inch", 25.4), ("micron", 1e-3), ("meter", 1e3)])
 def test_3mf(tmp_path, unit, millimetres):

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 import math
 import re
 import socket
@@ -13,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from aiohttp import ClientSession, CookieJar, web
+from aiohttp.http_exceptions import BadHttpMessage, BadStatusLine
 from aiohttp.test_utils import TestServer
 from yarl import URL
 
@@ -24,7 +26,7 @@ from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Setting
 from scenes.status import MEANINGS, REMEDIES
 from validation.batch.work import Chunk, Clean, Found, Packed
-from validation.explore import answers, best, budgets, effects, preview, prove, save, session, sphere, tools
+from validation.explore import answers, best, budgets, effects, preview, prove, save, server, session, sphere, tools
 from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
 from validation.explore.server import serve
@@ -617,3 +619,19 @@ def test_a_part_of_any_shape_is_as_large_as_its_scale_says(task1, size):
     image = np.arange(3000.0 * 3000).reshape(3000, 3000) % 200
     wanted = [max(1, round(n * part.scale)) for n in (part.height, part.width)]
     assert list(preview.rendered(task1, image, part).shape) == wanted
+
+
+def test_requests_that_are_no_http_are_not_logged_and_errors_of_ours_are():
+    """The filter is set once, however often a page is served."""
+    log = server._log()
+    assert server._log() is log
+    assert log.filters.count(server._is_ours) == 1
+
+    def record(error):
+        told = (type(error), error, None) if error else None
+        return logging.LogRecord(log.name, logging.ERROR, "", 1, "said", None, told)
+
+    kept = [
+        bool(log.filter(record(error))) for error in (None, ValueError("ours"), BadStatusLine("x"), BadHttpMessage("x"))
+    ]
+    assert kept == [True, True, False, False]
