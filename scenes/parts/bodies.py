@@ -48,7 +48,7 @@ def read(path: Path, data: bytes, most_triangles: int) -> tuple[dict[str, trimes
 
 
 def _owner(scene: trimesh.Scene, node: str) -> str:
-    """The node of the file that a node of the scene is, or is one of several primitives of (GLB: one for each colour)."""
+    """The node of the file that a node of the scene is, or is one of several primitives of (one for each colour)."""
     above = scene.graph.transforms.parents[node]
     is_primitive = scene.geometry[scene.graph.transforms.node_data[node]["geometry"]].metadata.get(
         "from_gltf_primitive"

@@ -74,24 +74,23 @@ def test_glb(glb):
     assert sorted(round(height) for height in numbers.values()) == [20, 30]
 
 
-@pytest.mark.parametrize(
-    "primitives", [((1, {}), (2, {})), ((1, {"material": 0}), (2, {"material": 1}))], ids=["", "red"]
-)
-def test_pieces_of_one_body_in_a_glb_are_one(tmp_path, primitives):
-    """Exporters write a primitive for each colour: two halves of a block of 2 x 3 x 4 m, whose node is one body."""
+def block_glb(path, meshes, nodes):
+    """A block of 2 x 3 x 4 m from the origin: its triangles are accessor 1 and 2, halves of it, and 3, all of them."""
     low = np.array([[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [0, 0, 4], [2, 0, 4], [2, 3, 4], [0, 3, 4]], "<f4")
     quads = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
     triangles = np.array([half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))], "<u2")
     data = low.tobytes() + triangles.tobytes()
-    views = [(0, 96), (96, 36), (132, 36)]
+    views = [(0, 96), (96, 36), (132, 36), (96, 72)]
     facts = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes,
         "materials": [{"name": "red"}, {"name": "blue"}],
-        "nodes": [{"name": "block", "mesh": 0, "translation": [0, 0, 7]}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": half, **more} for half, more in primitives]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}} | each for each in mesh]} for mesh in meshes],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [2, 3, 4]},
-            *({"bufferView": half, "componentType": 5123, "count": 18, "type": "SCALAR"} for half in (1, 2)),
+            *(
+                {"bufferView": view, "componentType": 5123, "count": views[view][1] // 2, "type": "SCALAR"}
+                for view in (1, 2, 3)
+            ),
         ],
         "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in views],
         "buffers": [{"byteLength": len(data)}],
@@ -99,15 +98,37 @@ def test_pieces_of_one_body_in_a_glb_are_one(tmp_path, primitives):
     text = json.dumps(facts).encode()
     text += b" " * (-len(text) % 4)
     chunks = b"".join(len(c).to_bytes(4, "little") + k + c for c, k in ((text, b"JSON"), (data, b"BIN\0")))
-    sizes = [each.to_bytes(4, "little") for each in (2, 12 + len(chunks))]
-    (tmp_path / "halves.glb").write_bytes(b"glTF" + b"".join(sizes) + chunks)
-    for body in (None, "block", 1):
-        solid = mesh.read(tmp_path / "halves.glb", None, "mm", body)
-        assert solid.vertices.min(0) == pytest.approx([0, 0, 7000])
-        assert solid.vertices.max(0) == pytest.approx([2000, 3000, 11000])
-        assert (len(solid.faces), len(solid.sharp)) == (6, 12)
-    with pytest.raises(InvalidInput, match=r"object.body must be one of 1 'block', got 2"):
-        mesh.read(tmp_path / "halves.glb", None, "mm", 2)
+    path.write_bytes(b"glTF" + b"".join(each.to_bytes(4, "little") for each in (2, 12 + len(chunks))) + chunks)
+    return path
+
+
+@pytest.mark.parametrize("materials", [({}, {}), ({"material": 0}, {"material": 1})], ids=["bare", "coloured"])
+def test_pieces_of_one_body_in_a_glb_are_one(tmp_path, materials):
+    """Exporters write a primitive for each colour: the node of two halves is one body; one below it is its own."""
+    halves = [{"indices": half, **more} for half, more in zip((1, 2), materials, strict=True)]
+    nodes = [
+        {"name": "block", "mesh": 0, "translation": [0, 0, 7], "children": [1]},
+        {"name": "block_bottom", "mesh": 1, "translation": [5, 0, -7]},
+    ]
+    path = block_glb(tmp_path / "halves.glb", [halves, [{"indices": 3}]], nodes)
+    low, high = np.array([0, 0, 7000]), np.array([2000, 3000, 11000])
+    away = np.array([5000, 0, -7000])
+    for body, first, last, faces in (("block", low, high, 6), ("block_bottom", low + away, high + away, 6),
+                                     (None, low + [0, 0, -7000], high + [5000, 0, 0], 12)):  # fmt: skip
+        solid = mesh.read(path, None, "mm", body)
+        assert solid.vertices.min(0) == pytest.approx(first)
+        assert solid.vertices.max(0) == pytest.approx(last)
+        assert (len(solid.faces), len(solid.sharp)) == (faces, 2 * faces)
+    with pytest.raises(InvalidInput, match=r"object.body must be one of \d 'block\w*', \d 'block\w*', got 3"):
+        mesh.read(path, None, "mm", 3)
+
+
+def test_lines_in_a_glb_are_no_body(tmp_path):
+    """Nor does what is left of a node's primitives become another one."""
+    path = block_glb(tmp_path / "lines.glb", [[{"indices": 3}, {"indices": 1, "mode": 1}]], [{"name": "a", "mesh": 0}])
+    assert len(mesh.read(path, None, "mm", "a").faces) == 6
+    with pytest.raises(InvalidInput, match=r"object.body must be one of 1 'a', got 2"):
+        mesh.read(path, None, "mm", 2)
 
 
 @lxml

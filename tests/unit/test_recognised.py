@@ -84,7 +84,7 @@ def test_the_axis_is_that_of_the_residual(quarter, rng):
 
 
 def test_the_cylinder_that_is_told_is_the_nearest_to_its_vertices(rng):
-    """A quarter whose radii fall by a thousandth from side to side: no other axis or radius leaves less than is told."""
+    """A quarter whose radii fall by a thousandth from side to side: no other axis or radius leaves less."""
     angle = np.linspace(0, np.pi / 2, 30)
     radii = 2.0 + 1e-3 * np.cos(3 * angle) + 2e-4 * rng.normal(size=30)
     outline = [(0.0, 0.0), *np.column_stack([radii * np.cos(angle), radii * np.sin(angle)]).tolist()]
