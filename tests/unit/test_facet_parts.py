@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scenes.parts import facets, rims
+from scenes.parts.chains import Chains
 
 
 def ring(count, radius, centre=(0.0, 0.0), start=0.0):
@@ -134,6 +135,21 @@ def test_an_end_is_smooth_that_bends_little_more_than_the_curve():
         assert some.smooth.tolist() == [is_smooth] + [True] * 4
 
 
+@pytest.mark.parametrize(
+    ("bend", "last", "width", "is_facet"),
+    [
+        (10.0, 7.1, 1.0, True), (10.0, 6.9, 1.0, False), (10.0, 10.0, 1.45, True), (10.0, 10.0, 1.55, False),
+        (10.0, 8.7, 1.45, True), (10.0, 8.4, 1.45, False), (4.5, 2.9, 1.0, True), (4.5, 3.1, 1.0, False),
+    ],
+)  # fmt: skip
+def test_a_last_facet_is_as_wide_and_bends_as_much_as_those_before(bend, last, width, is_facet):
+    """At most 1.5 times as wide, at least 0.7 of the curvature (bend over both widths) or 3 degrees; at either end."""
+    for way in (1, -1):
+        some = found([9, 1, 1, 1, 1, width][::way], np.radians([bend] * 4 + [last])[::way])
+        assert some.smooth.all()
+        assert (some.region[::way] >= 0).tolist() == [False] + [True] * 4 + [is_facet]
+
+
 def bends(*parts):
     return np.radians(np.concatenate(parts))
 
@@ -176,3 +192,20 @@ def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
     nothing = facets._of_rims(chains, [])
     assert not nothing[0].any()
     assert not nothing[1].any()
+
+
+def test_what_a_bend_is_sure_of_is_less_by_what_single_precision_moves_a_sliver():
+    """The longest edge of each of both faces over its area, at most 10 degrees; height over chords by the smaller."""
+    vertices = np.array([[0.0, 0, 0], [200, 0, 0], [0, 1, 0], [200, 1, 0]])
+    chains = [((0, 1), (0, 1), True), ((2, 3), (1, 2), True), ((0, 2), (2, 3), False)]
+    normals = np.array([[0, 0, 1.0], [0, 0.2, 1], [0, 0.5, 1], [0.3, 0, 1]])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    areas = np.array([50.0, 0.4, 80.0, 1e-5])
+    shape = Chains.of(vertices, chains, normals, areas)
+    bend = np.arccos(np.clip([normals[a] @ normals[b] for a, b in ((0, 1), (1, 2), (2, 3))], -1, 1))
+    assert shape.bend == pytest.approx(bend)
+    one = 3e-7 * 200
+    moved = [one * (200 / 50 + 200 / 0.4), one * (200 / 0.4 + 200 / 80), np.radians(10.0)]
+    assert shape.certain == pytest.approx(bend - moved)
+    assert shape.height == pytest.approx(bend * [0.4 / 200, 0.4 / 200, 1e-5] / 8)
+    assert (shape.unsure, shape.length.tolist()) == (pytest.approx(2 * one), [200.0, 200.0, 1.0])

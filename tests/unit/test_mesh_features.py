@@ -212,7 +212,7 @@ def test_a_vertex_is_named_by_a_place_within_a_thousandth_of_the_largest_extent(
     assert found.vertex("here").tolist() == [50, 10, 1]
     assert found.vertex("there").tolist() == [-50, 10, 1]
     assert sum(name.startswith("v") for name in found.vertex_names) == 6
-    with pytest.raises(InvalidInput, match="object.names must be names of their own, got v1, there"):
+    with pytest.raises(InvalidInput, match=r"object.names must be names of their own, got v1, there"):
         mesh.renamed(plate, {"v1": (50.0, 10.0, 1.0), "there": (-50.0, 10.0, 1.0)})
 
 
