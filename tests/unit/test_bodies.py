@@ -168,6 +168,29 @@ def test_hostile_files_are_refused_before_memory_is_taken(tmp_path):
             mesh.read(tmp_path / name)
 
 
+@pytest.mark.parametrize(("counts", "good"), [((30, 4), True), ((4, 31), False), ((), True)])
+def test_a_glb_may_tell_of_three_numbers_a_triangle(counts, good):
+    """Of ten triangles, if each has three corners of its own; whichever of its lists is the longest counts."""
+    told = json.dumps({"accessors": [{"count": count} for count in counts]} if counts else {}).encode()
+    data = b"glTF" + b"\2\0\0\0" + (20 + len(told)).to_bytes(4, "little") + len(told).to_bytes(4, "little") + b"JSON"
+    if good:
+        bodies._check_glb("a.glb", data + told, 10)
+        return
+    with pytest.raises(InvalidInput, match="must be of at most 10 triangles, got a.glb with 31 numbers"):
+        bodies._check_glb("a.glb", data + told, 10)
+
+
+@pytest.mark.parametrize(("most", "triangles", "good"), [(2, 204, True), (1, 204, False), (2, 203, False)])
+def test_a_glb_may_have_so_many_bodies_and_triangles(glb, monkeypatch, most, triangles, good):
+    """A block of 12, and a pin of 48 sides, of 192."""
+    monkeypatch.setattr(bodies, "MOST_BODIES", most)
+    if good:
+        assert len(bodies.read(glb, glb.read_bytes(), triangles)[0]) == 2
+        return
+    with pytest.raises(InvalidInput, match=rf"at most {triangles} triangles and {most} bodies, got .* with 204 and 2"):
+        bodies.read(glb, glb.read_bytes(), triangles)
+
+
 @lxml
 def test_archives_that_are_none_or_too_large(tmp_path, monkeypatch):
     path = three_mf(tmp_path / "two.3mf", "millimeter")

@@ -1,6 +1,7 @@
 """Boundaries of faces and what makes faces facets of a curved surface: steps of each, on made-up shapes."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,6 +136,20 @@ def test_an_end_is_smooth_that_bends_little_more_than_the_curve():
         assert some.smooth.tolist() == [is_smooth] + [True] * 4
 
 
+@pytest.mark.parametrize(("factor", "is_smooth"), [(1.58, True), (1.62, False)])
+def test_where_bends_are_slight_an_end_may_bend_by_more_than_half_as_much_again(factor, is_smooth):
+    """1.6 times: the steps of a curve may be unequal."""
+    some = found([9, 1, 1, 1, 1, 7], np.radians([7 * factor, 7, 7, 7, 7]))
+    assert some.smooth.tolist() == [is_smooth] + [True] * 4
+
+
+@pytest.mark.parametrize(("bend", "is_smooth"), [(0.98, True), (1.02, False)])
+def test_planes_that_bend_by_less_than_a_degree_are_joined_smoothly(bend, is_smooth):
+    some = found([9, 7, 8], np.radians([bend, 40.0]))
+    assert some.smooth.tolist() == [is_smooth, False]
+    assert some.region.tolist() == [-1] * 3
+
+
 @pytest.mark.parametrize(
     ("bend", "last", "width", "is_facet"),
     [
@@ -209,3 +224,14 @@ def test_what_a_bend_is_sure_of_is_less_by_what_single_precision_moves_a_sliver(
     assert shape.certain == pytest.approx(bend - moved)
     assert shape.height == pytest.approx(bend * [0.4 / 200, 0.4 / 200, 1e-5] / 8)
     assert (shape.unsure, shape.length.tolist()) == (pytest.approx(2 * one), [200.0, 200.0, 1.0])
+
+
+@pytest.mark.parametrize(("bend", "smooth", "loose"), [(30.9, 2, True), (31.1, 2, False), (20.0, 1, False)])
+def test_an_edge_that_ends_within_a_surface_is_none_and_neither_is_what_it_follows(bend, smooth, loose):
+    """Where at least two smooth pieces meet it; not one that bends by more than 31 degrees."""
+    within = [(1, 10), (1, 11)][:smooth]  # at one end of the first edge
+    edges = [(0, 1), (0, 2), (2, 3), (2, 4)]  # a way of two, which ends where two others meet
+    ends = np.array([*edges, *within, (0, 12), (0, 13)])
+    shape = SimpleNamespace(ends=ends, bend=np.radians([bend, 25.0, 40.0, 40.0] + [5.0] * (len(ends) - 4)))
+    kept = facets._dangling(shape, np.arange(len(ends)) < 4)
+    assert kept.tolist() == [loose, loose] + [False] * (len(ends) - 2)
