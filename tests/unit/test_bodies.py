@@ -176,7 +176,7 @@ def test_a_glb_may_tell_of_three_numbers_a_triangle(counts, good):
     if good:
         bodies._check_glb("a.glb", data + told, 10)
         return
-    with pytest.raises(InvalidInput, match="must be of at most 10 triangles, got a.glb with 31 numbers"):
+    with pytest.raises(InvalidInput, match=r"must be of at most 10 triangles, got a.glb with 31 numbers"):
         bodies._check_glb("a.glb", data + told, 10)
 
 
