@@ -137,3 +137,22 @@ def test_a_table_of_pairs_is_that_of_each_pair(task1, rng):
         sensors, lights = (rng.uniform((0, 0), (90, 360), (n, 2)) for n in (rows, columns))
         each = [[bool(limits.pairs(task1, s[None], k[None])[0]) for k in lights] for s in sensors]
         assert limits.pairs(task1, sensors[:, None], lights[None]).tolist() == each
+
+
+@pytest.mark.parametrize(
+    ("limits", "allowed"),
+    [
+        ((180, -180), [0, 90, 179, 180, 250, 359]), ((-180, 180), [0, 90, 179, 180, 250, 359]), ((90, 90), [90]),
+        ((350, 100), [0, 90, 359]), ((100, 350), [179, 180, 250]), ((-110, -2), [250]), ((179, 540), [179, 180]),
+    ],
+)  # fmt: skip
+def test_azimuths_grow_from_the_first_to_the_second_and_360_degrees_either_way_are_all(limits, allowed):
+    """Past 360 degrees, too; both ends are among them, and at the pole any is."""
+    azimuths = [0, 90, 179, 180, 250, 359]
+    poses = np.array([(30.0, azimuth) for azimuth in azimuths] + [(0.0, 200.0)])
+    if abs(limits[1] - limits[0]) > 360:
+        with pytest.raises(InvalidInput, match="light_azimuth_deg must be two azimuths at most 360 degrees apart"):
+            Constraints(light_azimuth_deg=limits)
+        return
+    found = Constraints(light_azimuth_deg=limits).lights(poses)
+    assert found.tolist() == [azimuth in allowed for azimuth in azimuths] + [True]
