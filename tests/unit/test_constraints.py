@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.features.projected_edges import projected_edges
+from imaging.pictures import Pictures
 from planner import Constraints
 from planner.search.constraints import _clearance, _to_segment
 from scenes import InvalidInput
@@ -156,3 +158,25 @@ def test_azimuths_grow_from_the_first_to_the_second_and_360_degrees_either_way_a
         return
     found = Constraints(light_azimuth_deg=limits).lights(poses)
     assert found.tolist() == [azimuth in allowed for azimuth in azimuths] + [True]
+
+
+def test_bodies_are_those_of_the_light_that_is_free():
+    """The second of two: at the camera's distance its body of 1 touches the camera's of 1 up to 11.5 degrees."""
+    lamp = SimpleNamespace
+    scene = lamp(free=(1,), camera=lamp(distance=10.0), lights=(lamp(distance=3.0), lamp(distance=10.0)))
+    limits = Constraints(camera_body=1.0, light_body=1.0)
+    sensors, places = np.array([[30.0, 40.0]]), np.array([[30.0 + away, 40.0] for away in (0.0, 11.0, 12.0, 50.0)])
+    assert limits.pairs(scene, sensors, places).tolist() == [False, False, True, True]
+    scene.free = (0,)
+    assert limits.pairs(scene, sensors, places).all()
+
+
+def test_a_clearance_is_asked_where_all_required_edges_are_seen():
+    """Of poses from which some are, some are not: such a pose is not allowed, however far apart those are that are."""
+    task1 = scenes.load("task1")
+    poses = np.array([(polar, azimuth) for polar in (20.0, 60.0, 100.0, 150.0) for azimuth in (15.0, 140.0, 260.0)])
+    seen = projected_edges(Pictures.of(task1, poses)).visible
+    assert (seen.any(1) & ~seen.all(1)).any()
+    allowed = Constraints(sensor_polar_deg=(0, 180), min_clearance_px=1e-6).sensors(task1, poses)
+    assert allowed.tolist() == seen.all(1).tolist()
+    assert allowed.any()
