@@ -39,6 +39,12 @@ def test_a_straight_edge_is_as_long_as_all_of_its_pieces_whatever_the_unit(scale
     assert pieces([*ARC, *[length] * 6], turns, [0] * 10, scale, 4e-7, (1, 2, 4, 7)) == told
 
 
+@pytest.mark.parametrize(("lengths", "found"), [([2.0, 0.1, 2.1], False), ([1.8, 0.1, 1.8], True)])
+def test_a_short_piece_of_a_straight_edge_may_turn_as_much_as_its_own_length_leaves_unsure(lengths, found):
+    told = pieces([*ARC, *lengths], [6.0] * 4 + [0.0] * 2, [0] * 7, off=4e-7)
+    assert told == [True] * 4 + [found] * 3
+
+
 @pytest.mark.parametrize(
     ("length", "turn", "found"), [(1.45, 6.0, True), (1.55, 6.0, False), (1.0, 4.3, True), (1.0, 4.1, False)]
 )
