@@ -20,6 +20,7 @@ def test_the_least_likely_part_tells_for_all_of_them(freedom):
         ratio = stats.f(own, known)
         each.append(2 * min(ratio.cdf(squares / own), ratio.sf(squares / own)))
     assert p_value(some, freedom) == pytest.approx(1 - (1 - min(each)) ** 3, rel=1e-6)
+    # margin: an inequality: one part is unlikely
     assert min(each) < 0.05
     # margin: a p-value is at most 1, by its kind
     assert p_value([Part(9.34, 10.0)], np.inf) <= 1

@@ -32,6 +32,7 @@ def test_a_noise_curve_is_the_likeliest_line_that_can_be(line, bent, rng):
         options={"ftol": 1e-15, "gtol": 1e-12},
     )  # fmt: skip
     told = np.array([max(found.dark, 1e-9), found.gain])
+    # margin: an inequality: no line is likelier
     assert unlikely(told, signal, variance, freedom) <= beside.fun + 1e-6 * abs(beside.fun)
     assert told == pytest.approx(beside.x, rel=1e-3, abs=1e-4)
     design = np.stack([np.ones(300), signal], 1)

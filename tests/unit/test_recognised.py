@@ -102,6 +102,7 @@ def test_the_cylinder_that_is_told_is_the_nearest_to_its_vertices(rng):
     assert np.sqrt(np.mean(off() ** 2)) == pytest.approx(found.residual, rel=1e-9)
     assert np.abs(off()).max() == pytest.approx(found.largest, rel=1e-9)
     for step in np.concatenate([np.eye(3), -np.eye(3)]) * 1e-5:
+        # margin: an inequality: the least is told
         assert np.mean(off(step[:2], step[2]) ** 2) > found.residual**2
 
 
