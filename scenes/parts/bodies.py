@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,7 +16,7 @@ from scenes.errors import InvalidInput
 MOST_BODIES = 10_000
 _NAMED = 12  # bodies in a message
 _MOST_UNPACKED = 512 << 20  # bytes of a 3MF file's XML
-_HOW = {"glb": {"skip_materials": True, "merge_primitives": True}, "3mf": {}}
+_HOW = {"glb": {"skip_materials": True}, "3mf": {}}  # its own joining of primitives asks for their materials
 _MISSING = "object.file must be of a kind that can be read: a 3MF file needs lxml, pip install 'ice-vision[3mf]'"
 
 
@@ -39,8 +40,20 @@ def read(path: Path, data: bytes, most_triangles: int) -> tuple[dict[str, trimes
     if len(found) > MOST_BODIES or count > most_triangles:
         most = f"{most_triangles} triangles and {MOST_BODIES} bodies"
         raise InvalidInput(f"object.file must be of at most {most}, got {path} with {count} and {len(found)}")
-    placed = {node: body.copy().apply_transform(scene.graph[node][0]) for node, body in found.items()}
-    return placed, trimesh.units.unit_conversion(scene.units or "millimeters", "millimeters")
+    placed: dict[str, list[trimesh.Trimesh]] = {}
+    for node, body in found.items():
+        placed.setdefault(_owner(scene, node), []).append(body.copy().apply_transform(scene.graph[node][0]))
+    joined = {name: parts[0] if len(parts) == 1 else trimesh.util.concatenate(parts) for name, parts in placed.items()}
+    return joined, trimesh.units.unit_conversion(scene.units or "millimeters", "millimeters")
+
+
+def _owner(scene: trimesh.Scene, node: str) -> str:
+    """The node of the file that a node of the scene is, or is one of several primitives of (one for each colour)."""
+    above = scene.graph.transforms.parents[node]
+    is_primitive = scene.geometry[scene.graph.transforms.node_data[node]["geometry"]].metadata.get(
+        "from_gltf_primitive"
+    )
+    return above if is_primitive and re.fullmatch(re.escape(above) + r"_\w{6}", node) else node
 
 
 def chosen(bodies: dict[str, trimesh.Trimesh], body: str | int | None) -> trimesh.Trimesh:

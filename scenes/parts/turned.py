@@ -19,6 +19,7 @@ from scenes.ranges import Coordinate, Length
 from scenes.units import Unit
 
 _SEGMENTS = 48  # pieces of a full turn
+_LARGE = 20  # the power of two that a part is made as large as: nothing is rounded
 _SAME = 1e-9  # of the largest number
 
 
@@ -66,8 +67,9 @@ def _made(axis: str, profile: tuple[tuple[float, float], ...]) -> Solid:
     from scenes.parts import mesh
 
     line = np.array([(0.0, profile[0][0]), *((r, z) for z, r in profile), (0.0, profile[-1][0])])
-    made = trimesh.creation.revolve(line, sections=_SEGMENTS)
-    made = trimesh.Trimesh(made.vertices @ _frame(axis), made.faces)
+    larger = 2.0 ** (_LARGE - math.frexp(np.abs(line).max())[1])  # what is small in any unit is left out by its library
+    made = trimesh.creation.revolve(larger * line, sections=_SEGMENTS)
+    made = trimesh.Trimesh(made.vertices @ _frame(axis) / larger, made.faces)
     solid = mesh.solid(made)
     walls = [(a, b) for a, b in pairwise(profile) if b[0] > a[0]]
     return replace(

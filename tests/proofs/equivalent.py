@@ -143,6 +143,10 @@ EQUIVALENT: dict[str, str] = {
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",
+    "scenes/parts/curves.py: away = shape.along[pairs] * np.where(ends == 1, 1.0, -1.0)[..., None]":
+        "the signs of two directions, whose product counts",
+    "scenes/parts/curves.py: away = shape.along[pairs] * np.where(ends != 0, 1.0, -1.0)[..., None]":
+        "the signs of two directions, whose product counts",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds

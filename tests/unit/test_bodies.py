@@ -74,6 +74,63 @@ def test_glb(glb):
     assert sorted(round(height) for height in numbers.values()) == [20, 30]
 
 
+def block_glb(path, meshes, nodes):
+    """A block of 2 x 3 x 4 m from the origin: its triangles are accessor 1 and 2, halves of it, and 3, all of them."""
+    low = np.array([[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [0, 0, 4], [2, 0, 4], [2, 3, 4], [0, 3, 4]], "<f4")
+    quads = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    triangles = np.array([half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))], "<u2")
+    data = low.tobytes() + triangles.tobytes()
+    views = [(0, 96), (96, 36), (132, 36), (96, 72)]
+    facts = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes,
+        "materials": [{"name": "red"}, {"name": "blue"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}} | each for each in mesh]} for mesh in meshes],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [2, 3, 4]},
+            *(
+                {"bufferView": view, "componentType": 5123, "count": views[view][1] // 2, "type": "SCALAR"}
+                for view in (1, 2, 3)
+            ),
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in views],
+        "buffers": [{"byteLength": len(data)}],
+    }  # fmt: skip
+    text = json.dumps(facts).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(len(c).to_bytes(4, "little") + k + c for c, k in ((text, b"JSON"), (data, b"BIN\0")))
+    path.write_bytes(b"glTF" + b"".join(each.to_bytes(4, "little") for each in (2, 12 + len(chunks))) + chunks)
+    return path
+
+
+@pytest.mark.parametrize("materials", [({}, {}), ({"material": 0}, {"material": 1})], ids=["bare", "coloured"])
+def test_pieces_of_one_body_in_a_glb_are_one(tmp_path, materials):
+    """Exporters write a primitive for each colour: the node of two halves is one body; one below it is its own."""
+    halves = [{"indices": half, **more} for half, more in zip((1, 2), materials, strict=True)]
+    nodes = [
+        {"name": "block", "mesh": 0, "translation": [0, 0, 7], "children": [1]},
+        {"name": "block_bottom", "mesh": 1, "translation": [5, 0, -7]},
+    ]
+    path = block_glb(tmp_path / "halves.glb", [halves, [{"indices": 3}]], nodes)
+    low, high = np.array([0, 0, 7000]), np.array([2000, 3000, 11000])
+    away = np.array([5000, 0, -7000])
+    for body, first, last, faces in (("block", low, high, 6), ("block_bottom", low + away, high + away, 6),
+                                     (None, low + [0, 0, -7000], high + [5000, 0, 0], 12)):  # fmt: skip
+        solid = mesh.read(path, None, "mm", body)
+        assert solid.vertices.min(0) == pytest.approx(first)
+        assert solid.vertices.max(0) == pytest.approx(last)
+        assert (len(solid.faces), len(solid.sharp)) == (faces, 2 * faces)
+    with pytest.raises(InvalidInput, match=r"object.body must be one of \d 'block\w*', \d 'block\w*', got 3"):
+        mesh.read(path, None, "mm", 3)
+
+
+def test_lines_in_a_glb_are_no_body(tmp_path):
+    """Nor does what is left of a node's primitives become another one."""
+    path = block_glb(tmp_path / "lines.glb", [[{"indices": 3}, {"indices": 1, "mode": 1}]], [{"name": "a", "mesh": 0}])
+    assert len(mesh.read(path, None, "mm", "a").faces) == 6
+    with pytest.raises(InvalidInput, match=r"object.body must be one of 1 'a', got 2"):
+        mesh.read(path, None, "mm", 2)
+
+
 @lxml
 @pytest.mark.parametrize(("unit", "millimetres"), [("millimeter", 1), ("inch", 25.4), ("micron", 1e-3), ("meter", 1e3)])
 def test_3mf(tmp_path, unit, millimetres):
@@ -109,6 +166,29 @@ def test_hostile_files_are_refused_before_memory_is_taken(tmp_path):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(InvalidInput, match=match):
             mesh.read(tmp_path / name)
+
+
+@pytest.mark.parametrize(("counts", "good"), [((30, 4), True), ((4, 31), False), ((), True)])
+def test_a_glb_may_tell_of_three_numbers_a_triangle(counts, good):
+    """Of ten triangles, if each has three corners of its own; whichever of its lists is the longest counts."""
+    told = json.dumps({"accessors": [{"count": count} for count in counts]} if counts else {}).encode()
+    data = b"glTF" + b"\2\0\0\0" + (20 + len(told)).to_bytes(4, "little") + len(told).to_bytes(4, "little") + b"JSON"
+    if good:
+        bodies._check_glb("a.glb", data + told, 10)
+        return
+    with pytest.raises(InvalidInput, match=r"must be of at most 10 triangles, got a.glb with 31 numbers"):
+        bodies._check_glb("a.glb", data + told, 10)
+
+
+@pytest.mark.parametrize(("most", "triangles", "good"), [(2, 204, True), (1, 204, False), (2, 203, False)])
+def test_a_glb_may_have_so_many_bodies_and_triangles(glb, monkeypatch, most, triangles, good):
+    """A block of 12, and a pin of 48 sides, of 192."""
+    monkeypatch.setattr(bodies, "MOST_BODIES", most)
+    if good:
+        assert len(bodies.read(glb, glb.read_bytes(), triangles)[0]) == 2
+        return
+    with pytest.raises(InvalidInput, match=rf"at most {triangles} triangles and {most} bodies, got .* with 204 and 2"):
+        bodies.read(glb, glb.read_bytes(), triangles)
 
 
 @lxml

@@ -95,3 +95,23 @@ def test_frame(rng):
     assert caliper.blur(along) == 0.7
     blurred = replace(caliper, defocus=np.array([1.0, -3.0]))
     assert blurred.blur(np.array([0.0, 5.0, 10.0])) == pytest.approx(np.sqrt(0.49 + np.array([1.0, 1.0, 9.0]) / 4))
+
+
+def test_of_an_edge_that_is_not_seen_nothing_is_said():
+    """No length and no places, but sound arrays: its blur may be asked for, and its points; so of one of no length."""
+    layout = polygon_layout(CORNERS, OPTICS)
+    ends = layout.ends.copy()
+    ends[2] = ends[2, :1]
+    layout = replace(
+        layout, ends=ends, visible=np.array([True, False, True, True]), defocus=np.arange(8.0).reshape(4, 2)
+    )
+    for edge in (1, 2):
+        nothing = edge_calipers(layout, 4.0, 0.0)[edge]
+        assert (nothing.name, nothing.status, nothing.length) == (layout.names[edge], status.NOT_VISIBLE, 0.0)
+        assert [each.tolist() for each in (nothing.origin, nothing.direction, nothing.positions, nothing.defocus)] == [
+            [0.0, 0.0], [1.0, 0.0], [], [0.0, 0.0]
+        ]  # fmt: skip
+        assert nothing.optics is OPTICS
+        assert nothing.blur(nothing.positions) == OPTICS.blur_px
+        assert nothing.at(nothing.positions, np.zeros(1)).shape == (0, 2)
+    assert edge_calipers(layout, 4.0, 0.0)[3].defocus.tolist() == [6.0, 7.0]

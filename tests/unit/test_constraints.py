@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.features.projected_edges import projected_edges
+from imaging.pictures import Pictures
 from planner import Constraints
 from planner.search.constraints import _clearance, _to_segment
 from scenes import InvalidInput
@@ -137,3 +139,44 @@ def test_a_table_of_pairs_is_that_of_each_pair(task1, rng):
         sensors, lights = (rng.uniform((0, 0), (90, 360), (n, 2)) for n in (rows, columns))
         each = [[bool(limits.pairs(task1, s[None], k[None])[0]) for k in lights] for s in sensors]
         assert limits.pairs(task1, sensors[:, None], lights[None]).tolist() == each
+
+
+@pytest.mark.parametrize(
+    ("limits", "allowed"),
+    [
+        ((180, -180), [0, 90, 179, 180, 250, 359]), ((-180, 180), [0, 90, 179, 180, 250, 359]), ((90, 90), [90]),
+        ((350, 100), [0, 90, 359]), ((100, 350), [179, 180, 250]), ((-110, -2), [250]), ((179, 540), [179, 180]),
+    ],
+)  # fmt: skip
+def test_azimuths_grow_from_the_first_to_the_second_and_360_degrees_either_way_are_all(limits, allowed):
+    """Past 360 degrees, too; both ends are among them, and at the pole any is."""
+    azimuths = [0, 90, 179, 180, 250, 359]
+    poses = np.array([(30.0, azimuth) for azimuth in azimuths] + [(0.0, 200.0)])
+    if abs(limits[1] - limits[0]) > 360:
+        with pytest.raises(InvalidInput, match="light_azimuth_deg must be two azimuths at most 360 degrees apart"):
+            Constraints(light_azimuth_deg=limits)
+        return
+    found = Constraints(light_azimuth_deg=limits).lights(poses)
+    assert found.tolist() == [azimuth in allowed for azimuth in azimuths] + [True]
+
+
+def test_bodies_are_those_of_the_light_that_is_free():
+    """The second of two: at the camera's distance its body of 1 touches the camera's of 1 up to 11.5 degrees."""
+    lamp = SimpleNamespace
+    scene = lamp(free=(1,), camera=lamp(distance=10.0), lights=(lamp(distance=3.0), lamp(distance=10.0)))
+    limits = Constraints(camera_body=1.0, light_body=1.0)
+    sensors, places = np.array([[30.0, 40.0]]), np.array([[30.0 + away, 40.0] for away in (0.0, 11.0, 12.0, 50.0)])
+    assert limits.pairs(scene, sensors, places).tolist() == [False, False, True, True]
+    scene.free = (0,)
+    assert limits.pairs(scene, sensors, places).all()
+
+
+def test_a_clearance_is_asked_where_all_required_edges_are_seen():
+    """Of poses from which some are, some are not: such a pose is not allowed, however far apart those are that are."""
+    task1 = scenes.load("task1")
+    poses = np.array([(polar, azimuth) for polar in (20.0, 60.0, 100.0, 150.0) for azimuth in (15.0, 140.0, 260.0)])
+    seen = projected_edges(Pictures.of(task1, poses)).visible
+    assert (seen.any(1) & ~seen.all(1)).any()
+    allowed = Constraints(sensor_polar_deg=(0, 180), min_clearance_px=1e-6).sensors(task1, poses)
+    assert allowed.tolist() == seen.all(1).tolist()
+    assert allowed.any()

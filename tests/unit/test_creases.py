@@ -121,6 +121,15 @@ def test_pieces_are_joined_between_the_same_surfaces_alone():
     assert [sorted(ends) for ends, *_ in plane] == [[0, 2], [2, 3], [3, 4]]
 
 
+@pytest.mark.parametrize(("aside", "second", "count"), [(3.4e-6, True, 1), (3.8e-6, True, 2), (0.0, False, 2)])
+def test_pieces_are_one_where_single_precision_tells_no_turn_and_both_bend_alike(aside, second, count):
+    """The shorter's end off the longer's line by 2 x 3e-7 of the largest coordinate, 3; both bend outwards."""
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [3, aside, 0]])
+    chains = [((0, 1), (0, 1), True), ((2, 1), (1, 0), second)]
+    normals = np.array([[0, 0, 1.0], [0, -1, 0]])
+    assert len(joined(vertices, chains, normals, np.full(2, -1), np.array([True] * 2))) == count
+
+
 def arc(centre, radius, start, stop, steps):
     angle = np.radians(np.linspace(start, stop, steps + 1))
     return [(centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a)) for a in angle]

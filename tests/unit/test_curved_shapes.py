@@ -110,3 +110,15 @@ def test_facets_of_a_wall_are_those_around_its_axis_between_its_ends(axis):
         assert np.abs(solid.normals[list(wall.faces)][:, k]).max() < 0.3  # margin: a cone's normals: 0.2
     used = sorted(f for wall in solid.curved for f in wall.faces)
     assert used == sorted(np.flatnonzero(np.abs(solid.normals[:, k]) < 0.9))
+
+
+@pytest.mark.parametrize("unit", [1e-4, 1e-3, 1 / 25.4, 1e4])
+def test_a_pin_is_one_in_any_unit(unit):
+    """Of a radius of 0.2 mm, with a chamfer and a shoulder of 5 micrometres; what is said in metres was refused."""
+    profile = [(0.0, 0.2), (3.0, 0.2), (3.0, 0.205), (3.1, 0.205), (3.105, 0.2)]
+    one, other = (Turned(kind="turned", profile=[(u * z, u * r) for z, r in profile]).solid for u in (1, unit))
+    assert other.vertices == pytest.approx(unit * one.vertices, abs=1e-9 * unit)
+    assert other.faces == one.faces
+    assert [(e.name, e.kind, e.convex) for e in other.edges] == [(e.name, e.kind, e.convex) for e in one.edges]
+    assert [wall.faces for wall in other.curved] == [wall.faces for wall in one.curved]
+    assert [len(wall.faces) for wall in one.curved] == [48, 48, 48]

@@ -9,7 +9,7 @@ import pytest
 import measure
 from measure.features.optics import Optics
 from measure.find import ellipse
-from measure.photo import ellipses
+from measure.photo import edge_points, ellipses
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.photograph import _quantities
 from measure.photo.recording import recording
@@ -72,3 +72,36 @@ def test_diameters_and_axes_are_twice_what_is_fitted_and_so_are_their_errors(kin
 
 def silent(seen):
     return replace(seen, curve=NoiseCurve(0.0, 0.0, 0.0, 0.0, None))
+
+
+@pytest.mark.parametrize(
+    ("share", "contrast", "expected"),
+    [(0.51, 1.01, "fitted"), (0.49, 9.0, "low_contrast"), (1.0, 0.99, "low_contrast"), (1.0, 1.01, "fitted")],
+)
+def test_an_outline_is_fitted_where_half_of_its_places_have_an_edge_above_the_noise(
+    share, contrast, expected, monkeypatch
+):
+    """The points that are fitted are those; on a circle they lie outside the steepest places by the blur's bend."""
+    optics, seen = Optics((200, 220), 0.8, 4.0, 1.5, 6.0), {}
+
+    def along(optics, positions, places, normals):
+        valid = np.arange(len(places)) < np.floor(share * len(places))
+        told = SimpleNamespace(valid=valid[None], offset=np.full((1, len(places)), 0.25), contrast=[level])
+        seen["count"] = int(valid.sum())
+        return SimpleNamespace(locate=lambda images: told)
+
+    level = contrast * edge_points.MIN_CONTRAST * 2.0
+    monkeypatch.setattr(edge_points, "gradient_along", along)
+    monkeypatch.setattr(edge_points, "_covariance", lambda locator, *_: np.eye(1000)[: seen["all"], : seen["all"]])
+    monkeypatch.setattr(edge_points, "_fitted", lambda *given: seen.update(points=given[0], by=given[1]) or "fitted")
+    near = np.array([110.0, 100.0, 40.0, 40.0, 0.0])
+    seen["all"] = int(2 * np.pi * 40 / (2 * 1.5))
+    found = edge_points.ellipse_by_points(np.zeros((200, 220)), near, optics, True)
+    if expected != "fitted":
+        assert str(found.status) == expected
+        return
+    assert found == "fitted"
+    assert len(seen["points"]) == seen["count"]
+    far = 40 + 0.25 + (1.5**2 + 0.8**2 + 1 / 12) / 2 / 40
+    assert np.linalg.norm(seen["points"] - [110, 100], axis=1) == pytest.approx(np.full(seen["count"], far))
+    assert seen["by"] == pytest.approx(np.eye(seen["count"]) / level**2)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 import math
 import re
 import socket
@@ -13,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from aiohttp import ClientSession, CookieJar, web
+from aiohttp.http_exceptions import BadHttpMessage, BadStatusLine
 from aiohttp.test_utils import TestServer
 from yarl import URL
 
@@ -24,7 +26,7 @@ from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Setting
 from scenes.status import MEANINGS, REMEDIES
 from validation.batch.work import Chunk, Clean, Found, Packed
-from validation.explore import answers, best, budgets, effects, preview, prove, save, session, sphere, tools
+from validation.explore import answers, best, budgets, effects, preview, prove, save, server, session, sphere, tools
 from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
 from validation.explore.server import serve
@@ -617,3 +619,76 @@ def test_a_part_of_any_shape_is_as_large_as_its_scale_says(task1, size):
     image = np.arange(3000.0 * 3000).reshape(3000, 3000) % 200
     wanted = [max(1, round(n * part.scale)) for n in (part.height, part.width)]
     assert list(preview.rendered(task1, image, part).shape) == wanted
+
+
+def test_requests_that_are_no_http_are_not_logged_and_errors_of_ours_are():
+    """The filter is set once, however often a page is served."""
+    log = server._log()
+    assert server._log() is log
+    assert log.filters.count(server._is_ours) == 1
+
+    def record(error):
+        told = (type(error), error, None) if error else None
+        return logging.LogRecord(log.name, logging.ERROR, "", 1, "said", None, told)
+
+    kept = [
+        bool(log.filter(record(error))) for error in (None, ValueError("ours"), BadStatusLine("x"), BadHttpMessage("x"))
+    ]
+    assert kept == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("took", "large", "where", "size", "shown"),
+    [
+        (0.51, False, "slowly", (2048, 512), True), (0.49, True, "quickly", (512, 2049), False),
+        (math.inf, True, "slowly", (1024, 1024), True), (math.inf, False, "quickly", (1024, 1025), False),
+    ],
+)  # fmt: skip
+def test_what_follows_at_rest(task1, took, large, where, size, shown, monkeypatch):
+    """A close look of more than half a second, or of a large part, in a process; a picture of up to 2^20 px."""
+    camera = task1.camera.model_copy(update={"width": size[0], "height": size[1]})
+    scene, said = task1.model_copy(update={"camera": camera}), []
+
+    class Kept:
+        async def quickly(self, work, *arguments):
+            return await self._done("quickly", work, arguments)
+
+        async def slowly(self, work, *arguments):
+            return await self._done("slowly", work, arguments)
+
+        async def _done(self, place, work, arguments):
+            said.append((place, work.__name__))
+            return {"refused": "", "core_s": 0.3} if work is session.answered else ["a row"]
+
+    async def send(message):
+        said.append(message)
+
+    async def noted(state):
+        said.append("coloured" if "coloured" not in said else "shown")
+
+    visitor = session.Session(session.Place(scene, "task1", None), Kept(), send)
+    visitor._close_s = took
+    monkeypatch.setattr(visitor, "_colour", noted)
+    monkeypatch.setattr(visitor, "_show", noted)
+    monkeypatch.setattr(preview, "is_large", lambda given: large)
+    asyncio.run(visitor._rest(State.first(scene), False, 7))
+    assert said == [
+        (where, "answered"), {"refused": "", "core_s": 0.3, "number": 7}, "coloured",
+        ("slowly", "rows"), {"type": "budget", "rows": ["a row"]},
+        ("slowly", "effects"), {"type": "effects", "rows": ["a row"]},
+        *(["shown"] if shown else []),
+    ]  # fmt: skip
+    assert visitor._close_s == 0.3
+
+
+@pytest.mark.parametrize(("width", "height"), [(420, 60), (1680, 240)])
+def test_a_rendered_picture_is_shown_pixel_by_pixel_or_by_means(task1, width, height, rng):
+    """Of one that is wider than what is sent each pixel is the mean of 4 x 4; else it is itself."""
+    levels = rng.integers(0, 256, (height + 7, width + 5)).astype(float)
+    part = preview.Window(3, 2, width, height)
+    found = preview.rendered(task1, levels, part)
+    cut, times = levels[2 : 2 + height, 3 : 3 + width], width // 420
+    means = cut.reshape(height // times, times, width // times, times).mean((1, 3))
+    if times == 1:
+        assert found.shape == (60, 420)
+    assert found.astype(float) == pytest.approx(np.floor(means + 1e-3), abs=1 if times > 1 else 0)

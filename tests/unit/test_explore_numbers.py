@@ -3,6 +3,7 @@
 import math
 import statistics
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ from scipy import stats
 
 import planner
 import scenes
-from scenes import Pose, Tolerance
+from scenes import InvalidInput, Pose, Tolerance
 from validation.batch.work import Chunk, Clean, Found, Packed
-from validation.explore import answers, prove, sphere
+from validation.explore import answers, best, preview, prove, sphere
+from validation.explore.messages import Message
 from validation.explore.state import SENSOR, State
 
 
@@ -125,3 +127,68 @@ def test_a_proof_is_in_standard_deviations(scene):
         assert message["interval"] == pytest.approx(ends)
         assert (message["n"], message["failed"], message["name"]) == (60, 4 + k, f"m{k}")
         assert sum(message["counts"]) == len(good)
+
+
+def test_together_each_measurand_has_its_own_number_of_views(scene):
+    """Of three pictures one tells of the first and two of the second."""
+    told = planner.predict(scene, State.first(scene).sensor, State.first(scene).lights).measurands
+    used = np.array([[False, True], [True, False], [False, True]])
+    together = SimpleNamespace(variances=np.array([4e-4, 9e-6]), status=("ok", "clutter"), used=used)
+    found = [answers._forecast(each, together, m)["together"] for m, each in enumerate(told)]
+    assert found == [
+        {"sigma": pytest.approx(0.02), "status": "ok", "views": 1},
+        {"sigma": pytest.approx(0.003), "status": "clutter", "views": 2},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "window"),
+    [
+        ((100, 50), (200, 90), (84, 34, 132, 72)), ((-90, -50), (-70, -45), (0, 0, 8, 8)),
+        ((9e3, 8e3), (9.1e3, 8.1e3), (-8, -8, 8, 8)), ((-50, 20.5), (50, 40.5), (0, 4, 66, 53)),
+    ],
+)  # fmt: skip
+def test_the_window_holds_the_object_and_12_percent_around_it_within_the_picture(scene, low, high, window, monkeypatch):
+    """And 4 px; of what lies beside the picture eight pixels of its border, each way."""
+    points = np.array([low, high, (np.nan, np.inf), low], float)
+    monkeypatch.setattr(preview, "project", lambda *given: points)
+    found = preview.window(scene, State.first(scene).picture(scene))
+    size = scene.camera.width, scene.camera.height
+    left, top = (start % full if start < 0 else start for start, full in zip(window[:2], size, strict=True))
+    assert (found.left, found.top, found.width, found.height) == (left, top, *window[2:])
+
+
+@pytest.mark.parametrize("measurand", [0, 1])
+def test_the_way_down_is_by_the_measurand_that_is_looked_at_each_thing_on_its_side(scene, measurand, monkeypatch):
+    """Of camera above and lights below; where a light would be above, nothing is to be found."""
+    above, below = Pose(40.0, 300.0), (Pose(100.0, 290.0), Pose(110.0, 280.0))
+    state = replace(State.first(scene), sensor=above, lights=below, measurand=measurand)
+    kept, variances = [], []
+
+    def model(pictures):
+        variances.append(pictures)
+        return SimpleNamespace(variances_object=np.array([[3.0, 8.0]]))
+
+    def descend(start, value, sizes):
+        kept.append(value)
+        return np.array([41.237, 301.0]), np.array([99.0, 291.111, 111.0, 279.0]), None, None
+
+    monkeypatch.setattr(best, "variance_model", lambda name: model)
+    monkeypatch.setattr(best, "descend", descend)
+    found = best.best_from(scene, state)
+    assert found == replace(state, sensor=Pose(41.24, 301.0), lights=(Pose(99.0, 291.11), Pose(111.0, 279.0)))
+    (value,) = kept
+    lights = np.array([100.0, 290, 110, 280])
+    assert value(np.array([40.0, 300]), lights) == (3.0, 8.0)[measurand]
+    assert value(np.array([100.0, 300]), lights) == np.inf
+    assert value(np.array([40.0, 300]), np.array([80.0, 200, 110, 280])) == np.inf
+
+
+@pytest.mark.parametrize(("number", "good"), [(2**53, True), (2**53 + 1, False), (-1, False)])
+def test_numbers_of_messages_are_such_that_javascript_has_them_exactly(number, good):
+    text = f'{{"type": "state", "number": {number}}}'
+    if good:
+        assert Message.of(text).number == number
+        return
+    with pytest.raises(InvalidInput, match="number must be"):
+        Message.of(text)

@@ -1,11 +1,13 @@
 """Boundaries of faces and what makes faces facets of a curved surface: steps of each, on made-up shapes."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from scenes.parts import facets, rims
+from scenes.parts.chains import Chains
 
 
 def ring(count, radius, centre=(0.0, 0.0), start=0.0):
@@ -134,6 +136,65 @@ def test_an_end_is_smooth_that_bends_little_more_than_the_curve():
         assert some.smooth.tolist() == [is_smooth] + [True] * 4
 
 
+@pytest.mark.parametrize(("factor", "is_smooth"), [(1.58, True), (1.62, False)])
+def test_where_bends_are_slight_an_end_may_bend_by_more_than_half_as_much_again(factor, is_smooth):
+    """1.6 times: the steps of a curve may be unequal."""
+    some = found([9, 1, 1, 1, 1, 7], np.radians([7 * factor, 7, 7, 7, 7]))
+    assert some.smooth.tolist() == [is_smooth] + [True] * 4
+
+
+@pytest.mark.parametrize(("bend", "is_smooth"), [(0.98, True), (1.02, False)])
+def test_planes_that_bend_by_less_than_a_degree_are_joined_smoothly(bend, is_smooth):
+    some = found([9, 7, 8], np.radians([bend, 40.0]))
+    assert some.smooth.tolist() == [is_smooth, False]
+    assert some.region.tolist() == [-1] * 3
+
+
+@pytest.mark.parametrize(
+    ("bend", "last", "width", "is_facet"),
+    [
+        (10.0, 7.1, 1.0, True), (10.0, 6.9, 1.0, False), (10.0, 10.0, 1.45, True), (10.0, 10.0, 1.55, False),
+        (10.0, 8.7, 1.45, True), (10.0, 8.4, 1.45, False), (4.5, 2.9, 1.0, True), (4.5, 3.1, 1.0, False),
+    ],
+)  # fmt: skip
+def test_a_last_facet_is_as_wide_and_bends_as_much_as_those_before(bend, last, width, is_facet):
+    """At most 1.5 times as wide, at least 0.7 of the curvature (bend over both widths) or 3 degrees; at either end."""
+    for way in (1, -1):
+        some = found([9, 1, 1, 1, 1, width][::way], np.radians([bend] * 4 + [last])[::way])
+        assert some.smooth.all()
+        assert (some.region[::way] >= 0).tolist() == [False] + [True] * 4 + [is_facet]
+
+
+def bends(*parts):
+    return np.radians(np.concatenate(parts))
+
+
+@pytest.mark.parametrize(("width", "is_round"), [(1.2, True), (1.3, False)])
+def test_a_coarse_surface_is_a_polygon_beside_finer_ones(width, is_round):
+    """Five times as high over its chords as they: 20 degrees on so wide faces beside 5 degrees on faces of 1."""
+    some = found([9, 1, 1, 1, 1, 90, *[width] * 4, 90], bends([5.0] * 5, [20.0] * 5))
+    assert (some.region[1:5] >= 0).all()
+    assert (some.region[6:10] >= 0).tolist() == [is_round] * 4
+    assert some.smooth.tolist() == [True] * 5 + [is_round] * 5
+    alone = found([90, *[width] * 4, 90], bends([20.0] * 5))
+    assert (alone.region[1:5] >= 0).all()
+
+
+@pytest.mark.parametrize(("bend", "is_round"), [(19.0, True), (21.0, False)])
+def test_two_bends_that_are_much_higher_than_their_surface_are_edges(bend, is_round):
+    """Ten times as high over their chords as three quarters of the others, and of more than 12 degrees."""
+    some = found([9, *[1.0] * 17, 9], bends([2.0] * 8, [bend] * 2, [2.0] * 8))
+    assert some.smooth.tolist() == [True] * 8 + [is_round] * 2 + [True] * 8
+    assert (len(set(some.region[1:18].tolist())) == 1) is is_round
+
+
+@pytest.mark.parametrize(("bend", "is_round"), [(10.8, True), (11.2, False)])
+def test_one_bend_that_stands_out_by_ten_times_is_an_edge(bend, is_round):
+    """However little it is: 1.1 degrees before and behind."""
+    some = found([9, *[1.0] * 15, 9], bends([1.1] * 8, [bend], [1.1] * 7))
+    assert some.smooth.tolist() == [True] * 8 + [is_round] + [True] * 7
+
+
 def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
     """Where two of its walls meet in an edge; what belongs to both is no rim."""
     loop = (0, 1, 2)
@@ -146,3 +207,31 @@ def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
     nothing = facets._of_rims(chains, [])
     assert not nothing[0].any()
     assert not nothing[1].any()
+
+
+def test_what_a_bend_is_sure_of_is_less_by_what_single_precision_moves_a_sliver():
+    """The longest edge of each of both faces over its area, at most 10 degrees; height over chords by the smaller."""
+    vertices = np.array([[0.0, 0, 0], [200, 0, 0], [0, 1, 0], [200, 1, 0]])
+    chains = [((0, 1), (0, 1), True), ((2, 3), (1, 2), True), ((0, 2), (2, 3), False)]
+    normals = np.array([[0, 0, 1.0], [0, 0.2, 1], [0, 0.5, 1], [0.3, 0, 1]])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    areas = np.array([50.0, 0.4, 80.0, 1e-5])
+    shape = Chains.of(vertices, chains, normals, areas)
+    bend = np.arccos(np.clip([normals[a] @ normals[b] for a, b in ((0, 1), (1, 2), (2, 3))], -1, 1))
+    assert shape.bend == pytest.approx(bend)
+    one = 3e-7 * 200
+    moved = [one * (200 / 50 + 200 / 0.4), one * (200 / 0.4 + 200 / 80), np.radians(10.0)]
+    assert shape.certain == pytest.approx(bend - moved)
+    assert shape.height == pytest.approx(bend * [0.4 / 200, 0.4 / 200, 1e-5] / 8)
+    assert (shape.unsure, shape.length.tolist()) == (pytest.approx(2 * one), [200.0, 200.0, 1.0])
+
+
+@pytest.mark.parametrize(("bend", "smooth", "loose"), [(30.9, 2, True), (31.1, 2, False), (20.0, 1, False)])
+def test_an_edge_that_ends_within_a_surface_is_none_and_neither_is_what_it_follows(bend, smooth, loose):
+    """Where at least two smooth pieces meet it; not one that bends by more than 31 degrees."""
+    within = [(1, 10), (1, 11)][:smooth]  # at one end of the first edge
+    edges = [(0, 1), (0, 2), (2, 3), (2, 4)]  # a way of two, which ends where two others meet
+    ends = np.array([*edges, *within, (0, 12), (0, 13)])
+    shape = SimpleNamespace(ends=ends, bend=np.radians([bend, 25.0, 40.0, 40.0] + [5.0] * (len(ends) - 4)))
+    kept = facets._dangling(shape, np.arange(len(ends)) < 4)
+    assert kept.tolist() == [loose, loose] + [False] * (len(ends) - 2)

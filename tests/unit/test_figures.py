@@ -1,6 +1,7 @@
 """The pictures show what was measured."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,6 +13,7 @@ import measure
 import planner
 from imaging.geometry.projection import project
 from tests.oracle import polygon_image
+from validation.report import camera_figure
 from validation.report.canvas import WIDTH
 from validation.report.figures import edge_pixels
 from validation.report.map_figure import COLOURS, Chart, draw_map
@@ -123,3 +125,58 @@ def test_a_maps_scale_is_as_wide_as_the_map_at_most(drawn):
     map_, scale = axis.get_position(original=True), bar.get_position()
     assert map_.x0 < scale.x0 < scale.x1 < map_.x1  # margin: where it stands, by its kind
     assert scale.y1 < map_.y0  # margin: the same
+
+
+@pytest.fixture
+def calibrated(monkeypatch, tmp_path):
+    """Draws a calibration's figure as its command does, and gives the figure as it was saved."""
+
+    def draw(count, rms=0.031):
+        lens = SimpleNamespace(cx=330.0, cy=225.0)
+        rng = np.random.default_rng(7)
+        boards = [SimpleNamespace(corners=rng.uniform(40, 440, (6, 2))) for _ in range(count)]
+        left = [rng.normal(0, rms, (6, 2)) for _ in range(count)]
+        found = SimpleNamespace(
+            image_shape=(480, 640), rms_px=rms, residuals=left, lens=lens, status="ok", p_value=0.4321
+        )
+        kept = []
+        monkeypatch.setattr(camera_figure.plt, "close", kept.append)
+        path = camera_figure.draw(found, boards, tmp_path / "camera.png")
+        monkeypatch.undo()
+        assert path.read_bytes()[:4] == b"\x89PNG"
+        plt.close(kept[0])
+        return kept[0], boards, left
+
+    return draw
+
+
+def test_a_calibrations_arrows_are_its_residuals_enlarged(calibrated):
+    """By 200: the largest round number that makes the root mean square arrow at most a fiftieth of 640 px."""
+    figure, boards, left = calibrated(3, 0.05)
+    (axis,) = figure.axes
+    assert axis.get_title() == "Residuals x 200: 0.0500 px rms, ok, p = 0.43; +: the axis"
+    for arrows, board, rest in zip(axis.collections, boards, left, strict=True):
+        assert arrows.get_offsets() == pytest.approx(board.corners)
+        assert np.stack([arrows.U, arrows.V], 1) == pytest.approx(200 * rest)
+        assert (arrows.angles, arrows.scale, arrows.scale_units) == ("xy", 1, "xy")
+    assert len({tuple(arrows.get_facecolor()[0]) for arrows in axis.collections}) == 3
+    assert axis.lines[0].get_xydata().tolist() == [[330.0, 225.0]]
+    assert (axis.get_xlim(), axis.get_ylim()) == ((-0.5, 639.5), (479.5, -0.5))
+
+
+@pytest.mark.parametrize(("count", "named"), [(10, 10), (11, 0)])
+def test_up_to_ten_boards_are_named_close_below_their_figure(calibrated, count, named):
+    """Each in a line's colour; under the axis' name and within the figure, which is left to the picture."""
+    figure, *_ = calibrated(count)
+    (axis,) = figure.axes
+    legend = axis.get_legend()
+    assert (len(legend.get_texts()) if legend else 0) == named
+    if legend:
+        assert [each.get_text() for each in legend.get_texts()] == [f"board {i}" for i in range(1, 11)]
+        place, whole = legend.get_window_extent(), figure.bbox
+        label = axis.xaxis.label.get_window_extent()
+        shown = axis.get_window_extent()
+        # margin: where things stand, by their kind
+        assert whole.y0 <= place.y0 < place.y1 <= label.y1
+        assert shown.y0 - place.y1 < 0.1 * shown.height  # margin: close to it, by its kind
+        assert shown.x0 < (place.x0 + place.x1) / 2 < shown.x1  # margin: the same

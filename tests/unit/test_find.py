@@ -1,9 +1,13 @@
 """Shapes found in pictures made with known ones, and nothing where a person sees nothing."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import measure
+from measure.find import tags
 from measure.find.candidate import CHESSBOARD, QUADRILATERAL, TAG, Candidate, ellipse_outline
 from measure.find.choose import nearest
 from measure.find.distinct import distinct
@@ -81,6 +85,25 @@ def test_tags(family, turn):
     assert (found.identifier, found.family) == (7, family)
     # margin: where the measurement begins: a sixth of the 3 px within which it seeks
     assert found.outline == pytest.approx(np.roll(_TAG, turn, 0), abs=0.5)
+
+
+@pytest.mark.parametrize(("side", "asked"), [(12.1, 1), (11.9, 0)])
+def test_a_tag_is_read_from_12_pixels_along_its_shorter_side(side, asked, monkeypatch):
+    """Dark, with a bright cell within; of a bright one and of a plain one none is read either."""
+    image = np.full((60, 70), 200.0)
+    image[15:46, 10:61] = 30.0
+    image[26:33, 30:42] = 200.0
+    calls = []
+    reader = SimpleNamespace(detectMarkersMultiDict=lambda grey: calls.append(grey.shape) or ((), None, (), None))
+    monkeypatch.setattr(tags, "_detector", lambda: reader)
+    outline = np.array([[10.0, 30 - side / 2], [60, 30 - side / 2], [60, 30 + side / 2], [10, 30 + side / 2]])
+    shape = Candidate(QUADRILATERAL, outline, 1.0, -10.0, 1.0)
+    assert tags.tag(image, shape) is shape
+    assert len(calls) == asked
+    for other in (replace(shape, contrast=10.0), replace(shape, kind="circle")):
+        assert tags.tag(image, other) is other
+    assert tags.tag(np.where(image == 200.0, 30.0, image), shape) is shape
+    assert len(calls) == asked
 
 
 def test_a_tag_damaged_is_a_quadrilateral():

@@ -10,7 +10,7 @@ import planner
 from measure.fitting import fit, sides, start
 from measure.fitting.noise import by_repetition
 from measure.fitting.parameters import Parameters
-from measure.fitting.photograph import Pixels, Shots
+from measure.fitting.photograph import Pixels, Shots, grouped
 from scenes import Picture
 
 
@@ -141,3 +141,80 @@ def test_poses_around_are_tried_where_much_is_left(lefts, monkeypatch):
     assert len(set(turned)) == (0 if len(lefts) == 1 else 26)
     assert followed == [0.0, 17.0, 18.0, 16.0, 19.0][: len(lefts) if lefts[-1] < 1 else 1 + start._KEPT]
     assert best[0] == followed[int(np.argmin([lefts[min(i, len(lefts) - 1)] for i in range(len(followed))]))]
+
+
+@pytest.mark.parametrize(
+    ("area", "brighter", "distance", "exposure"),
+    [(1.21, 1.5, 1.1**-2, 1.5**2), (9.0, 7.0, 0.5, 10.0), (1 / 9, 0.1, 1.4**2, 0.1), (1 / 1.5, 0.5, 1.5, 0.25)],
+)
+def test_size_and_brightness_are_followed_by_so_much_in_each_of_two_steps(
+    two, area, brighter, distance, exposure, monkeypatch
+):
+    """The distance by 0.7 to 1.4, the exposure by 0.2 to 5, and both within the bounds that a fit has."""
+    parameters, seen = Parameters.of(two), []
+
+    def outline(image):
+        seen.append(image)
+        photographed = len(seen) % 2 == 1
+        return np.zeros(2), (area if photographed else 1.0), (brighter if photographed else 1.0)
+
+    monkeypatch.setattr(start, "_outline", outline)
+    begin, names = parameters.start(), parameters.names
+    found = start._aligned(parameters, (moved(two[0], 0, 0, 1.0, 0.0),), begin, parameters.scene.noise)
+    for name, factor in (("camera.distance", distance), ("camera.exposure", exposure)):
+        assert found[names.index(name)] / begin[names.index(name)] == pytest.approx(factor, rel=1e-6)
+    assert len(seen) == 4
+
+
+@pytest.mark.parametrize(
+    ("ratios", "chosen"),
+    [([0.9, 1.0, 0.2, 1.0, 0.5, 0.5], None), ([0.9, 1.2, 3.0, 1.1, 2.0, 2.5], 2), ([9.0, 1, 1, 1, 1, 9.5], 5)],
+)
+def test_the_flattest_of_all_sides_tells_the_errors(ratios, chosen, monkeypatch):
+    """Of two angles of a light, and of the one of a sensor by which faces come into sight; beside one, all others."""
+    kinds = {"light.a": "light", "camera.exposure": "number", "sensor.p": "sensor", "x": "number", "light.b": "light",
+             "sensor.a": "sensor"}  # fmt: skip
+    free = [SimpleNamespace(name=name, kind=kind) for name, kind in kinds.items()]
+    problem = SimpleNamespace(parameters=SimpleNamespace(free=free))
+    ways = []
+
+    def followed(problem, values, noise, which, white, variance, way):
+        ways.append((way[0], way[1], way[2].tolist()))
+        return f"there {len(ways) - 1}", ratios[len(ways) - 1]
+
+    monkeypatch.setattr(sides, "_followed", followed)
+    monkeypatch.setattr(sides, "_turns_away", lambda problem, values, i, which, white: i == 5)
+    found = sides.flatter_side(problem, "here", None, np.array([0, 1, 2, 3, 4, 5]), None, None)
+    assert found == ("here" if chosen is None else f"there {chosen}")
+    assert ways == [
+        (i, side, others)
+        for i, others in ((0, [1, 4]), (4, [0, 1]), (5, [0, 1, 2, 3, 4]))
+        for side in (-1.0, 1.0)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("slow", "groups"), [(0.315, [(0, 1)]), (0.318, [(0,), (1,)])])
+def test_photographs_differ_by_white_noise_up_to_one_and_a_half_times_its_variance(slow, groups):
+    """Blocks of 4 x 4 differ by a sum that is 0 in each, of variance 16/15, and all of them by a level of their own."""
+    y, x = np.indices((16, 24))
+    fast = np.where((x + y) % 2, 1.0, -1.0)
+    blocks = np.where((x // 4 + y // 4) % 2, slow, -slow)
+    image = 100.0 + 3 * x
+    assert [each.members for each in grouped([image, image + fast + blocks])] == groups
+
+
+@pytest.mark.parametrize(("first", "second"), [(1e-6, 1e-5), (1e-5, 1e-6)])
+def test_of_what_is_held_at_its_start_or_where_it_is_likeliest_the_likelier_fit_is_taken(first, second, monkeypatch):
+    """Where what is held leaves a misfit."""
+    at_start = "where the scene has it"
+
+    def held(parameters, shots, begin, noise, estimated, known, at):
+        p = first if at is at_start else second
+        assert at in (at_start, None)
+        return SimpleNamespace(status="misfit", statuses=("ok", fit.HELD), p_value=p)
+
+    monkeypatch.setattr(fit, "shows_something", lambda *_: True)
+    monkeypatch.setattr(fit, "near", lambda *_: None)
+    monkeypatch.setattr(fit, "_with_held", held)
+    parameters = SimpleNamespace(start=lambda: at_start)
+    assert fit._fitted(parameters, (), None, True, True).p_value == max(first, second)

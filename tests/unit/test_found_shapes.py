@@ -10,9 +10,10 @@ from measure.find.candidate import CHESSBOARD, ELLIPSE, QUADRILATERAL, TAG, Cand
 from measure.find.chessboard import _alternation, find_chessboard
 from measure.find.coarse import Coarse
 from measure.find.distinct import outside, same
-from measure.find.four_sides import _goes_on, _sides, deviation, near, polygon, shaped
+from measure.find.four_sides import _goes_on, _sides, deviation, four_sides, near, polygon, shaped
 from measure.find.support import Steepest, contrast, sign_of, steepest
 from tests.boards import SMALL
+from tests.oracle import polygon_image
 
 POSE = np.array([0.35, -0.25, 0.1, -105.0, -62.0, 370.0])
 
@@ -299,3 +300,15 @@ def test_sides_of_no_area_have_normals():
     """A bow tie, whose two halves cancel."""
     _, normals, *_ = _sides(np.array([[0.0, 0], [40, 40], [40, 0], [0, 40]]), 0.1)
     assert np.hypot(*normals.T) == pytest.approx(np.ones(len(normals)))
+
+
+@pytest.mark.parametrize(("gap", "good"), [(0, True), (8, True), (14, False)])
+def test_a_side_may_lack_three_hundredths_of_itself(gap, good):
+    """Of 208 px 6.2; a patch of one level over a side hides it but for what blurring brings in at both ends."""
+    corners = np.array([[30.3, 28.6], [238.1, 35.2], [231.7, 219.4], [27.2, 212.9]])
+    image = polygon_image(corners, (250, 270), 0.8, 100.0, 40.0) + np.random.default_rng(1).normal(0, 1, (250, 270))
+    image[26:40, 120 : 120 + gap] = 90.0
+    found = four_sides(Coarse.of(image), corners)
+    assert (found is not None) is good
+    if found is not None:
+        assert found.outline == pytest.approx(corners, abs=0.5)

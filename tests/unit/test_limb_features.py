@@ -186,3 +186,19 @@ def test_places_are_at_most_two_smoothing_scales_apart(larger):
     assert times * 64 == limbs._count(pictures, ball, optics)
     assert length / (times * 64) <= 2 * optics.scale_px
     assert times == 1 or length / ((times - 1) * 64) > 2 * optics.scale_px
+
+
+def test_facets_of_a_ball_bend_outwards_and_none_is_an_edge():
+    """Each edge between two facets, whose outer sides look away from each other; corners on the sphere."""
+    edges = BALL.edges
+    assert len(edges) == 3 * len(BALL.faces) // 2 == 1920
+    assert len({frozenset(edge.ends) for edge in edges}) == 1920
+    middles = np.array([BALL.vertices[list(face)].mean(0) for face in BALL.faces])
+    for edge in edges:
+        one, two = edge.faces
+        assert set(edge.ends) == set(BALL.faces[one]) & set(BALL.faces[two])
+        assert (edge.kind, edge.convex) == ("smooth", bool(BALL.normals[one] @ (middles[two] - middles[one]) < 0))
+    assert all(edge.convex for edge in edges)
+    assert np.linalg.norm(BALL.vertices - [0.5, -0.2, 0.3], axis=1) == pytest.approx(np.full(642, 3.0))
+    assert BALL.is_convex
+    assert BALL.sharp == ()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from scenes import InvalidInput
 from scenes.parts import mesh
 from tests.parts import Hole, bracket, evenly, prism, unevenly
 
@@ -194,3 +195,34 @@ def test_a_fin_of_no_thickness_has_two_sides():
     assert np.isfinite(solid.normals).all()
     sides = solid.normals[np.abs(solid.offsets) == 1][:, 1]
     assert sorted(sides[sides != 0].tolist()) == [-1.0, 1.0]
+
+
+@pytest.mark.parametrize(("off", "good"), [(0.09, True), (0.11, False)])
+def test_a_vertex_is_named_by_a_place_within_a_thousandth_of_the_largest_extent(off, good):
+    """Of a plate of 100 x 20 x 2, whose nearest vertex is meant."""
+    plate = mesh.solid(trimesh.creation.box((100, 20, 2)))
+    names = {"here": (50.0, 10.0 + off, 1.0), "there": (-50.0, 10.0, 1.0 - off)}
+    if not good:
+        with pytest.raises(
+            InvalidInput, match=r"object.names.here must be the position of a vertex, got \[50.0, 10.11"
+        ):
+            mesh.renamed(plate, names)
+        return
+    found = mesh.renamed(plate, names)
+    assert found.vertex("here").tolist() == [50, 10, 1]
+    assert found.vertex("there").tolist() == [-50, 10, 1]
+    assert sum(name.startswith("v") for name in found.vertex_names) == 6
+    with pytest.raises(InvalidInput, match=r"object.names must be names of their own, got v1, there"):
+        mesh.renamed(plate, {"v1": (50.0, 10.0, 1.0), "there": (-50.0, 10.0, 1.0)})
+
+
+def test_corners_are_where_two_sharp_edges_meet_or_more():
+    """Of half a rod: two at each end of both straight edges along it, and no vertex of its half circles."""
+    angle = np.radians(np.linspace(0, 180, 25))
+    rod = mesh.solid(prism([(0, 0), *np.column_stack([5 * np.cos(angle), 5 * np.sin(angle)]).tolist()], 12.0))
+    corners = {name: rod.vertex(name).round(9).tolist() for name in rod.vertex_names if name.startswith("v")}
+    assert corners == {"v1": [-5, 0, 0], "v2": [-5, 12, 0], "v3": [5, 0, 0], "v4": [5, 12, 0]}
+    assert sorted(name for name in rod.vertex_names if name not in corners) == sorted(f"p{i}" for i in range(1, 47))
+    assert [sorted(rod.vertex_names[i] for i in edge.ends) for edge in rod.sharp] == [
+        ["v1", "v2"], ["v1", "v3"], ["v2", "v4"], ["v3", "v4"]
+    ]  # fmt: skip

@@ -1,14 +1,18 @@
 """Noise, blur and sides of a photograph, each told from images made with known ones."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
+from measure.find.candidate import Candidate
 from measure.find.search import find_quadrilateral
-from measure.photo import profiles
+from measure.photo import photograph, profiles
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput
+from scenes.photograph import Photograph
 from tests.oracle import polygon_image
 from validation.cli.measure import _shapes_wanted
 
@@ -106,3 +110,41 @@ def test_one_corner_that_is_far_off_leaves_all_as_they_were(corner, off, is_take
     found[corner, 1] = CORNERS[corner, 1] + off
     monkeypatch.setattr(profiles, "intersect", lambda *_: (found, None))
     assert refined(picture(), CORNERS).tolist() == (found if is_taken else CORNERS).tolist()
+
+
+@pytest.mark.parametrize(
+    ("of_corners", "alike", "of_all", "expected"),
+    [
+        (("ok", "not_visible", "ok"), True, "ok", "ok"), (("ok", "not_visible", "ok"), False, "ok", "correlated"),
+        (("ok", "low_contrast", "ok"), True, "compressed", "compressed"),
+        (("ok", "low_contrast", "misfit"), True, "ok", "misfit"), (("not_visible",) * 3, True, "ok", "not_visible"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_boards_corners(of_corners, alike, of_all, expected, monkeypatch):
+    """The worst of those that are measured and of the photograph; the least p-value of them, and all their errors."""
+    measured = np.array([each in ("ok", "misfit") for each in of_corners])
+    corners = np.where(measured[:, None], [[1.0, 2], [3, 4], [5, 6]], np.nan)
+    told = SimpleNamespace(
+        measured=measured, status=of_corners, corners=corners, p_value=np.array([0.3, np.nan, 0.02]), blur_px=0.8
+    )
+    seen = SimpleNamespace(curve=SimpleNamespace(variance=lambda level: 2 * level), status=of_all)
+    photo, grid = Photograph(np.full((4, 5), 8.0)), np.arange(6.0).reshape(1, 3, 2)
+    asked = []
+    monkeypatch.setattr(photograph, "recording", lambda *given: asked.append(given) or seen)
+    monkeypatch.setattr(photograph, "measured", lambda *given: asked.append(given) or told)
+    monkeypatch.setattr(photograph, "board_covariance", lambda *given: (np.eye(6), alike))
+    one = Candidate("chessboard", grid[0], 1.0, 10.0, 1.0, grid=grid)
+    found = photograph._board(photo, one)
+    assert asked[0] == (photo,)
+    assert asked[1][0] is photo.levels
+    assert asked[1][1] is grid
+    assert asked[1][2] == 4.0
+    assert (found.kind, found.status, found.noise, found.blur_px) == ("chessboard", expected, 4.0, 0.8)
+    assert (found.ellipse, found.quantities, found.residuals, found.candidate) == (None, (), (), one)
+    if measured.any():
+        assert found.p_value == 0.02
+        assert found.corners is corners
+        assert found.covariance.tolist() == np.eye(6).tolist()
+    else:
+        assert np.isnan(found.p_value)
+        assert (found.corners, found.covariance) == (None, None)

@@ -7,7 +7,7 @@ import trimesh
 import scenes
 from scenes.parts.mesh import solid
 from scenes.parts.recognised import _turn, cylinders
-from tests.parts import bracket, unevenly
+from tests.parts import bracket, prism, unevenly
 from validation.report import scene_table
 
 
@@ -83,6 +83,29 @@ def test_the_axis_is_that_of_the_residual(quarter, rng):
     assert found.residual < 1.2e-5
 
 
+def test_the_cylinder_that_is_told_is_the_nearest_to_its_vertices(rng):
+    """A quarter whose radii fall by a thousandth from side to side: no other axis or radius leaves less."""
+    angle = np.linspace(0, np.pi / 2, 30)
+    radii = 2.0 + 1e-3 * np.cos(3 * angle) + 2e-4 * rng.normal(size=30)
+    outline = [(0.0, 0.0), *np.column_stack([radii * np.cos(angle), radii * np.sin(angle)]).tolist()]
+    mesh, _ = turned(prism(outline, 5.0), 3)
+    made = solid(mesh)
+    (found,) = cylinders(made)
+    points = made.vertices[np.unique([v for f in found.faces for v in made.faces[f]])]
+    surface = found.surface
+    beside = np.linalg.svd(surface.axis[None])[2][1:]
+
+    def off(shift=(0.0, 0.0), larger=0.0):
+        away = points - surface.point - np.array(shift) @ beside
+        return np.linalg.norm(np.cross(away, surface.axis), axis=1) - surface.radius - larger
+
+    assert np.sqrt(np.mean(off() ** 2)) == pytest.approx(found.residual, rel=1e-9)
+    assert np.abs(off()).max() == pytest.approx(found.largest, rel=1e-9)
+    for step in np.concatenate([np.eye(3), -np.eye(3)]) * 1e-5:
+        # margin: an inequality: the least is told
+        assert np.mean(off(step[:2], step[2]) ** 2) > found.residual**2
+
+
 def test_walls_of_holes_are_hollow():
     """A bracket's two bores of unequal facets, turned in space: radii 4 and 5 mm, 12 and 6 mm deep."""
     mesh, frame = turned(bracket(angles=unevenly(np.random.default_rng(2), 60)), 4)
@@ -104,6 +127,20 @@ def test_what_is_hollow_is_so_anywhere(hollow, far):
     """A tube's two walls, far off the origin and off its axis."""
     found = cylinders(solid(trimesh.creation.annulus(2.0, 3.0, 5.0).apply_translation(far)))
     assert [each.surface.hollow for each in found if (each.surface.radius < 2.5) == hollow] == [hollow]
+
+
+@pytest.mark.parametrize("far", [(0.0, 0.0), (900.0, 0.0), (0.0, -900.0), (-900.0, 300.0), (300.0, 900.0)])
+@pytest.mark.parametrize("hollow", [False, True])
+def test_what_is_hollow_is_so_where_facets_go_a_quarter_round(hollow, far):
+    """A fillet and its opposite, wherever they are: the normals of a whole wall add up to nothing, theirs do not."""
+    angle = np.radians(np.linspace(0, 90, 13))
+    middle = (9.0, 7.0) if hollow else (5.0, 3.0)
+    arc = np.column_stack([np.cos(angle), np.sin(angle)]) * (-4.0 if hollow else 4.0) + middle
+    outline = [*((0.0, 0.0), (9.0, 0.0)), *(arc[::-1] if hollow else arc).tolist(), (0.0, 7.0)]
+    made = prism(outline, 6.0).apply_translation((far[0], 0.0, far[1]))
+    (found,) = cylinders(solid(made))
+    assert found.surface.hollow is hollow
+    assert (found.surface.radius, found.turn_deg) == (pytest.approx(4.0), pytest.approx(90.0))
 
 
 def test_a_cone_a_box_and_a_ball_are_none():

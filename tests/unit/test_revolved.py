@@ -106,3 +106,16 @@ def test_a_bright_floor_is_told(reflectance, clear):
     pictures = Pictures.of(scenes.Picture.of(scene, (60, 30), (40, 60)))
     outline = limb_outline(scene.solid.round("ball"), pictures.sensors, scene.camera)
     assert unlent(pictures, outline).all() == clear
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_rings_are_those_of_the_part_in_any_unit(unit):
+    """Walls and a shoulder of a hundredth between two of them, as many and so many times as large."""
+    profile = [(0.1, 6.0), (20.3, 6.0), (20.3, 6.01), (30.7, 6.01), (33.0, 4.0)]
+    one, other = (
+        rings_of(Turned(kind="turned", profile=[(u * z, u * r) for z, r in profile]).solid) for u in (1, unit)
+    )
+    assert other.profile == pytest.approx(unit * one.profile)
+    assert other.of_wall == one.of_wall
+    assert len(one.own) == 3 * revolved._ON_WALL + revolved._ON_SHOULDER == len(other.own)
+    assert other.own == one.own

@@ -17,9 +17,10 @@ from planner.search.objective import SearchProblem
 from render.curved import stands_for
 from scenes import InvalidInput
 from scenes.load import from_document
-from scenes.parts import step
+from scenes.parts import step, walls
 from scenes.parts.mesh import solid
 from scenes.parts.recognised import cylinders
+from scenes.parts.surfaces import Cone
 from scenes.parts.walls import recognised_walls
 from validation.report import scene_table
 
@@ -179,3 +180,31 @@ def test_refinement_begins_where_the_search_ended(task1):
     assert told[1][0] == pytest.approx(start[0])
     with pytest.raises(InvalidInput, match="must begin at a pose that is allowed"):
         refine(problem, start, 5.0, value=value)
+
+
+@pytest.mark.parametrize(("slope", "radius", "found"), [(45.0, 1.01, True), (45.0, 0.99, False), (-45.0, 1.01, True),
+                                                        (-45.0, 0.99, False)])  # fmt: skip
+def test_a_cone_whose_apex_lies_between_its_ends_is_none(slope, radius, found):
+    """Its wall is 2 long: either way its radius falls by 1 from the middle to an end."""
+    rod = solid(trimesh.creation.cylinder(3.0, 2.0, sections=24))
+    (whole,) = cylinders(rod)
+    cone = Cone((0, 0, 0), (0, 0, 1), radius, (-0.1, 0.1), half_angle_deg=slope)
+    wall = walls._whole(rod, "a", cone, whole.faces, 1e-9)
+    assert (wall is not None) is found
+    if wall is not None:
+        assert (wall.radius, wall.surface.ends) == (pytest.approx(radius), pytest.approx((-1, 1)))
+
+
+def test_walls_of_one_name_are_told_apart():
+    """Two pins that a file calls alike, and one called as a corner is: the first keeps the name."""
+    pins = [trimesh.creation.cylinder(r, 4.0, sections=24).apply_translation((9.0 * r, 0, 0)) for r in (1.0, 2.0, 3.0)]
+    made = solid(trimesh.util.concatenate(pins))
+    found = {round(each.surface.radius): each for each in cylinders(made)}
+    owners = np.full(len(made.faces), 3)
+    for r, each in found.items():
+        owners[list(each.faces)] = r - 1
+    surfaces = (*(found[r].surface for r in (1, 2, 3)), None)
+    named = walls.exact_walls(made, owners, surfaces, ("pin", "pin", made.vertex_names[0], ""))
+    assert {wall.name: round(wall.radius) for wall in named} == {"pin": 1, "k2": 2, "k3": 3}
+    apart = walls.exact_walls(made, owners, surfaces, ("a", "b", "c", ""))
+    assert {wall.name: round(wall.radius) for wall in apart} == {"a": 1, "b": 2, "c": 3}
