@@ -628,6 +628,10 @@ def test_sizes_of_1e12_and_empty_meshes_are_one_line(suffix, tmp_path):
     trimesh.creation.box((1e12, 1e12, 1e12)).export(path)
     with pytest.raises(InvalidInput, match=r"object.file must have coordinates up to 1e\+09, got"):
         mesh.read(path)
+    if suffix == "obj":  # in full digits
+        path.write_text("v 1000000000.5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        with pytest.raises(InvalidInput, match=r"object.file must have coordinates up to 1e\+09, got"):
+            mesh.read(path)
     path.write_bytes(b"")
     with pytest.raises(InvalidInput, match=r"object\.file must"):
         mesh.read(path)

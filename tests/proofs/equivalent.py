@@ -6,6 +6,15 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
+    "planner/view_sets.py: told = zip(self.views[-1].prediction.measurands, self.combination.variances, strict=True)":
+        "names and tolerances are those of the scene, in each picture the same",
+    "imaging/light/revolved.py: turn, level = np.stack([np.cos(angle), np.sin(angle)], 1), np.ones((fine, 1))":
+        "of two axes the second is the last",
+    'measure/photo/quadrilateral.py: return _told(first, state, np.nan, "gradient", 2.0, there.layout)':
+        "the threshold of edge points, which this estimator does not have",
+    "measure/estimators/reach.py: return np.full( 2, np.inf)": "nothing is told within either reach: all infinite",
+    'validation/hard/fit_cases.py: ("ellipse 1e6 px from the origin", (1e6, 999999.0, 40.0, 20.0, 0.7), many, 1e-8),':
+        "a case as far away",
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
     "imaging/geometry/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
     "imaging/light/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "

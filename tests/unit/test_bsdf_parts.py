@@ -57,6 +57,8 @@ def test_a_texture_s_factor_is_of_the_matt_part_alone(analyser, light, sensor):
         there = made.eval(mitsuba.BSDFContext(), hit, mitsuba.Vector3f(*light), True)
         values.append(float(np.array(there).ravel()[0]) * math.pi)
         assert not np.array(made.eval(mitsuba.BSDFContext(), hit, mitsuba.Vector3f(*light[:2], -light[2]), True)).any()
+        hit.wi = mitsuba.Vector3f(*sensor[:2], -0.5 * sensor[2])  # nor is it seen from behind
+        assert not np.array(made.eval(mitsuba.BSDFContext(), hit, mitsuba.Vector3f(*light), True)).any()
     up = np.array([0, 0, 1.0])
     axis = None if analyser is None else np.array(analyser)
     exact = float(GLOSSY.reflected(known, up, np.array(light), np.array(sensor), analyser=axis))

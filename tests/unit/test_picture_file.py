@@ -1,5 +1,6 @@
 """Images in files."""
 
+import io
 import struct
 import zlib
 
@@ -8,6 +9,7 @@ import pytest
 from PIL import Image
 
 from scenes import InvalidInput, photograph
+from scenes.cameras.pinhole import MOST_PIXELS
 from scenes.files import image as image_file
 from scenes.files.image import Size, WrongSize
 from validation import picture_file
@@ -132,3 +134,11 @@ def test_missing_file_and_bad_suffix(tmp_path):
         picture_file.read(tmp_path / "a.png")
     with pytest.raises(InvalidInput, match=r"--output must end in .*, got"):
         picture_file.write(tmp_path / "a.xyz", np.zeros((2, 2)))
+
+
+def test_the_largest_image_as_doubles_is_no_too_large_file():
+    """Its numbers, and a header of NumPy's or of a TIFF; a tenth of it more is too large for any image."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (1, MOST_PIXELS)})
+    whole = 8 * MOST_PIXELS + len(header.getvalue())
+    assert whole <= image_file._MOST_BYTES < 1.1 * whole

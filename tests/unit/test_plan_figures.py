@@ -95,3 +95,16 @@ def test_a_circles_name_stands_on_any_of_its_four_sides():
     (above, right, left, below), rim = view.names[0].places, view.names[0].places
     assert above[1] == rim[:, 1].min() < rim[:, 1].max() == below[1]
     assert left[0] == rim[:, 0].min() < rim[:, 0].max() == right[0]
+
+
+@pytest.mark.parametrize(("sensor", "shape"), [((30, 135), "as seen"), ((90, 0), "least")])
+def test_a_figure_of_the_part_has_the_shape_of_what_is_seen(sensor, shape, monkeypatch):
+    """Of the width of a column, and an inch of words; a flat view keeps a least height."""
+    scene, sizes = scenes.load("task1"), []
+    monkeypatch.setattr(scene_figure, "save", lambda figure, path: sizes.append(figure.get_size_inches()))
+    scene_figure.draw(scene, Pose(*sensor), None)
+    seen = project(scene.solid.vertices, np.array(sensor, float), scene.camera)
+    across, down = np.ptp(seen, axis=0)
+    height = 0.85 * sizes[0][0] * down / across
+    assert (height > 2.5) == (shape == "as seen")
+    assert sizes[0][1] == pytest.approx(max(height, 2.5) + 1)
