@@ -75,9 +75,9 @@ def page() -> str:
     parts = [
         "# Gallery",
         "The bundled scenes, each rendered at its first setting, with what is measured in it (`ice scenes` lists them, "
-        "`ice validate NAME` proves one). Blue circles: measured precisely enough, U at most a quarter of the tolerance; "
-        "squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; white octagons: not "
-        "proven.",
+        "`ice validate NAME` proves one). Blue circles: measured precisely enough, U at most a quarter of the "
+        "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; white "
+        "octagons: not proven.",
     ]
     return "\n\n".join(parts + [_entry(scenes.load(name)) for name in scenes.names()]) + "\n"
 
