@@ -98,8 +98,8 @@ def facts(found: Fit) -> dict[str, Any]:
 
 
 _TERMS = (
-    "parameter: a key of the scene file, or a pose (polar, azimuth; degrees). start: as the scene has it. standard "
-    "error: 1 sigma."
+    "parameter: a key of the scene file, a pose (polar, azimuth; degrees), or by how much the camera looks beside "
+    "look_at (aim). start: as the scene has it. standard error: 1 sigma."
 )
 
 

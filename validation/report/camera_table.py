@@ -25,7 +25,8 @@ _OF_BOARDS = (
     "corner, +- 1 sigma."
 )
 _OF_CAMERA = (
-    "fx, fy: focal lengths. cx, cy: where the optical axis meets the image. k1, k2, p1, p2, k3: OpenCV's distortion."
+    "fx, fy: focal lengths (fx alone: of both axes). cx, cy: where the optical axis meets the image. k1, k2, p1, p2, "
+    "k3: OpenCV's distortion."
 )
 
 
