@@ -121,6 +121,7 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
         "next": next_step(found),
         "need": need(found),
         "checked": "",
+        "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
         "sketched": f"Camera and lamp to scale: {told}.",

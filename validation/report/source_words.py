@@ -65,7 +65,7 @@ def smaller(source: str) -> str:
     """What to do for a smaller uncertainty by a source.
 
     >>> smaller("camera.focal_px")
-    'state `camera.focal_px` more exactly (`ice budget SCENE --reach U` says how exactly)'
+    'get to know it more exactly (`ice budget SCENE --reach U` says how exactly)'
     """
     if source == NOISE:
         return "expose longer, come nearer, or take the mean of several pictures"
@@ -80,4 +80,4 @@ def smaller(source: str) -> str:
         return "correct the pictures by a flat field"
     if source == ROUNDING:
         return "keep more digits of the value"
-    return f"state `{source}` more exactly (`ice budget SCENE --reach U` says how exactly)"
+    return "get to know it more exactly (`ice budget SCENE --reach U` says how exactly)"

@@ -13,24 +13,16 @@ from validation.report.page_tables import Table
 from validation.report.requirements import WELL, Grade, Requirement
 
 COLUMNS = (
-    "",
-    "requirement",
-    "nominal",
-    "tolerance",
-    "sigma",
-    "bias",
-    "U",
-    "U / tolerance",
-    "measurement",
-    "limited by",
-)
+    "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "measurement", "limited by",
+)  # fmt: skip
 PART = (
     f"U / tolerance: U over half of the tolerance zone; up to {100 * WELL:.0f} % the measurement is precise enough, up "
     "to 100 % usable."
 )
 NOTE = (
     "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± its standard "
-    f"uncertainty. U: expanded uncertainty (95 %) of both. {PART} limited by: what adds most to U, and its share of U²."
+    f"uncertainty. U: expanded uncertainty (95 %), by all that is not exactly known. {PART} limited by: what adds most "
+    "to U, and its share of U²."
 )
 
 

@@ -39,7 +39,7 @@ def write(found: planner.Views, path: Path) -> Path:
         "what": f"{what(asked)}, numbered in the pictures, from {_pictures(len(last.views))} together. "
         f"{page.SIMULATED}",
         "sentence": sentence(asked), "wrong": wrong(asked), "next": next_step(asked),
-        "need": need(asked), "checked": "",
+        "need": need(asked), "checked": "", "is_sky": True,
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),
