@@ -44,7 +44,7 @@ MEANINGS = {
 REMEDIES = {
     NOT_VISIBLE: "turn the camera until it sees all of it, take pictures from several sides (`ice plan --views 2`), "
     "or choose another feature",
-    SHORT: "come nearer or turn the camera, so that its image becomes longer",
+    SHORT: "come nearer or turn the camera, so that the image of the edge becomes longer",
     SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
     LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
     ILL_CONDITIONED: "turn the camera, or choose edges that meet at a larger angle",

@@ -90,6 +90,34 @@ def test_a_visit(task1, tmp_path):
     assert list(saved.settings[-1].light) == moved["lights"][0]
 
 
+@in_a_browser
+def test_what_stands_below_the_horizon_is_seen_and_moved(tmp_path):
+    """Camera and lamp are drawn within the sphere's canvas and follow the mouse; that half is coloured. The width of
+    the lower side of task1's block is measured."""
+    text = (scenes.load.__globals__["BUNDLED"] / "task1.toml").read_text().split("[task]")[0]
+    asked = 'name = "low"\nkind = "width"\nfeatures = [{ edge = "e1" }, { edge = "e5" }]'
+    setting = "sensor = [160, 10]\nlight = [140, 55]"
+    file = tmp_path / "low.toml"
+    file.write_text(f"{text}\n[[measurands]]\n{asked}\n[[settings]]\n{setting}\n")
+    low = scenes.load(file)
+
+    async def visit():
+        async with served(str(file), tmp_path) as url, chromium() as page:
+            await page.open(url)
+            await page.until("window.explore?.view.map", 60)
+            for which in (-1, 0):
+                x, y = await page.value(f"explore.view.spot({which})")
+                assert await page.value(f"document.elementFromPoint({x}, {y}).id") == "sphere"
+            assert min(border[0] for border in await page.value("explore.view.map.borders")) == 90
+            await drag_lamp(page, (-40.0, -10.0), 6, 0.04)
+            there = await state(page)
+            assert there["lights"][0] != [140, 55]
+            assert there["lights"][0][0] > 90
+            assert await sigma(page) == pytest.approx(predicted(low, there), rel=1e-9)
+
+    asyncio.run(visit())
+
+
 LABELS = """[explore.view, explore.picture].map(({ labels: { taken } }) => taken.flatMap((a, i) => taken.slice(i + 1)
   .filter(b => (a.name || b.name) && Math.min(a.x + a.width, b.x + b.width) - Math.max(a.x, b.x) > 0.01
     && Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y) > 0.01).map(b => [a.name, b.name])))"""

@@ -82,7 +82,7 @@ def answers(scene, states):
 
         found = []
         with ThreadPoolExecutor(1) as quick:
-            tools = Tools(quick, None, asyncio.Semaphore(1))  # nothing rests, so nothing is done in a process
+            tools = Tools(quick, None, asyncio.Semaphore(1), quick)  # nothing rests, so nothing is done in a process
             await Session(Place(scene, "part", None), tools, told.put).run(messages())
         return found
 

@@ -20,7 +20,8 @@ from validation.batch import work
 
 POSE = ("--sensor", "20,0", "--light", "20,45")
 WORDS = re.compile(
-    r" (?:pass|fail) +(?:ok|clutter)|within tolerance|TUR = |\+- [\d.e-]+ mm, k = |\bagree: |guard band U = "
+    r" (?:pass|fail) +(?:ok|clutter)|measured (?:precisely enough|usably)|TUR = |\+- [\d.e-]+ mm, k = |\bagree: "
+    "|guard band U = "
 )
 KEYS = {"decision": ("pass", "fail"), "signed": (True,), "agrees": (True,), "capability": (dict,), "ok": (True,)}
 

@@ -74,7 +74,7 @@ def test_verdict_pictures_and_no_network(found, page):
     read = Page(page.read_text())
     assert read.verdict == found[0].verdict.text
     assert read.outside == []
-    assert len(read.pictures) == 6  # the part, the sketch, scatter, bias, distributions, budget
+    assert len(read.pictures) == 7  # the part, two sketches, scatter, bias, distributions, budget
     for picture in read.pictures:
         assert picture["role"] == "img"
         assert len(picture["aria-label"]) > 20

@@ -4,8 +4,10 @@ import asyncio
 import json
 import logging
 import math
+import os
 import re
 import socket
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -435,6 +437,8 @@ def test_of_states_that_come_too_fast_the_newest_is_answered(task1):
         async def quickly(self, work, *arguments):
             return await asyncio.to_thread(work, *arguments)
 
+        aside = quickly
+
         async def slowly(self, work, *arguments):
             return []
 
@@ -480,7 +484,7 @@ def test_every_error_of_work_is_told_in_one_line(task1, caplog, error, told, log
         async def quickly(self, work, *arguments):
             raise error
 
-        slowly = quickly
+        slowly = aside = quickly
 
     async def run(text):
         sent = asyncio.Queue()
@@ -510,6 +514,10 @@ def test_a_close_look_that_takes_long_holds_nobody_up(task1):
             asked.append(("quickly", work, arguments[-1]))
             return work(*arguments) | {"core_s": 9.0} if work is session.answered else None
 
+        async def aside(self, work, *arguments):
+            asked.append(("aside", work, arguments[-1]))
+            return work(*arguments) | {"core_s": 9.0}
+
         async def slowly(self, work, *arguments):
             asked.append(("slowly", work, arguments[-1]))
             await asyncio.sleep(60)
@@ -537,12 +545,49 @@ def test_a_close_look_that_takes_long_holds_nobody_up(task1):
     glance, close = ("quickly", False), ("slowly", True)
     assert looks == [
         glance,
-        ("quickly", True),
+        ("aside", True),
         glance,
         glance,
         close,
         glance,
     ]  # how long it takes is known from the first
+
+
+def test_a_close_look_does_not_hold_up_an_answer():
+    """One that waits in the other thread is over only when an answer in the first one lets it."""
+
+    async def run():
+        with tools.open_tools() as given:
+            told = threading.Event()
+            close = asyncio.create_task(given.aside(told.wait, 10))
+            await asyncio.sleep(0)
+            await given.quickly(told.set)
+            return await close
+
+    assert asyncio.run(run()) is True
+
+
+def test_work_in_processes_leaves_the_cores_to_answers():
+    """Ten steps of niceness more than here."""
+
+    async def run():
+        with tools.open_tools() as given:
+            return await given.slowly(os.nice, 0)
+
+    assert asyncio.run(run()) == min(os.nice(0) + 10, 19)
+
+
+def test_below_the_horizon_the_lower_hemisphere_is_coloured(task1):
+    """The mirrored patches, of what stands there; the values are others."""
+    state = State.first(task1)
+    low = replace(state, lights=(Pose(160, 20),), moving=0)
+    assert [sphere.is_below(each) for each in (state, low, replace(low, moving=-1))] == [False, True, False]
+    assert sphere.key(low) != sphere.key(replace(low, lights=(Pose(20, 20),)))
+    above, below = sphere.cells(), sphere.cells(below=True)
+    assert below.poses == pytest.approx(np.array([180, 0]) - above.poses * [1, -1])
+    assert (below.borders[:, 0] < below.borders[:, 1]).all()
+    message = sphere.to_message(task1, low, np.ones((len(below.poses), 1)))
+    assert min(border[0] for border in message["borders"]) == 90
 
 
 def test_work_in_processes_that_nobody_waits_for_never_begins():
@@ -557,7 +602,7 @@ def test_work_in_processes_that_nobody_waits_for_never_begins():
             raise KeyError(number)
 
         with ThreadPoolExecutor(1) as crew:
-            given = tools.Tools(crew, crew, asyncio.Semaphore(1))
+            given = tools.Tools(crew, crew, asyncio.Semaphore(1), crew)
             one, two = (asyncio.create_task(given.slowly(work, number)) for number in (1, 2))
             await asyncio.sleep(0.01)
             one.cancel()

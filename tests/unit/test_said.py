@@ -86,10 +86,12 @@ def test_a_distance_edge_by_edge():
         "edges": [{"name": "a-b", "status": "ok", "used": 41, "rejected": 2, "contrast": 52.4},
                   {"name": "c-d", "status": "short", "used": 7, "rejected": 3, "contrast": 31.7}],
     }  # fmt: skip
-    assert measure_cli._distance_text(distance(), told["edges"]) == (
-        "90.2500 +- 0.3000 px (1 sigma), ok (goodness of fit: p = 0.031)\n"
-        "edges: a-b ok (41 used, contrast 52), c-d short (7 used, contrast 32)"
-    )
+    assert measure_cli._distance_text(distance(), told["edges"]).splitlines() == [
+        "The distance in the image: 90.2500 +- 0.3000 px (1 sigma), ok (goodness of fit: p = 0.031)",
+        "Its edges, with the samples used and the contrast in grey levels: a-b ok (41, 52), c-d short (7, 32)",
+        "p: how likely so bad a fit is by chance if the picture is as the model says; "
+        "below 0.0001 the status is misfit or a worse one.",
+    ]
 
 
 def test_a_distance_that_is_none():
@@ -97,8 +99,13 @@ def test_a_distance_that_is_none():
     assert (none["value_px"], none["variance_px2"], none["corners"]) == (None, None, None)
     assert none["edges"][0]["used"] == 41
     said = measure_cli._distance_text(distance(math.nan), none["edges"])
-    assert said.startswith("not measured, ok (goodness of fit: p = 0.031)\n")
-    assert measure_cli._fit(math.nan) == ""
+    assert said.startswith("The distance in the image: not measured, ok (goodness of fit: p = 0.031)\n")
+    assert photograph.fit(math.nan) == ""
+
+
+def test_an_uncertainty_that_is_not_known_is_no_number():
+    assert photograph._beside(0.0123, 3) == "+- 0.012"
+    assert photograph._beside(math.nan, 3) == photograph._beside(math.inf, 3) == "+- unknown"
 
 
 def board(corners):

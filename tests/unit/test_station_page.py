@@ -24,10 +24,12 @@ from validation.report import (
     page,
     proof_figures,
     requirements,
+    source_words,
     station,
     station_sketch,
     station_table,
     station_view,
+    wording,
 )
 from validation.report.requirements import Grade, Requirement
 
@@ -35,7 +37,9 @@ TOLERANCE = Tolerance(plus=0.03, minus=0.01)  # half of the zone: 0.02
 
 
 def required(number=1, u=0.001, status="ok", tolerance=TOLERANCE, name="bore"):
-    return Requirement(number, name, "mm", 4.0, tolerance, 0.0005, 0.0001, None, u, status, "pixel noise, 90 %")
+    return Requirement(
+        number, name, "mm", 4.0, tolerance, 0.0005, 0.0001, None, u, status, "pixel noise, 90 %", source="pixel noise"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +74,9 @@ def test_a_run_says_what_decided_each_status_once():
 def test_a_requirement_without_a_tolerance_is_told_with_its_uncertainty():
     one = required(tolerance=None, u=0.00284)
     told = "measured with an expanded uncertainty U (95 %) of 0.0028 mm; no tolerance is given to compare with."
-    assert requirements.sentence([one]) == f"Bore is {told}"
-    assert requirements.sentence([one, required(2, name="slot")]).endswith(told)
-    assert "U (95 %)" not in requirements.sentence([one, dataclasses.replace(one, number=2)])
+    assert wording.sentence([one]) == f"Bore is {told}"
+    assert wording.sentence([one, required(2, name="slot")]).endswith(told)
+    assert "U (95 %)" not in wording.sentence([one, dataclasses.replace(one, number=2)])
 
 
 @pytest.mark.parametrize("name", ["plate", "copper", "task1"])
@@ -117,19 +121,58 @@ def test_grades_are_of_half_the_zone(u, status, tolerance, grade):
 def test_the_sentence_counts_all_and_names_what_is_wrong():
     several = [required(k, name=f"r{k}") for k in range(1, 9)]
     several += [required(9, u=0.03, name="step"), required(10, status="clutter", name="square")]
-    text = requirements.sentence(several)
-    assert text.startswith("8 of 10 requirements are measured well within tolerance: the expanded uncertainty U (95 %)")
-    assert "Step is measured with an uncertainty U that is larger than the tolerance. " in text
-    assert text.endswith("Square is not proven: its value must not be relied on.")
-    square, step = requirements.wrong(several)
-    assert square == f"Square (clutter): {MEANINGS['clutter']}."
-    assert step == "Step: U is 1.5 times what the tolerance allows; most of it comes from pixel noise."
-    assert requirements.next_step(several) == f"Requirement 10: {REMEDIES['clutter']}."
-    assert requirements.next_step(several[:9]) == "Improve step first; most of it comes from pixel noise."
-    assert requirements.next_step(several[:8]).startswith("Nothing has to be changed")
-    assert requirements.wrong(several[:8]) == []
-    assert requirements.sentence(several[:8]).startswith("All 8 requirements are measured well within tolerance")
-    assert requirements.sentence(several[:1]).startswith("The requirement is measured well within tolerance")
+    text = wording.sentence(several)
+    assert text.startswith(
+        "8 of 10 requirements are measured precisely enough: the uncertainty U (95 %) of the measurement is at most"
+    )
+    assert "Step (no. 9) is measured too uncertainly: U is larger than the tolerance. " in text
+    assert text.endswith("Square (no. 10) is not proven: its value must not be relied on.")
+    square, step = wording.wrong(several)
+    assert square == f"Square (no. 10), status clutter: {MEANINGS['clutter']}."
+    assert step == "Step (no. 9): U is 1.5 times the tolerance; most of it comes from pixel noise."
+    first, second = wording.next_step(several).split(". Step")
+    assert first == f"Square (no. 10): {REMEDIES['clutter']}"
+    assert second == (
+        " (no. 9): most of U comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
+    )
+    assert wording.next_step(several[:9]) == f"Step{second}"
+    assert wording.next_step(several[:8]).startswith("Nothing has to be changed")
+    assert wording.wrong(several[:8]) == []
+    assert wording.sentence(several[:8]).startswith("All 8 requirements are measured precisely enough")
+    assert wording.sentence(several[:1]).startswith("The requirement is measured precisely enough")
+
+
+def test_the_first_words_of_u_say_what_it_is():
+    """Once, wherever the sentence begins."""
+    for u, told in ((0.001, "enough"), (0.006, "usably, though"), (0.03, "too uncertainly:")):
+        text = wording.sentence([required(u=u), required(2, u=u, name="slot")])
+        assert told in text
+        assert text.count("the uncertainty U (95 %) of the measurement is ") == 1
+        assert " U is " not in text
+
+
+def test_what_is_said_agrees_with_its_colour():
+    """To be done, worth doing, or nothing: by the worst requirement; the words of each begin accordingly."""
+    well, within, over = required(), required(2, u=0.012, name="slot"), required(3, u=0.03)
+    doubtful, open_ = required(4, status="short"), required(5, tolerance=None)
+    needs = [wording.need([well, each]) for each in (well, within, open_, over, doubtful)]
+    assert needs == ["none", "may", "may", "act", "act"]
+    assert wording.next_step([well, within]) == (
+        "Nothing has to be changed: set camera and lamp up at these places. For a smaller U of slot (no. 2): most of U "
+        "comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
+    )
+    assert "smaller" not in wording.next_step([within, over])
+    assert wording.next_step([open_]).startswith("Give each requirement its tolerance, the key `tolerance` of its `[[")
+    assert wording.wrong([open_]) == ["No tolerance is given: whether U is small enough cannot be told."]
+    assert wording.wrong([well, open_])[0].startswith("No tolerance is given for bore (no. 5): ")
+
+
+def test_of_many_requirements_the_numbers_are_named():
+    doubtful = [required(k, status="short", name=f"r{k}") for k in range(1, 6)]
+    (line,) = wording.wrong([*doubtful, required(6)])
+    assert line.startswith("Requirements no. 1, 2, 3, 4 and 5, status short: ")
+    assert wording.sentence([*doubtful, required(6)]).endswith("5 of 6 requirements are not proven: their values must "
+                                                               "not be relied on.")  # fmt: skip
 
 
 def test_what_is_wrong_is_told_with_its_number():
@@ -137,21 +180,24 @@ def test_what_is_wrong_is_told_with_its_number():
     first."""
     faint = dataclasses.replace(required(2, status="low_contrast", name="b"), reason="edge e1 is dark")
     several = [required(1, status="clutter", name="a"), required(3, status="low_contrast", name="c"), faint]
-    told = requirements.wrong(several)
-    assert told == ["C and b (low_contrast): of b, edge e1 is dark.", f"A (clutter): {MEANINGS['clutter']}."]
-    assert requirements.next_step(several) == (
-        f"Requirements 3 and 2: {REMEDIES['low_contrast']}. Requirement 1: {REMEDIES['clutter']}."
+    told = wording.wrong(several)
+    assert told == [
+        "C (no. 3) and b (no. 2), status low_contrast: of b, edge e1 is dark.",
+        f"A (no. 1), status clutter: {MEANINGS['clutter']}.",
+    ]
+    assert wording.next_step(several) == (
+        f"C (no. 3) and b (no. 2): {REMEDIES['low_contrast']}. A (no. 1): {REMEDIES['clutter']}."
     )
 
 
 def test_the_worst_is_improved_first():
     """By its U over half the zone: what cannot be told is worst, of equals the first comes first."""
     a, b, c = required(1, u=0.03, name="a"), required(2, u=0.05, name="b"), required(3, u=0.05, name="c")
-    assert requirements.next_step([a, b, c]).startswith("Improve b first; most of it comes from pixel noise.")
-    assert requirements.next_step([c, b, a]).startswith("Improve b first")
-    assert requirements.next_step([a, b, required(4, u=None, name="d")]).startswith("Improve d first")
+    assert wording.next_step([a, b, c]).startswith("B (no. 2): most of U comes from pixel noise; ")
+    assert wording.next_step([c, b, a]).startswith("B (no. 2): ")
+    assert wording.next_step([a, b, required(4, u=None, name="d")]).startswith("D (no. 4): ")
     wide = required(5, u=0.06, name="e", tolerance=Tolerance(plus=0.1, minus=0.1))
-    assert requirements.next_step([a, wide]).startswith("Improve a first")
+    assert wording.next_step([a, wide]).startswith("A (no. 1): ")
 
 
 def test_every_status_says_what_to_do():
@@ -180,7 +226,7 @@ def test_one_that_cannot_be_measured_takes_nothing_from_the_others(plate):
     made = requirements.requirements(plate, sigmas, [0.0] * 5, found, states)
     assert [each.U is None for each in made] == [False, True, False, False, False]
     assert made[1].grade == Grade.DOUBT
-    assert "Bore is not proven" in requirements.sentence(made)
+    assert "Bore (no. 2) is not proven" in wording.sentence(made)
     whole = {each.name: each.U for each in planner.budget(plate).measurands}
     assert pytest.approx(whole["length"]) == made[2].U
 
@@ -195,7 +241,7 @@ def test_what_a_correction_is_not_sure_of_is_in_u(plate):
     made = requirements.requirements(plate, sigmas, [0.0] * 5, found, ["ok"] * 4 + ["clutter"], doubts)
     assert [each.u_bias for each in made] == doubts
     assert made[4].grade == Grade.DOUBT
-    assert station_table.lines(made)[4].cells[4] == "0 ± not known"
+    assert station_table.lines(made)[0].cells[4] == "0 cm ± not known"
 
 
 def crossing(one, other):
@@ -292,10 +338,11 @@ def test_lamps_are_drawn_where_they_stand(name, monkeypatch):
     """Each of the scene's, seen from the side and from above, in the scene's unit, with a ray to what is aimed at."""
     scene, kept = scenes.load(name), []
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
-    monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure))
+    monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure) or "")
     station_sketch.draw(picture)
     try:
-        for axis, (right, up) in zip(kept[0].axes, station_sketch.axes_of(picture), strict=True):
+        for figure, (right, up) in zip(kept, station_sketch.axes_of(picture), strict=True):
+            (axis,) = figure.axes
             stars = [line.get_xydata()[0] for line in axis.lines if line.get_marker() == "*"]
             polar, azimuth = np.radians([list(pose) for pose in picture.lights]).T
             ways = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
@@ -304,7 +351,8 @@ def test_lamps_are_drawn_where_they_stand(name, monkeypatch):
             ends = [line.get_xydata()[1].tolist() for line in axis.lines if line.get_marker() == "None"]
             assert all(star.tolist() in ends for star in stars)
     finally:
-        plt.close(kept[0])
+        for figure in kept:
+            plt.close(figure)
 
 
 def test_a_bars_parts_add_to_u_in_per_cent_of_the_tolerance(rig):
@@ -326,7 +374,8 @@ def test_what_halving_a_source_gains_is_told(rig):
     (each,) = found.measurands
     best = max(each.contributions, key=lambda row: row.contribution)
     gain = 1 - math.sqrt(1 - 0.75 * best.contribution**2 / each.u**2)
-    assert budget_figure.improved(found)[0] == f"Halve {best.source}: U of {each.name} -{100 * gain:.0f} %."
+    told = budget_figure.improved(found)[0]
+    assert told == f"Halve {source_words.keyed(best.source)}: U of {each.name} -{100 * gain:.0f} %."
 
 
 def test_names_are_text_within_a_picture():
@@ -345,11 +394,85 @@ def test_names_are_text_within_a_picture():
 
 def test_the_tables_cells_say_unit_zone_and_part():
     made = station_table.lines([required(3, u=0.004), required(4, status="clutter"), required(5, tolerance=None)])
-    assert made[0].cells[:5] == ("bore", "4 mm", "+0.03 -0.01", "0.00050", "+0.00010")
-    assert made[0].cells[5:] == ("0.0040", "20 %", "well within tolerance", "pixel noise, 90 %")
-    assert made[0].part == pytest.approx(0.2)
-    assert (made[1].part, made[1].cells[5], made[1].cells[7]) == (None, "-", "not proven: clutter")
-    assert (made[2].part, made[2].cells[2], made[2].cells[7]) == (None, "-", "no tolerance given")
+    doubtful, well, free = made  # what fails comes first
+    assert [line.number for line in made] == [4, 3, 5]
+    assert [line.fails for line in made] == [True, False, False]
+    assert well.cells[:5] == ("bore", "4 mm", "+0.03 -0.01 mm", "0.00050 mm", "+0.00010 mm")
+    assert well.cells[5:] == ("0.0040 mm", "20 %", "precise enough", "pixel noise, 90 %")
+    assert well.part == pytest.approx(0.2)
+    assert (doubtful.part, doubtful.cells[5], doubtful.cells[7]) == (None, "-", "not proven: clutter")
+    assert (free.part, free.cells[2], free.cells[7]) == (None, "-", "no tolerance given")
+    bare = station_table.lines([required(3, u=0.004)], units=False)[0]
+    assert bare.cells[1:6] == ("4 mm", "+0.03 -0.01", "0.00050", "+0.00010", "0.0040")
+    lean = dataclasses.replace(required(u=0.004), unit="degrees", nominal=90.0)
+    assert station_table.lines([lean])[0].cells[1:6] == ("90°", "+0.03 -0.01°", "0.00050°", "+0.00010°", "0.0040°")
+
+
+def test_the_terms_explain_what_the_table_needs():
+    """That rows are in another order, and what x and y of a position are; the names in the table without a point."""
+    well, over = required(), required(2, u=0.03)
+    assert station_table.note([over, well]) == station_table.note([well]) == station_table.NOTE
+    assert station_table.note([well, over]) == f"{station_table.NOTE} What fails comes first."
+    placed = required(name="bore from sides.x")
+    assert station_table.lines([placed])[0].cells[0] == "bore from sides, x"
+    assert station_table.note([placed]).endswith(
+        "x, y: distances of a position from its first and its second datum edge."
+    )
+
+
+def test_the_scale_of_the_sketch_is_a_length_of_its_view(plate, monkeypatch):
+    """Black, as long as it says, within the view, of the scene's unit; the two views have scales of their own."""
+    kept, said = [], []
+    monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure) or "")
+    station_sketch.draw(plate)
+    try:
+        for figure in kept:
+            (axis,) = figure.axes
+            (bar,) = (line for line in axis.lines if line.get_color() == "black")
+            (start, level), (stop, same) = bar.get_xydata()
+            text = axis.texts[-1].get_text()
+            said.append(text)
+            assert (f"{stop - start:g} cm", same) == (text, level)
+            (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
+            assert left < start < stop < (left + right) / 2
+            assert low < level < low + 0.1 * (high - low)  # margin: it stands at the lower end, by its kind
+        assert len(set(said)) == 2
+    finally:
+        for figure in kept:
+            plt.close(figure)
+
+
+@pytest.mark.parametrize(("agrees", "reasons"), [(True, ()), (False, ("rows",)), (False, ("not proven",))])
+def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
+    """What contradicts stands first in what is wrong and is to be looked into; what fails elsewhere stands last."""
+
+    def row(index, *told):
+        made = tuple(SimpleNamespace(status=status, ratio=ratio) for status, ratio in told)
+        return SimpleNamespace(index=index, measurands=made, main=SimpleNamespace(n=60))
+
+    verdict = SimpleNamespace(agrees=agrees, reasons=reasons, inside=1, rows=1)
+    rows = [row(0, ("ok", 1.0)), row(1, ("short", None)), row(2, ("ok", None)), row(3, ("ok", 1.1))]
+    found = SimpleNamespace(verdict=verdict, rows=rows)
+    first = {"wrong": ["It is dark."], "next": "Bring light.", "need": "none", "checked": ""}
+    told = page._of_run(first, found, SimpleNamespace(number=1))
+    after = "In 2 of the 3 other settings, not shown here, not everything is proven: short 1, not measured 1."
+    assert told["wrong"][-2:] == ["It is dark.", after]
+    if agrees:
+        assert told["checked"].startswith("Checked: 60 noisy pictures of each setting were measured")
+        assert (len(told["wrong"]), told["need"], told["next"]) == (2, "none", "Bring light.")
+    else:
+        assert told["wrong"][0].startswith("The predicted uncertainties did not pass their check: ")
+        assert (len(told["wrong"]), told["need"], told["checked"]) == (3, "act", "")
+        assert told["next"].startswith("`ice effects SCENE --check` tells") == (reasons == ("rows",))
+        assert told["next"].endswith("Bring light.")
+
+
+def test_numbers_in_sentences_lead_to_rows_that_there_are(plate, tmp_path):
+    written = page.write_station(station.of_picture(plate), "Plate", tmp_path / "plan.html").read_text()
+    rows = re.findall(r'<tr role="row" id="requirement-(\d+)"', written)
+    assert sorted(map(int, rows)) == list(range(1, 1 + len(plate.scene.quantities)))
+    assert set(re.findall(r'href="#requirement-(\d+)"', written)) <= set(rows)
+    assert page.linked("no. 1, 3 and 4", [1, 4]).count("<a ") == 2
 
 
 def test_grades_differ_without_colour():
@@ -374,7 +497,7 @@ def test_the_page_of_a_picture_needs_no_render(plate, tmp_path):
     written = page.write_station(station.of_picture(plate), "A <b>plate</b>", tmp_path / "plan.html").read_text()
     assert "A &lt;b&gt;plate&lt;/b&gt;" in written
     assert "Drawn from the model" in written
-    assert written.count('<svg role="img"') == 3
+    assert written.count('<svg role="img"') == 4
     assert all(status in MEASURED for status in (each.status for each in requirements.predicted(plate)))
 
 
@@ -514,7 +637,7 @@ def test_names_stand_side_by_side_where_camera_and_lamp_are_near(camera, aligned
         station_sketch._labels(axis, places, part, np.zeros(2))
         assert [text.get_ha() for text in axis.texts] == aligned
         assert axis.get_xlim() == pytest.approx((-1.6, 1.6))
-        assert axis.get_ylim() == pytest.approx((-1.35, 1.45))
+        assert axis.get_ylim() == pytest.approx((-1.75, 1.45))
     finally:
         plt.close(figure)
 

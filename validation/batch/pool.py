@@ -18,6 +18,8 @@ from multiprocessing.process import BaseProcess
 
 from scenes import plugins
 
+_PATIENCE = 10  # steps of niceness of workers that leave the cores to others
+
 
 @dataclass(frozen=True)
 class Crew:
@@ -38,10 +40,11 @@ def cores() -> int:
 
 
 @contextmanager
-def local(workers: int) -> Iterator[Crew]:
+def local(workers: int, *, yielding: bool = False) -> Iterator[Crew]:
     """Processes on this machine; one worker is a thread of this process.
 
-    The processes end with this one, however it ends: each watches a pipe whose other end only this process holds.
+    ``yielding``: they leave the cores to whatever else wants them. The processes end with this one, however it ends:
+    each watches a pipe whose other end only this process holds.
     """
     if workers == 1:
         with ThreadPoolExecutor(1) as executor:
@@ -52,7 +55,7 @@ def local(workers: int) -> Iterator[Crew]:
         return
     context, others = _Spawn(), set(multiprocessing.active_children())
     ours, theirs = context.Pipe()
-    executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs, plugins.loaded()))
+    executor = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(theirs, plugins.loaded(), yielding))
     known: set[BaseProcess] = set()
 
     def check(error: Exception | None) -> None:
@@ -127,9 +130,11 @@ class _Spawn(SpawnContext):
     Process = _Deaf
 
 
-def _begin(lifeline: Connection, modules: tuple[str, ...]) -> None:
+def _begin(lifeline: Connection, modules: tuple[str, ...], yielding: bool) -> None:
     """In a worker: leave Ctrl-C to the main process, end when that is gone, and know the kinds that it knows."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if yielding and hasattr(os, "nice"):
+        os.nice(_PATIENCE)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
     for name in modules:
         plugins.load(name)

@@ -12,7 +12,7 @@ import scenes
 from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import read
-from validation.cli import recorded
+from validation.cli import photograph, recorded
 from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -97,12 +97,19 @@ def facts(found: Fit) -> dict[str, Any]:
     }  # fmt: skip
 
 
+_TERMS = (
+    "parameter: a key of the scene file, a pose (polar, azimuth; degrees), or by how much the camera looks beside "
+    "look_at (aim). start: as the scene has it. standard error: 1 sigma."
+)
+
+
 def _table(name: str, found: Fit) -> Table:
     from validation.report import cells
 
-    title = f"{name} fitted to {sum(map(len, found.members))} photograph(s)"
+    count = sum(map(len, found.members))
+    title = f"{name} fitted to {count} photograph{'s' * (count != 1)}"
     columns = ("parameter", "start", "fitted", "standard error", "unit", "")
-    made = cells.table(title, *columns, words=("parameter", "unit", ""))
+    made = cells.table(title, *columns, words=("parameter", "unit", ""), caption=_TERMS)
     rows = zip(found.names, found.units, found.start, found.values, found.standard_errors, found.statuses, strict=True)
     for name, unit, start, value, error, status in rows:
         told = f"{error:.2g}" if status == "ok" else "-"
@@ -117,12 +124,17 @@ def _said(found: Fit) -> str:
         "repeated": "noise from repeated photographs (photon transfer)",
     }[found.noise]  # fmt: skip
     if found.status == "low_contrast":
-        return "low_contrast: nothing in the photograph stands out of its noise"
-    text = f"{found.status} (goodness of fit: p = {found.p_value:.2g}); {len(found.pictures)} pose(s), {whence}"
+        return "low_contrast: nothing in the photograph stands out of its noise; move the lamp, or expose longer"
+    poses = f"{len(found.pictures)} pose{'s' * (len(found.pictures) != 1)}"
+    text = f"{found.status}{photograph.fit(found.p_value)}; {poses}, {whence}\n{photograph.of_fit()}"
     if found.status == "tone_unknown":
         text += (
             "\nNeither the files nor the photographs tell whether levels are linear in the light: say it by --gamma."
         )
     if found.status == "misfit":
-        text += "\nThe photographs are not what the model says: neither values nor standard errors are to be trusted."
+        text += (
+            "\nThe photographs are not what the model says: neither values nor standard errors are to be trusted. "
+            "The picture of the residuals (--residuals) shows where; mend the scene there, or free more parameters "
+            "(--free)."
+        )
     return text

@@ -102,9 +102,10 @@ def _decision(row: dict[str, Any]) -> str:
 
 
 _CAPTION = (
-    "u: combined standard uncertainty, of noise and of the bias that a simulation tells and that is taken off; of "
-    "noise alone where there is no light to simulate. pass, fail: by more than 2 u within or beyond the tolerance (ISO "
-    "14253-1); only a value whose status is ok is decided."
+    "value: with the bias taken off that a simulation of this picture tells (bias off). u(bias): standard uncertainty "
+    "of that. u: combined standard uncertainty, of noise and u(bias); of noise alone where no light is given, or with "
+    "--as-measured. pass, fail: by more than 2 u within or beyond the tolerance (ISO 14253-1); only a value whose "
+    "status is ok is decided."
 )
 
 

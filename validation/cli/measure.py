@@ -204,9 +204,9 @@ def _distance_facts(found: measure.Measurement) -> dict:
 def _distance_text(found: measure.Measurement, edges: list[dict]) -> str:
     good = np.isfinite(found.value_px)
     value = f"{found.value_px:.4f} +- {np.sqrt(found.variance_px2):.4f} px (1 sigma)" if good else "not measured"
-    told = ", ".join(f"{e['name']} {e['status']} ({e['used']} used, contrast {e['contrast']:.0f})" for e in edges)
-    return f"{value}, {found.status}{_fit(found.p_value)}\nedges: {told}"
-
-
-def _fit(p_value: float) -> str:
-    return f" (goodness of fit: p = {p_value:.2g})" if np.isfinite(p_value) else ""
+    told = ", ".join(f"{e['name']} {e['status']} ({e['used']}, {e['contrast']:.0f})" for e in edges)
+    return "\n".join([
+        f"The distance in the image: {value}, {found.status}{photograph.fit(found.p_value)}",
+        f"Its edges, with the samples used and the contrast in grey levels: {told}",
+        *([photograph.of_fit()] if np.isfinite(found.p_value) else []),
+    ])  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from scenes import InvalidInput
+from scenes.status import legend
 from validation.cli import recorded
 from validation.cli.measurands import digits
 from validation.report import cells
@@ -83,24 +84,47 @@ def _standing_out(one: measure.Candidate) -> dict[str, float]:
 
 def text(found: measure.Shapes) -> str:
     """Each shape that was measured."""
-    return "\n".join([*(_text(number, one) for number, one in enumerate(found.found, 1)), "(1 sigma)"])
+    lines = [_text(number, one) for number, one in enumerate(found.found, 1)]
+    if any(one.measured for one in found.found):
+        lines.append(_TERMS)
+    if any(math.isfinite(one.p_value) for one in found.found):
+        lines.append(of_fit())
+    return "\n".join(lines + legend(one.status for one in found.found))
+
+
+def fit(p_value: float) -> str:
+    """Goodness of fit beside a status; empty where it is not known."""
+    return f" (goodness of fit: p = {p_value:.2g})" if math.isfinite(p_value) else ""
+
+
+def of_fit() -> str:
+    """What a goodness of fit is."""
+    from measure.goodness import WORST
+
+    return (
+        "p: how likely so bad a fit is by chance if the picture is as the model says; below "
+        f"{WORST:g} the status is misfit or a worse one."
+    )
+
+
+def _beside(sigma: float, places: int) -> str:
+    return f"+- {sigma:.{places}f}" if math.isfinite(sigma) else "+- unknown"
 
 
 def _text(number: int, one: measure.Found) -> str:
     name = one.kind if one.kind != "tag" else f"tag {one.candidate.family} {one.candidate.identifier}"
     seen = f"noise {one.noise:.2f} grey levels, blur {one.blur_px:.2f} px"
-    fit = f" (goodness of fit: p = {one.p_value:.2g})" if math.isfinite(one.p_value) else ""
     if one.kind == "chessboard":
-        return f"{number}. {name}: {_board(one)}; {seen}{fit}"
-    lines = [f"{number}. {name}: {one.status}; {seen}{fit}"]
+        return f"{number}. {name}: {_board(one)}; {seen}{fit(one.p_value)}"
+    lines = [f"{number}. {name}: {one.status}; {seen}{fit(one.p_value)}"]
     lines += [f"   {line}" for line in recorded.of_sides_lines(one.quadrilateral)] if one.quadrilateral else []
     if one.corners is not None and one.covariance is not None:
         sigma = np.sqrt(np.diag(one.covariance)).reshape(4, 2)
         for i, ((x, y), (sx, sy)) in enumerate(zip(one.corners, sigma, strict=True), 1):
-            lines.append(f"   corner {i:<12} ({x:.3f} +- {sx:.3f}, {y:.3f} +- {sy:.3f}) px")
+            lines.append(f"   corner {i:<12} ({x:.3f} {_beside(sx, 3)}, {y:.3f} {_beside(sy, 3)}) px")
     for q in one.quantities:
         places = max(digits(q.sigma), 3) if math.isfinite(q.sigma) else 3
-        lines.append(f"   {q.name:<19} {q.value:.{places}f} +- {q.sigma:.{places}f} {q.unit}")
+        lines.append(f"   {q.name:<19} {q.value:.{places}f} {_beside(q.sigma, places)} {q.unit}")
     return "\n".join(lines)
 
 
@@ -130,4 +154,8 @@ def table(found: measure.Shapes) -> Table:
 
 
 _ROWS = 30
-_CAPTION = "Support: part of the outline (of the worst side) with an edge. Score: signal to noise ratio of the outline."
+_CAPTION = (
+    "at: middle of the shape, x, y. support: part of the outline (of the worst side) with an edge. contrast/noise: of "
+    "its edges, in sigmas. score: signal to noise ratio of the whole outline; the highest are measured (--most, --all)."
+)
+_TERMS = "+-: standard deviation by noise (1 sigma). Places: x, y from the middle of the upper left pixel."

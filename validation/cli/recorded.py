@@ -35,7 +35,7 @@ def facts(photo: Photograph) -> dict[str, Any]:
 
 def text(photo: Photograph) -> str:
     """The same in words."""
-    asked = "" if photo.tone_known else " (the file does not say; --gamma does)"
+    asked = "" if photo.tone_known else " assumed: the file does not say, and --gamma was not given"
     return f"{photo.tone}{asked}; channel: {photo.channel}"
 
 
@@ -55,7 +55,7 @@ def of_sides_lines(found: measure.Quadrilateral) -> list[str]:
     curve, blur = found.curve, found.side_blur_px
     grows = f" + {curve.gain:.3g} (level - {curve.dark_level:.0f})" if curve.gain else ""
     lines = [
-        f"by {found.estimator}; noise variance {curve.dark:.3g}{grows} grey levels^2"
+        f"estimator {found.estimator}; noise variance {curve.dark:.3g}{grows} grey levels^2"
         + (", and rounding" if curve.step else "")
     ]
     if np.isfinite(blur).all():

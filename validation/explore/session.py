@@ -132,10 +132,11 @@ class Session:
         await self._send(message | {"number": number})
 
     async def _rest(self, state: State, closely: bool, number: int) -> None:
-        """What follows when nothing moves; a long close look in a process, so that a movement is answered meanwhile."""
+        """What follows when nothing moves; a close look beside the thread that answers, a long one in a process: a
+        movement is answered meanwhile."""
         if not (closely or self._refused):
             is_long = self._close_s > _LONG_S if math.isfinite(self._close_s) else preview.is_large(self._scene)
-            await self._answer(self._tools.slowly if is_long else self._tools.quickly, state, True, number)
+            await self._answer(self._tools.slowly if is_long else self._tools.aside, state, True, number)
         await self._colour(state)
         if self._refused:
             return
@@ -147,7 +148,7 @@ class Session:
     async def _colour(self, state: State) -> None:
         key = sphere.key(state)
         if self._sphere is None or self._sphere[0] != key:
-            parts, places = [], sphere.cells().poses
+            parts, places = [], sphere.cells(below=sphere.is_below(state)).poses
             pieces = sphere.values(self._scene, state, places)
             while (part := await self._tools.quickly(next, pieces, None)) is not None:
                 parts.append(part)

@@ -21,7 +21,7 @@ _AT_ONCE = 16  # poses between looks at whether the sphere is still wanted
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Patches of the upper hemisphere: the pose of each one's middle, and its four borders, degrees.
+    """Patches of a hemisphere: the pose of each one's middle, and its four borders, degrees.
 
     Attributes
     ----------
@@ -36,13 +36,15 @@ class Cells:
 
 
 @lru_cache
-def cells(step_deg: float = STEP_DEG) -> Cells:
-    """Rings of patches of nearly equal size.
+def cells(step_deg: float = STEP_DEG, *, below: bool = False) -> Cells:
+    """Rings of patches of nearly equal size, of the upper hemisphere or the one below.
 
     Examples
     --------
     >>> len(cells(15.0).poses), cells(15.0).poses[0].tolist()
     (95, [7.5, 30.0])
+    >>> cells(15.0, below=True).borders[0].tolist()
+    [165.0, 180.0, 0.0, 60.0]
     """
     borders = []
     for low in np.arange(0.0, 90.0, step_deg):
@@ -50,13 +52,26 @@ def cells(step_deg: float = STEP_DEG) -> Cells:
         starts = 360.0 / count * np.arange(count)
         borders += [(low, low + step_deg, start, start + 360.0 / count) for start in starts]
     found = np.array(borders)
+    if below:
+        found[:, :2] = 180.0 - found[:, 1::-1]
     return Cells(np.column_stack([found[:, :2].mean(1), found[:, 2:].mean(1)]), found)
 
 
+def is_below(state: State) -> bool:
+    """Whether what is moved stands in the lower hemisphere."""
+    pose = state.sensor if state.moving == SENSOR else state.lights[state.moving]
+    return pose.polar_deg > 90
+
+
 def key(state: State) -> tuple:
-    """What the values depend on: all poses but that of what is moved."""
+    """What the values depend on: all poses but that of what is moved, and of that the hemisphere."""
     sensor = None if state.moving == SENSOR else state.sensor
-    return state.moving, sensor, tuple(pose for i, pose in enumerate(state.lights) if i != state.moving)
+    return (
+        state.moving,
+        is_below(state),
+        sensor,
+        tuple(pose for i, pose in enumerate(state.lights) if i != state.moving),
+    )
 
 
 def values(scene: Scene, state: State, poses: np.ndarray) -> Iterator[np.ndarray]:
@@ -104,7 +119,7 @@ def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]
         known = [(m, each.tolerance.half) for m, each in enumerate(scene.quantities) if each.tolerance]
         chosen = np.max([2 * sigmas[:, m] / half for m, half in known], axis=0)
     return {
-        "borders": cells().borders.tolist(),
+        "borders": cells(below=is_below(state)).borders.tolist(),
         "values": [float(f"{value:.4g}") if np.isfinite(value) else None for value in chosen],
         "what": "2 sigma / tolerance" if ratio else "sigma",
         "unit": "" if ratio else "degrees" if quantity.is_angle else scene.units,

@@ -1,4 +1,4 @@
-"""What all visitors of a page share: one thread for quick answers, processes for what takes long."""
+"""What all visitors of a page share: one thread for quick answers, another for close looks, processes for long work."""
 
 from __future__ import annotations
 
@@ -29,15 +29,23 @@ class Tools:
         Processes, started when first asked.
     free : asyncio.Semaphore
         How many of them are free.
+    beside : Executor
+        One more thread: a close look of a small part, which would hold up answers, and for which no process is worth
+        starting.
     """
 
     quick: Executor
     slow: Executor
     free: asyncio.Semaphore
+    beside: Executor
 
     async def quickly(self, work: Callable, *arguments: Any) -> Any:
         """What ``work`` gives, in the one thread."""
         return await asyncio.get_running_loop().run_in_executor(self.quick, work, *arguments)
+
+    async def aside(self, work: Callable, *arguments: Any) -> Any:
+        """What ``work`` gives, in the other thread; what is no longer wanted before its turn never begins."""
+        return await asyncio.get_running_loop().run_in_executor(self.beside, work, *arguments)
 
     async def slowly(self, work: Callable, *arguments: Any) -> Any:
         """What ``work`` gives, in a process; both must be such that they can be sent there.
@@ -74,11 +82,11 @@ class _Left(Exception):
 @contextmanager
 def open_tools() -> Iterator[Tools]:
     """The tools; at the end work that is under way is not waited for."""
-    with ThreadPoolExecutor(1) as quick:
+    with ThreadPoolExecutor(1) as quick, ThreadPoolExecutor(1) as beside:
         try:
             workers = max(_WORKERS, pool.cores())
-            with pool.local(workers) as crew:
-                yield Tools(quick, crew.executor, asyncio.Semaphore(workers))
+            with pool.local(workers, yielding=True) as crew:
+                yield Tools(quick, crew.executor, asyncio.Semaphore(workers), beside)
                 raise _Left  # the pool ends its processes at once when an error leaves it
         except _Left:
             pass

@@ -17,7 +17,9 @@ from planner.uncertainty.budget import Budget
 from planner.uncertainty.improve import improvements
 from scenes.status import is_trusted
 from validation.report.canvas import TEXT, WIDTH, inline, save
+from validation.report.cells import name as shown_name
 from validation.report.cells import percent
+from validation.report.source_words import keyed
 
 _SOURCES = 6  # that have a colour of their own; the others are one
 _LONGEST = 26  # letters of a name
@@ -66,13 +68,13 @@ def improved(found: SceneBudget) -> list[str]:
             if one.gain >= _LEAST_GAIN:
                 gains.setdefault(one.source, {})[each.name] = one.gain
     order = sorted(gains, key=lambda source: -round(max(gains[source].values()), 6))[:_SOURCES]
-    return [f"Halve {source}: U of {_gained(gains[source])}." for source in order]
+    return [f"Halve {keyed(source)}: U of {_gained(gains[source])}." for source in order]
 
 
 def _gained(gains: dict[str, float]) -> str:
     """The requirements that gain most, with what U becomes less by."""
     best = sorted(gains, key=lambda name: -round(gains[name], 6))
-    shown = ", ".join(f"{name} -{100 * gains[name]:.0f} %" for name in best[:_SOURCES])
+    shown = ", ".join(f"{shown_name(name)} -{100 * gains[name]:.0f} %" for name in best[:_SOURCES])
     return f"{shown}, and {len(best) - _SOURCES} more" if len(best) > _SOURCES else shown
 
 
@@ -84,15 +86,15 @@ def _drawn(found: SceneBudget):
     left = np.zeros(count)
     for name, part, (colour, hatch) in zip(sources, table.T, _LOOKS, strict=False):
         axis.barh(range(count), part, left=left, height=0.62, color=colour, hatch=hatch, edgecolor="black", lw=0.5,
-                  label=name)  # fmt: skip
+                  label=keyed(name))  # fmt: skip
         left += part
     for m, (each, state) in enumerate(zip(found, found.statuses, strict=True)):
-        words = percent(left[m] / 100) if halves[m] is not None else f"U {each.U:.2g} {each.unit}"
+        told = percent(left[m] / 100) if halves[m] is not None else f"U {each.U:.2g} {each.unit}"
         axis.annotate(
-            words if is_trusted(state) else f"{words}, {state}", (left[m], m), (4, 0), textcoords="offset points",
+            told if is_trusted(state) else f"{told}, {state}", (left[m], m), (4, 0), textcoords="offset points",
             va="center", fontsize=TEXT,
         )  # fmt: skip
-    _finished(axis, [each.name for each in found], left, any(half is not None for half in halves))
+    _finished(axis, [shown_name(each.name) for each in found], left, any(half is not None for half in halves))
     return figure
 
 
@@ -118,5 +120,5 @@ def draw(found: SceneBudget, path: Path) -> Path:
 
 def drawn(found: SceneBudget, key: str = "budget") -> Markup:
     """The chart as SVG within a page."""
-    names = ", ".join(f"{each.name} {each.U:.2g} {each.unit}" for each in found)
+    names = ", ".join(f"{shown_name(each.name)} {each.U:.2g} {each.unit}" for each in found)
     return inline(_drawn(found), key, f"Expanded uncertainties by source: {names}.")

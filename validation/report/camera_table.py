@@ -11,18 +11,29 @@ from rich.table import Table
 
 import scenes
 from measure.boards.camera import CameraCalibration
+from measure.goodness import WORST
 from scenes import InvalidInput
+from scenes.status import legend
 from validation.boards import Boards
 from validation.report import cells
 from validation.strict_json import dumps
 
 _STRONG = 0.9  # correlation that is told of
+_OF_BOARDS = (
+    "corners: columns x rows of inner corners. not ok: corners that are not used, by status. noise: grey levels. rms: "
+    "distance of corners from where the calibrated camera sees them. distance: from the camera to the board's first "
+    "corner, +- 1 sigma."
+)
+_OF_CAMERA = (
+    "fx, fy: focal lengths (fx alone: of both axes). cx, cy: where the optical axis meets the image. k1, k2, p1, p2, "
+    "k3: OpenCV's distortion."
+)
 
 
 def boards(found: CameraCalibration, seen: Boards, units: str) -> Table:
     """One row a board."""
     columns = ("file", "corners", "not ok", "noise", "blur px", "rms px", f"distance {units}", "+-")
-    table = cells.table("Boards", *columns, words=("file",), wrap=True)
+    table = cells.table("Boards", *columns, words=("file",), wrap=True, caption=_OF_BOARDS)
     for each in _board_facts(found, seen):
         size = f"{each['shape'][0]} x {each['shape'][1]}"
         bad = ", ".join(f"{count} {name}" for name, count in each["status"].items() if name != "ok") or "-"
@@ -35,7 +46,9 @@ def boards(found: CameraCalibration, seen: Boards, units: str) -> Table:
 
 def parameters(found: CameraCalibration) -> Table:
     """One row an intrinsic."""
-    table = cells.table("Camera", "", "value", "+- (1 sigma)", "unit", words=("", "unit"), wrap=True)
+    table = cells.table(
+        "Camera", "", "value", "+- (1 sigma)", "unit", words=("", "unit"), wrap=True, caption=_OF_CAMERA
+    )
     for name, value, sd in zip(found.names, found.values, found.sd, strict=True):
         pixels = name in ("fx", "fy", "cx", "cy")
         digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 12)) if 0 < sd < np.inf else 4
@@ -47,7 +60,8 @@ def summary(found: CameraCalibration) -> str:
     """What the residuals say, and the strongest correlations."""
     lines = [
         f"{found.status}: reprojection {found.rms_px:.4f} px rms; chi-square {found.chi_square:.1f} for "
-        f"{found.freedom} degrees of freedom, p = {found.p_value:.2g}"
+        f"{found.freedom} degrees of freedom, p = {found.p_value:.2g} (the chance of so large residuals if board and "
+        f"lens are as the model says; below {WORST:g} they are not)"
     ]
     if found.dispersion != 1:
         lines.append(
@@ -56,8 +70,10 @@ def summary(found: CameraCalibration) -> str:
         )
     pairs = _strong(found)
     if pairs:
-        lines.append("strongly correlated: " + ", ".join(f"{a} and {b} {value:+.3f}" for a, b, value in pairs))
-    return "\n".join(lines)
+        strong = abs(pairs[0][2]) > _STRONG
+        title = "strongly correlated, so that the boards hardly tell them apart" if strong else "strongest correlation"
+        lines.append(f"{title}: " + ", ".join(f"{a} and {b} {value:+.3f}" for a, b, value in pairs))
+    return "\n".join(lines + legend([found.status]))
 
 
 def lens_file(found: CameraCalibration) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -72,6 +73,26 @@ def pose(poses: Any) -> str:
     ('(15.0, 315.0)', '(15.0, 315.0)', '(15.0, 315.0) (60.0, 90.0)', '-')
     """
     return " ".join("({:.1f}, {:.1f})".format(*each) for each in several(poses)) or "-"
+
+
+def name(told: str) -> str:
+    """A requirement's name as a page shows it: a position's coordinates, NAME.x and NAME.y, without the point.
+
+    >>> name("bore from sides.x"), name("slot 1.5")
+    ('bore from sides, x', 'slot 1.5')
+    """
+    return re.sub(r"\.([xy])$", r", \1", told)
+
+
+def united(number: str, unit: str) -> str:
+    """A number as text with its unit, where there is a number.
+
+    >>> united("0.02", "mm"), united("90", "degrees"), united("-", "mm"), united("4", "")
+    ('0.02 mm', '90°', '-', '4')
+    """
+    if number == "-" or not unit:
+        return number
+    return f"{number}°" if unit == "degrees" else f"{number} {unit}"
 
 
 def zone(tolerance: Tolerance | None) -> str:

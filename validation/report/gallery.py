@@ -13,7 +13,8 @@ import scenes
 from render import Quality
 from scenes import Picture, Scene
 from validation.report import station_view
-from validation.report.requirements import predicted, sentence
+from validation.report.requirements import predicted
+from validation.report.wording import sentence
 
 _PAGE, _FOLDER = "gallery.md", "gallery"
 _LARGEST = 640  # px of a picture's side, to which a larger camera is made coarser
@@ -74,8 +75,9 @@ def page() -> str:
     parts = [
         "# Gallery",
         "The bundled scenes, each rendered at its first setting, with what is measured in it (`ice scenes` lists them, "
-        "`ice validate NAME` proves one). Blue circles: measured well within tolerance; squares: within; diamonds: too "
-        "uncertain; grey: no tolerance is given; white octagons: not proven.",
+        "`ice validate NAME` proves one). Blue circles: measured precisely enough, U at most a quarter of the "
+        "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; white "
+        "octagons: not proven.",
     ]
     return "\n\n".join(parts + [_entry(scenes.load(name)) for name in scenes.names()]) + "\n"
 

@@ -1,10 +1,11 @@
-"""How grades look: colours that differ in lightness, and shapes of balloons that differ without any colour."""
+"""How grades look: colours that differ in lightness, and shapes of balloons that differ without any colour; and what
+each of them means."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from validation.report.requirements import Grade
+from validation.report.requirements import WELL, Grade
 
 
 @dataclass(frozen=True)
@@ -32,4 +33,11 @@ LOOKS = {
     Grade.OVER: Look("#8c1a11", "#8c1a11", "#ffffff", "D", _DIAMOND),
     Grade.OPEN: Look("#e4e4e4", "#333333", "#000000", "o", _CIRCLE),
     Grade.DOUBT: Look("#ffffff", "#8c1a11", "#000000", "8", _OCTAGON),
+}
+MEANS = {
+    Grade.WELL: f"{Grade.WELL} (U at most {100 * WELL:.0f} % of the tolerance)",
+    Grade.WITHIN: f"{Grade.WITHIN} (U {100 * WELL:.0f} to 100 % of the tolerance)",
+    Grade.OVER: f"{Grade.OVER} (U larger than the tolerance)",
+    Grade.OPEN: str(Grade.OPEN),
+    Grade.DOUBT: f"{Grade.DOUBT} (do not rely on the value)",
 }

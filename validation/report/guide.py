@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenes.status import legend
+from scenes.status import counted, is_trusted, legend
 from validation.batch.result import Validation
+from validation.batch.rows import Row
 from validation.report.cells import pose
 from validation.statistics import LEVEL
 
@@ -147,6 +148,43 @@ def plain_verdict(found: Validation) -> str:
         f"{verdict.inside} of {verdict.rows} lie in their 95 % interval, where chance alone leaves "
         f"{_expected(verdict.rows)}."
     )
+
+
+def checked(found: Validation) -> str:
+    """The same in short, of a run that agrees."""
+    images = max(row.main.n for row in found.rows)
+    return f"Checked: {images} noisy pictures of each setting were measured, and the values scatter as predicted."
+
+
+def contradiction(found: Validation) -> str:
+    """The same of a run that does not agree, as what is wrong."""
+    told = plain_verdict(found).removeprefix("No: ")
+    return f"The predicted uncertainties did not pass their check: {told}"
+
+
+def why_not(found: Validation) -> str:
+    """What to do to learn why a run does not agree; empty where what could not be measured is why."""
+    if set(found.verdict.reasons) <= {"not measured", "not proven"}:
+        return ""
+    return "`ice effects SCENE --check` tells whether an effect that was left out is why the check fails."
+
+
+def elsewhere(found: Validation, number: int | None) -> list[str]:
+    """In how many of the settings that are not shown a requirement is not proven; empty where in none."""
+    others = [row for row in found.rows if row.index + 1 != number]
+    states = [_unproven(row) for row in others]
+    doubtful = sum(map(bool, states))
+    if not doubtful:
+        return []
+    which = "the other setting" if len(others) == 1 else f"{doubtful} of the {len(others)} other settings"
+    told = counted(state for each in states for state in each)
+    return [f"In {which}, not shown here, not everything is proven: {told}."]
+
+
+def _unproven(row: Row) -> list[str]:
+    """Of the requirements of a setting that are not proven: their statuses, or that they were not measured."""
+    doubtful = [each for each in row.measurands if each.ratio is None or not is_trusted(each.status)]
+    return ["not measured" if is_trusted(each.status) else each.status for each in doubtful]
 
 
 def _expected(rows: int) -> str:

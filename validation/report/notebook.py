@@ -29,7 +29,7 @@ def _(found: Picture) -> str:
         return ""
     try:
         asked = predicted(found) if found.scene.features else ()
-        label = "; ".join(f"{each.number} {each.name}: {each.grade}" for each in asked)
+        label = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in asked)
         view = station_view.draw(found, asked, None, f"The part as the camera sees it. {label}", f"n{next(_NUMBER)}")
     except InvalidInput:
         return ""

@@ -19,6 +19,7 @@ from validation.report import (
     budget_figure,
     budget_section,
     budget_table,
+    cells,
     guide,
     page_tables,
     proof_figures,
@@ -27,13 +28,13 @@ from validation.report import (
     station_table,
     station_view,
 )
-from validation.report.grades import LOOKS
+from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
-from validation.report.requirements import next_step, sentence, what, wrong
 from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
+from validation.report.wording import Need, need, next_step, sentence, what, wrong
 
-SIMULATED = "How well is told by simulation: no camera was used"
+SIMULATED = "All is simulated: no camera was used, and no part was judged"
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     if found.refused:
         sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
     sections.append(_done(found, store))
-    first = first_screen(station, not store.identity().get("photos"))
+    first = _of_run(first_screen(station, not store.identity().get("photos")), found, station)
     context = _context(station, first, found.title or found.scene, sections) | {"agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
     paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
@@ -89,7 +90,7 @@ def write_page(first: dict[str, Any], name: str, title: str, sections: list[Sect
 def _environment(escaped: bool) -> jinja2.Environment:
     loader = jinja2.PackageLoader("validation.report")
     made = jinja2.Environment(loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    made.filters |= {"md": markdown, "words": words}
+    made.filters |= {"md": markdown, "words": words, "linked": linked}
     return made
 
 
@@ -109,24 +110,59 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     simulated = f". {SIMULATED}" if is_simulated else ""
     number = f"Setting {station.number}. " if station.number else ""
     how = "" if station.image is not None else " Drawn from the model: no shadows, no light between surfaces."
-    named = "; ".join(f"{each.number} {each.name}: {each.grade}" for each in found)
+    how += station_view.enlarged(picture)
+    named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
-        "what": f"{what(found)} on this part, numbered in the picture, from one picture of one camera{simulated}",
+        "what": f"{what(found)}, numbered in the picture, from one picture of one camera{simulated}",
         "sentence": sentence(found),
         "wrong": wrong(found),
         "next": next_step(found),
+        "need": need(found),
+        "checked": "",
+        "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
         "sketched": f"Camera and lamp to scale: {told}.",
         "caption": f"{number}What is measured, as the camera sees it.{how}",
-        "key": [(grade, LOOKS[grade]) for grade in grades],
+        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
         "lines": station_table.lines(found),
-        "note": station_table.NOTE,
+        "note": station_table.note(found),
         "section": Section("Requirements", answer=f"{number}{told}.", tables=[table]),
     }
+
+
+def _of_run(first: dict[str, Any], found: Validation, station: Station) -> dict[str, Any]:
+    """The first screen with what a run says of it: whether it agrees, and what is not proven elsewhere."""
+    wrong, after = first["wrong"], guide.elsewhere(found, station.number)
+    if found.verdict.agrees:
+        return first | {"checked": guide.checked(found), "wrong": wrong + after}
+    steps = [guide.why_not(found), first["next"] if wrong else ""]
+    return first | {
+        "wrong": [guide.contradiction(found), *wrong, *after],
+        "next": " ".join(step for step in steps if step) or first["next"],
+        "need": Need.ACT,
+    }
+
+
+def linked(text: str, numbers: Sequence[int]) -> Markup:
+    """A text as `words`, in which the numbers of requirements lead to their rows.
+
+    >>> linked("Slot (no. 4) & no. 9", [4])
+    Markup('Slot (<a href="#requirement-4">no.\\xa04</a>) &amp; no. 9')
+    """
+
+    def link(found: re.Match[str]) -> str:
+        known = int(found.group(1)) in numbers
+        shown = found.group().replace(" ", "\N{NO-BREAK SPACE}")
+        return f'<a href="#requirement-{found.group(1)}">{shown}</a>' if known else found.group()
+
+    def all_links(found: re.Match[str]) -> str:
+        return re.sub(r"(?:no\. )?(\d+)", link, found.group())
+
+    return Markup(re.sub(r"\bno\. \d+(?:, \d+)*(?: and \d+)?", all_links, words(text)))
 
 
 def words(text: str) -> Markup:
@@ -186,7 +222,7 @@ def _budget(found: SceneBudget | None) -> list[Section]:
         "to improve. `ice budget SCENE --reach U` says how well a source must be known for a wanted U."
     )
     folded = [
-        Table(f"{each.name} [{each.unit}]", budget_table.COLUMNS, budget_section.cells(each),
+        Table(f"{cells.name(each.name)} [{each.unit}]", budget_table.COLUMNS, budget_section.cells(each),
               budget_section.note(found, m))
         for m, each in enumerate(found)
     ]  # fmt: skip

@@ -20,6 +20,7 @@ from validation.batch.measurands import column
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
+from validation.report import cells
 from validation.report.canvas import TEXT, WIDTH, inline
 
 MOST = 5000  # settings that are looked at, evenly spaced
@@ -89,7 +90,7 @@ def forest(lines: Sequence[Line], key: str = "forest") -> Markup:
     figure, axis = _rows(len(shown) + len(groups))
     for y, (name, some) in enumerate(groups):
         _group(axis, y, np.array([line.ratio for line in some]))
-        _name(axis, y, f"{name}, {len(some)} settings")
+        _name(axis, y, f"{cells.name(name)}, {len(some)} settings")
     for y, line in enumerate(shown, len(groups)):
         colour, fill = {"inside": (_GOOD, _GOOD), "outside": (_BAD, "white"), "open": (_OPEN, "white")}[line.grade]
         axis.plot([line.low, line.high], [y, y], color=colour, lw=1.6, ls=":" if line.grade == "open" else "-")
@@ -155,7 +156,7 @@ def bias(lines: Sequence[Line]) -> Markup:
     figure, axis = _rows(len(shown) + len(groups))
     for y, (name, some) in enumerate(groups):
         _group(axis, y, np.array([_biased(line, toleranced)[0] for line in some]))
-        _name(axis, y, f"{name}, {len(some)} settings")
+        _name(axis, y, f"{cells.name(name)}, {len(some)} settings")
     for y, line in enumerate(shown, len(groups)):
         value, spread = _biased(line, toleranced)
         trusted = is_trusted(line.status)
@@ -187,7 +188,7 @@ def bias_told(lines: Sequence[Line]) -> str:
         return "Mean errors; the band is 0.3 sigma of one picture, which the verdict allows."
     worst = max(some, key=lambda line: (round(abs(line.bias) / line.half, 9), -line.setting))
     part = 100 * abs(worst.bias) / worst.half
-    return f"Mean errors against the tolerance (band): the largest, of {worst.name}, is {part:.2g} % of it."
+    return f"Mean errors against the tolerance (band): the largest, of {cells.name(worst.name)}, is {part:.2g} % of it."
 
 
 def distributions(found: Validation, store: RunFile) -> Markup:
@@ -207,7 +208,7 @@ def distributions(found: Validation, store: RunFile) -> Markup:
         panel.stairs(counts[name] / max(total, 1) / np.diff(_BINS), _BINS, fill=True, color="#a9c7dd")
         panel.plot(x, stats.norm.pdf(x), color="black", lw=1)
         panel.set(yticks=[], xticks=[-3, 0, 3], ylim=(0, None))
-        panel.set_title(_short(name, 18), fontsize=TEXT)
+        panel.set_title(_short(cells.name(name), 18), fontsize=TEXT)
     figure.supxlabel("(value - mean) / predicted sigma", fontsize=TEXT)
     return inline(figure, "spread", f"Distributions of {len(names)} requirements, beside the normal one predicted.")
 
@@ -251,10 +252,10 @@ def _label(line: Line, every: Sequence[Line]) -> str:
     """Requirement, and the setting where there are several; of one requirement the setting alone."""
     several = any(other.setting != every[0].setting for other in every)
     if not several:
-        return f"{line.number}: {_short(line.name)}"
+        return f"{line.number}: {_short(cells.name(line.name))}"
     if all(other.number == 1 for other in every):
         return f"setting {line.setting}"
-    return f"{_short(line.name)}, setting {line.setting}"
+    return f"{_short(cells.name(line.name))}, setting {line.setting}"
 
 
 def _short(name: str, most: int = _LONGEST) -> str:

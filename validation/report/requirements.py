@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,21 +14,25 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from scenes import InvalidInput, Picture, Tolerance
 from scenes.results import finite
-from scenes.status import MEANINGS, REMEDIES, WORST_FIRST, is_trusted
+from scenes.status import is_trusted
+from validation.report import cells, source_words
 
-_WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
-_UNSURE = "what is not exactly known"  # of a bias that is taken off
-_NAMED = 4  # requirements that a sentence names
+WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
 
 
 class Grade(StrEnum):
-    """What the expanded uncertainty is against half of the tolerance zone."""
+    """What the expanded uncertainty is against half of the tolerance zone: of the measurement, not of the part."""
 
-    WELL = "well within tolerance"
-    WITHIN = "within tolerance"
+    WELL = "precise enough"
+    WITHIN = "usable"
     OVER = "too uncertain"
     OPEN = "no tolerance given"
     DOUBT = "not proven"
+
+    @property
+    def fails(self) -> bool:
+        """Whether nothing can be decided with such a measurement."""
+        return self in (Grade.DOUBT, Grade.OVER)
 
 
 @dataclass(frozen=True)
@@ -53,11 +56,13 @@ class Requirement:
         Expanded uncertainty (95 %); None where it cannot be measured.
     status : str
     limits : str
-        The source with the largest share of the variance, and that share; empty where there is no budget.
+        In words, the source with the largest share of the variance, and that share; empty where there is no budget.
     kind : str
         Of the measurand: distance, width, ...
     reason : str
         What decided a status that is not ``ok``, with its number; empty where no more is known than the status says.
+    source : str
+        The budget's name of the source in ``limits``; empty where there is no budget.
     """
 
     number: int
@@ -73,6 +78,12 @@ class Requirement:
     limits: str
     kind: str = "requirement"
     reason: str = ""
+    source: str = ""
+
+    @property
+    def title(self) -> str:
+        """The name as a page shows it: "bore, x" of ``bore.x``."""
+        return cells.name(self.name)
 
     @property
     def ratio(self) -> float | None:
@@ -89,7 +100,7 @@ class Requirement:
             return Grade.OPEN
         if self.ratio is None or self.ratio > 1:
             return Grade.OVER
-        return Grade.WELL if self.ratio <= _WELL else Grade.WITHIN
+        return Grade.WELL if self.ratio <= WELL else Grade.WITHIN
 
 
 def predicted(picture: Picture, p: float = 0.95) -> tuple[Requirement, ...]:
@@ -122,6 +133,7 @@ def requirements(
     """
     told, known = planner.predict(picture).measurands, {} if found is None else {each.name: each for each in found}
     statuses = [each.status for each in told] if statuses is None else statuses
+    leading = {each.name: _leading(known.get(each.name)) for each in told}
     return tuple(
         Requirement(
             number=m + 1, name=each.name, unit=each.unit, nominal=each.nominal, tolerance=each.tolerance,
@@ -129,7 +141,7 @@ def requirements(
             U=known[each.name].U if each.name in known and math.isfinite(sigmas[m]) else None,
             status=statuses[m], kind=each.kind,
             reason=each.why(statuses[m], u_biases[m] if u_biases else None, sigmas[m]),
-            limits=_limits(known[each.name]) if each.name in known else "",
+            limits=_limits(leading[each.name]), source=leading[each.name][0],
         )
         for m, each in enumerate(told)
     )  # fmt: skip
@@ -169,112 +181,20 @@ def measurable_budget(
     known = {name: np.array([each[m] for m in places], float) for name, each in told.items() if each is not None}
     known["biased"] = biased
     if doubts is not None:
-        known["doubts"] = {_UNSURE: known["doubts"]}
+        known["doubts"] = {source_words.ALL: known["doubts"]}
     try:
         return budget(picture, **known, statuses=statuses and tuple(statuses[m] for m in places), p=p)
     except InvalidInput:
         return None
 
 
-def _limits(found: Budget) -> str:
-    worst = max(found.contributions, key=lambda row: round(row.share, 9), default=None)
-    return "" if worst is None or not worst.share > 0 else f"{worst.source}, {100 * worst.share:.0f} %"
+def _leading(found: Budget | None) -> tuple[str, float]:
+    """The source with the largest share of the variance, and that share; an empty name where there is none."""
+    every = () if found is None else found.contributions
+    worst = max(every, key=lambda row: round(row.share, 9), default=None)
+    return ("", 0.0) if worst is None or not worst.share > 0 else (worst.source, worst.share)
 
 
-def what(found: Sequence[Requirement]) -> str:
-    """What is measured, in plain words.
-
-    >>> what([])
-    'Nothing'
-    """
-    kinds = Counter(each.kind for each in found)
-    parts = [f"{count} {kind}{'s' * (count > 1)}" for kind, count in kinds.items()]
-    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts) or "Nothing"
-
-
-def sentence(found: Sequence[Requirement]) -> str:
-    """How well all of them are measured, in plain words."""
-    grades = [each.grade for each in found]
-    parts = []
-    if good := grades.count(Grade.WELL):
-        parts.append(
-            f"{_count(good, len(found))} measured well within tolerance: the expanded uncertainty U (95 %) is at most "
-            f"{100 * _WELL:.0f} % of it"
-        )
-    for grade, words in (
-        (Grade.WITHIN, f"measured within tolerance, with an uncertainty U above {100 * _WELL:.0f} % of it"),
-        (Grade.OVER, "measured with an uncertainty U that is larger than the tolerance"),
-        (Grade.OPEN, f"measured{_known(found)}; no tolerance is given to compare with"),
-        (Grade.DOUBT, "not proven: its value must not be relied on"),
-    ):
-        if some := [each for each in found if each.grade == grade]:
-            words = words if len(some) == 1 else words.replace("its value", "their values")
-            parts.append(f"{_which(some, len(found))} {words}")
-    return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
-
-
-def _known(found: Sequence[Requirement]) -> str:
-    """The uncertainty of what has no tolerance, where that is one number."""
-    each = [one for one in found if one.grade == Grade.OPEN]
-    if len(each) != 1 or each[0].U is None:
-        return ""
-    return f" with an expanded uncertainty U (95 %) of {each[0].U:.2g} {each[0].unit}"
-
-
-def wrong(found: Sequence[Requirement]) -> list[str]:
-    """What is wrong, a line for each status that is not ``ok`` and each U that is too large; empty where nothing is."""
-    lines = []
-    for status in WORST_FIRST:
-        some = [each for each in found if each.status == status and not is_trusted(status)]
-        if some:
-            told = next((each for each in some if each.reason), None)
-            about = f"{f'of {told.name}, ' if len(some) > 1 else ''}{told.reason}" if told else MEANINGS[status]
-            lines.append(f"{_joined([each.name for each in some])} ({status}): {about}.")
-    for each in found:
-        if each.grade == Grade.OVER and each.ratio is not None:
-            lines.append(f"{each.name}: U is {each.ratio:.2g} times what the tolerance allows{_mostly(each)}.")
-    return [line[0].upper() + line[1:] for line in lines]
-
-
-def _count(some: int, every: int) -> str:
-    if every == 1:
-        return "The requirement is"
-    return f"all {every} requirements are" if some == every else f"{some} of {every} requirements {_are(some)}"
-
-
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
-def _which(some: Sequence[Requirement], every: int) -> str:
-    """By name where they are few."""
-    if len(some) > _NAMED or len(some) == every:
-        return _count(len(some), every) if every > 1 else f"{some[0].name} is"
-    return f"{_joined([each.name for each in some])} {_are(len(some))}"
-
-
-def _joined(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _numbers(numbers: Sequence[int]) -> str:
-    return f"Requirement{'s' * (len(numbers) > 1)} {_joined([str(each) for each in numbers])}"
-
-
-def _mostly(each: Requirement) -> str:
-    return f"; most of it comes from {each.limits.rsplit(',', 1)[0]}" if each.limits else ""
-
-
-def next_step(found: Sequence[Requirement]) -> str:
-    """What to do about what is wrong, the worst first; then about the largest uncertainty."""
-    doubtful = [status for status in WORST_FIRST if any(r.status == status for r in found) and not is_trusted(status)]
-    if doubtful:
-        steps = [(_numbers([each.number for each in found if each.status == s]), REMEDIES[s]) for s in doubtful]
-        return " ".join(f"{numbers}: {remedy}." for numbers, remedy in steps)
-    over = [each for each in found if each.grade in (Grade.OVER, Grade.WITHIN)]
-    if over:
-        worst = max(over, key=lambda each: (round(each.ratio or math.inf, 9), -each.number))
-        return f"Improve {worst.name} first{_mostly(worst)}."
-    if found and all(each.grade == Grade.OPEN for each in found):
-        return "Give each requirement its tolerance in the scene, then U can be compared with it."
-    return "Nothing has to be changed: set camera and lamp up at these places."
+def _limits(leading: tuple[str, float]) -> str:
+    source, share = leading
+    return f"{source_words.words(source)}, {100 * share:.0f} %" if source else ""

@@ -8,6 +8,8 @@ import math
 from scenes.status import counted, is_trusted
 from validation.batch.result import Validation
 from validation.batch.rows import Row
+from validation.report.cells import PLACES
+from validation.report.cells import name as shown_name
 from validation.report.page_tables import Table
 from validation.report.run_cells import names, small_sigma
 from validation.report.station import merit
@@ -23,10 +25,10 @@ def table(found: Validation, halves: dict[str, float], chosen: int | None) -> Ta
     lines = [[str(row.index + 1), *cells[row.index], _largest(row, halves), _proven(row), _doubtful(row)]
              for row in rows]  # fmt: skip
     note = f"The best {_ROWS} of {len(found.rows)}; all are in table.csv." if len(found.rows) > _ROWS else ""
-    what = (
+    what = f"{PLACES} " + (
         "largest sigma: of the requirement whose sigma is largest against its tolerance, in per cent of it."
         if halves
-        else f"largest sigma: of {found.rows[0].measurands[0].name}, one picture's; no tolerance is given."
+        else f"largest sigma: of {shown_name(found.rows[0].measurands[0].name)}, one picture's; no tolerance is given."
     )
     where = next((i for i, row in enumerate(rows) if row.index + 1 == chosen), None)
     return Table("All settings, the best first", columns, lines, " ".join([what, note]).strip(), chosen=where)
@@ -36,7 +38,7 @@ def _largest(row: Row, halves: dict[str, float]) -> str:
     known = [(each.predicted**0.5 / halves[each.name], each.name) for each in row.measurands if each.name in halves]
     if known:
         part, name = max(known, key=lambda pair: round(pair[0], 9))
-        return f"{100 * part:.2g} % ({name})"
+        return f"{100 * part:.2g} % ({shown_name(name)})"
     first = row.measurands[0]
     return f"{small_sigma(first.predicted)} {first.unit}" if math.isfinite(first.predicted) else "-"
 

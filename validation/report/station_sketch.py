@@ -13,9 +13,10 @@ from scipy.spatial import ConvexHull, QhullError
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
 from scenes import Picture
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, inline
 
-_HEIGHT = 2.7  # inches
+_SIZE = 2.3, 2.2  # inches of a view
+_STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
 _VIEWS = ("from the side", "from above")
 
@@ -44,16 +45,18 @@ def _where(what: str, distance: float, pose, units: str) -> str:
 
 
 def draw(picture: Picture) -> Markup:
-    """The sketch as SVG."""
-    figure, panels = plt.subplots(1, 2, figsize=(WIDTH, _HEIGHT), layout="constrained")
+    """The sketch as SVG, one a view, each with a scale of its own."""
     pictures, scene = Pictures.of(picture), picture.scene
     eye = sensor_position(scene.camera, np.array(list(picture.sensor)))
     lamps = [np.array([e.at for e in pictures.emitters if e.which == i]) for i in range(len(scene.lights))]
-    for panel, (right, up), title in zip(panels, axes_of(picture), _VIEWS, strict=True):
-        flat = np.stack([right, up], -1)
-        _panel(panel, flat, picture, eye, [lamp for lamp in lamps if len(lamp)])
+    drawn = []
+    for (right, up), title in zip(axes_of(picture), _VIEWS, strict=True):
+        figure, panel = plt.subplots(figsize=_SIZE, layout="constrained")
+        _panel(panel, np.stack([right, up], -1), picture, eye, [lamp for lamp in lamps if len(lamp)])
         panel.set_title(title, fontsize=TEXT)
-    return inline(figure, "sketch", f"Sketch to scale: {told(picture)}.")
+        label = f"Sketch to scale, seen {title}: {told(picture)}."
+        drawn.append(inline(figure, f"sketch-{title.split()[-1]}", label))
+    return Markup("").join(drawn)
 
 
 def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: list[np.ndarray]) -> None:
@@ -69,6 +72,7 @@ def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: lis
     axis.plot(*camera, "s", color=_CAMERA, ms=9)
     places = [("camera", camera, _CAMERA), *(("lamp", lamp.mean(0) @ flat, _LAMP) for lamp in lamps[:1])]
     _labels(axis, places, np.array([scene.solid.vertices @ flat]).reshape(-1, 2), middle)
+    _scale(axis, scene.units)
 
 
 def _part(axis, points: np.ndarray) -> None:
@@ -98,7 +102,27 @@ def _labels(axis, places: list, part: np.ndarray, middle: np.ndarray) -> None:
         above = 1 if place[1] >= middle[1] - 0.05 * reach else -1
         axis.annotate(name, place, xytext=(2 * aside, 9 * above), textcoords="offset points", fontsize=TEXT,
                       color=colour, ha=align, va="bottom" if above > 0 else "top")  # fmt: skip
-    axis.set(xlim=centre[0] + np.array([-1.6, 1.6]) * reach, ylim=centre[1] + np.array([-1.35, 1.45]) * reach)
+    axis.set(xlim=centre[0] + np.array([-1.6, 1.6]) * reach, ylim=centre[1] + np.array([-1.75, 1.45]) * reach)
     axis.set(aspect="equal", xticks=[], yticks=[])
     for side in axis.spines.values():
         side.set_color("#cccccc")
+
+
+def _scale(axis, units: str) -> None:
+    """A length in the lower left corner."""
+    (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
+    length = scale_length((right - left) / 3)
+    start, level = left + 0.04 * (right - left), low + 0.05 * (high - low)
+    axis.plot([start, start + length], [level, level], color="black", lw=2, solid_capstyle="butt")
+    axis.annotate(f"{length:g} {units}", (start + length, level), xytext=(5, 0), textcoords="offset points",
+                  fontsize=TEXT, va="center")  # fmt: skip
+
+
+def scale_length(most: float) -> float:
+    """The longest of 1, 2, 5, 10, 20, ... that is no longer.
+
+    >>> scale_length(0.3), scale_length(7), scale_length(50), scale_length(99.9)
+    (0.2, 5.0, 50.0, 50.0)
+    """
+    power = 10.0 ** np.floor(np.log10(most) + 1e-9)
+    return float((_STEPS * power)[_STEPS * power <= most * (1 + 1e-9)].max())

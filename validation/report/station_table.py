@@ -6,71 +6,90 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenes.status import MEANINGS
 from validation.report import cells
 from validation.report.budget_table import decimals
 from validation.report.grades import LOOKS, Look
 from validation.report.page_tables import Table
-from validation.report.requirements import Grade, Requirement
+from validation.report.requirements import WELL, Grade, Requirement
 
-COLUMNS = ("", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "result", "limited by")
+COLUMNS = (
+    "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "measurement", "limited by",
+)  # fmt: skip
+PART = (
+    f"U / tolerance: U over half of the tolerance zone; up to {100 * WELL:.0f} % the measurement is precise enough, up "
+    "to 100 % usable."
+)
 NOTE = (
-    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± what its correction "
-    "is not sure of. U: expanded uncertainty, 95 %. tolerance: how far the value may lie from the nominal one; U is "
-    "compared with half of the whole zone."
+    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± its standard "
+    f"uncertainty. U: expanded uncertainty (95 %), by all that is not exactly known. {PART} limited by: what adds most "
+    "to U, and its share of U²."
 )
 
 
 @dataclass(frozen=True)
 class Line:
-    """A requirement as text; ``part`` is U over half of the tolerance zone, for the bar, at most 1."""
+    """A requirement as text; ``part`` is U over half of the tolerance zone, for the bar, at most 1; ``fails``: as of
+    its grade."""
 
     number: int
     look: Look
     cells: tuple[str, ...]
     part: float | None
-    why: str
+    fails: bool
 
 
-def lines(found: Sequence[Requirement]) -> list[Line]:
-    """One a requirement; ``cells`` from its name on, as `COLUMNS`."""
+def lines(found: Sequence[Requirement], *, units: bool = True) -> list[Line]:
+    """One a requirement, those that fail first; ``cells`` from its name on, as `COLUMNS`, each with its unit, or with
+    ``units`` off the nominal value alone."""
+    worst = [each for grade in (Grade.DOUBT, Grade.OVER) for each in found if each.grade == grade]
     return [
-        Line(each.number, LOOKS[each.grade], _cells(each), None if each.ratio is None else min(each.ratio, 1.0),
-             MEANINGS[each.status] if each.grade == Grade.DOUBT else "")
-        for each in found
+        Line(each.number, LOOKS[each.grade], _cells(each, each.unit if units else ""),
+             None if each.ratio is None else min(each.ratio, 1.0), each.grade.fails)
+        for each in (*worst, *(each for each in found if not each.grade.fails))
     ]  # fmt: skip
+
+
+def note(found: Sequence[Requirement], terms: str = NOTE) -> str:
+    """What the columns mean, and the names and the order of the rows where these need it."""
+    told = [terms]
+    if any(each.title != each.name for each in found):
+        told.append("x, y: distances of a position from its first and its second datum edge.")
+    fails = [each.grade.fails for each in found]
+    if fails != sorted(fails, reverse=True):
+        told.append("What fails comes first.")
+    return " ".join(told)
 
 
 def table(found: Sequence[Requirement]) -> Table:
     """The same for Markdown."""
     rows = [[str(line.number), *line.cells] for line in lines(found)]
-    return Table("Requirements", ["no.", *COLUMNS[1:]], rows, NOTE)
+    return Table("Requirements", ["no.", *COLUMNS[1:]], rows, note(found))
 
 
-def _cells(each: Requirement) -> tuple[str, ...]:
+def _cells(each: Requirement, unit: str) -> tuple[str, ...]:
     places = decimals(each.sigma) if math.isfinite(each.sigma) else 3
     part = "-" if each.ratio is None else cells.percent(each.ratio)
-    result = f"{each.grade}: {each.status}" if each.grade == Grade.DOUBT else str(each.grade)
+    doubtful = each.grade == Grade.DOUBT
+    sigma = "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}"
+    whole = "-" if each.U is None or doubtful else f"{each.U:.{decimals(each.U)}f}"
     return (
-        each.name, _nominal(each), cells.zone(each.tolerance),
-        "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}",
-        _bias(each, places), "-" if each.U is None or each.grade == Grade.DOUBT else f"{each.U:.{decimals(each.U)}f}",
-        part, result, each.limits or "-",
+        each.title, cells.united(f"{each.nominal:.6g}", each.unit), cells.united(cells.zone(each.tolerance), unit),
+        cells.united(sigma, unit), _bias(each, places, unit), cells.united(whole, unit),
+        part, f"{each.grade}: {each.status}" if doubtful else str(each.grade), each.limits or "-",
     )  # fmt: skip
 
 
-def _nominal(each: Requirement) -> str:
-    return f"{each.nominal:.6g}" + ("°" if each.unit == "degrees" else f" {each.unit}")
-
-
-def _bias(each: Requirement, places: int) -> str:
+def _bias(each: Requirement, places: int, unit: str = "") -> str:
+    """With its standard uncertainty, the unit once at the end."""
     if each.bias is None:
         return "not known"
     told = f"{each.bias:+.{places}f}"
     told = "0" if float(told) == 0 else told
     if each.u_bias is None:
-        return told
+        return cells.united(told, unit)
     if not math.isfinite(each.u_bias):
-        return f"{told} ± not known"
+        return f"{cells.united(told, unit)} ± not known"
     beside = f"{each.u_bias:.{places}f}"
-    return f"{told}, ± less than {10**-places:.{places}f}" if float(beside) == 0 else f"{told} ± {beside}"
+    if float(beside) == 0:
+        return f"{told}, ± less than {cells.united(f'{10**-places:.{places}f}', unit)}"
+    return f"{told} ± {cells.united(beside, unit)}"

@@ -27,6 +27,7 @@ from validation.report.requirements import Grade, Requirement
 _BAND, _PITCH = 0.34, 0.36  # inches: of the rim in which balloons stand, and from one to the next
 _TALLEST = 5.5  # inches, of the picture in it
 _MOST_PX = 900  # of the picture's longer side
+_SOFT = 2  # times that a pixel is enlarged, from which on edges look soft
 _CHORDS = 72
 _TIED = np.array([0.5, 0.35, 0.65, 0.2, 0.8])  # of what lies between two features: where a balloon may be tied
 
@@ -141,7 +142,7 @@ def draw(
     """
     part = preview.window(picture.scene, picture)
     grey = preview.drawn(picture.scene, picture, part) if image is None else _cut(picture, image, part)
-    scale = min((WIDTH - 2 * _BAND) / part.width, _TALLEST / part.height)
+    scale = _scale(part)
     size = np.array([part.width, part.height]) * scale
     figure = plt.figure(figsize=(WIDTH, size[1] + 2 * _BAND))
     left = (WIDTH - size[0]) / 2
@@ -160,6 +161,19 @@ def draw(
     for each, mark, anchor, spot in zip(found, drawn, anchors, spots, strict=True):
         _requirement(axis, each, [placed(line) for line in mark.lines], anchor, spot)
     return inline(figure, key, label)
+
+
+def enlarged(picture: Picture) -> str:
+    """What is to be said of a picture of few pixels, each of which is drawn large; of others nothing."""
+    times = 96 * _scale(preview.window(picture.scene, picture))
+    if times < _SOFT:
+        return ""
+    return f" Each pixel of the camera is drawn about {times:.0f} times as large, so edges look soft."
+
+
+def _scale(part: preview.Window) -> float:
+    """Inches of a pixel of the camera."""
+    return min((WIDTH - 2 * _BAND) / part.width, _TALLEST / part.height)
 
 
 def _cut(picture: Picture, image: np.ndarray, part: preview.Window) -> np.ndarray:

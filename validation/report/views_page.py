@@ -18,16 +18,16 @@ from scenes import Picture
 from scenes.results import finite
 from validation.report import cells, map_figure, page, station_table, station_view
 from validation.report.canvas import TEXT, WIDTH, inline
-from validation.report.grades import LOOKS
+from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
-from validation.report.requirements import Requirement, next_step, sentence, what, wrong
+from validation.report.requirements import Requirement
+from validation.report.wording import need, next_step, sentence, what, wrong
 
 _P = 0.95
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
 _NOTE = (
-    "sigma: standard deviation of the combined value, by noise. U: 95 %, of noise alone. taken from: by inverse "
-    "variance from these pictures. tolerance: how far the value may lie from the nominal one; U is compared with half "
-    "of the whole zone."
+    "sigma: standard deviation of the combined value, by noise. bias: mean error of it. U: 95 %, of noise alone. "
+    f" {station_table.PART} taken from: by inverse variance from these pictures."
 )
 
 
@@ -36,15 +36,17 @@ def write(found: planner.Views, path: Path) -> Path:
     scene, last = found.scene, found.sets[-1]
     asked = requirements(last)
     first = {
-        "what": f"{what(asked)} on this part, numbered in the pictures, from {_pictures(len(last.views))} together. "
+        "what": f"{what(asked)}, numbered in the pictures, from {_pictures(len(last.views))} together. "
         f"{page.SIMULATED}",
         "sentence": sentence(asked), "wrong": wrong(asked), "next": next_step(asked),
+        "need": need(asked), "checked": "", "is_sky": True,
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),
         "caption": "What is taken from each picture, as the camera sees it. Drawn from the model: no shadows.",
-        "key": [(grade, LOOKS[grade]) for grade in dict.fromkeys(each.grade for each in asked)],
-        "columns": (*station_table.COLUMNS[:-1], "taken from"), "lines": station_table.lines(asked), "note": _NOTE,
+        "key": [(MEANS[grade], LOOKS[grade]) for grade in dict.fromkeys(each.grade for each in asked)],
+        "columns": (*station_table.COLUMNS[:-1], "taken from"), "lines": station_table.lines(asked),
+        "note": station_table.note(asked, _NOTE),
     }  # fmt: skip
     sections = [
         page.Section("Where they stand", tables=[_poses(last)]),
@@ -103,7 +105,7 @@ def _view(found: planner.Views, number: int, asked: tuple[Requirement, ...]) -> 
     view, used = last.views[number], last.combination.used[number]
     picture = Picture.of(found.scene, view.sensor, view.light)
     shown = [each if taken else None for each, taken in zip(asked, used, strict=True)]
-    names = "; ".join(f"{each.number} {each.name}: {each.grade}" for each in shown if each)
+    names = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in shown if each)
     label = f"Picture {number + 1}: {names or 'nothing is taken from it'}."
     return station_view.draw(picture, shown, None, label, f"view{number + 1}")
 

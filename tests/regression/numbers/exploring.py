@@ -35,7 +35,7 @@ class Tools:
     async def quickly(self, work, *arguments):
         return work(*arguments)
 
-    slowly = quickly
+    slowly = aside = quickly
 
     async def variant(self):
         return "scalar_rgb"

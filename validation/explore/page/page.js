@@ -116,6 +116,7 @@ const take = {
     scene = { ...message, solid: new Solid(message) };
     if (state === null) state = message.state;
     Object.assign(view, { scene, state });
+    if (state.sensor[0] > 90) view.tilt = -Math.abs(view.tilt); // seen from where the camera is
     $("title").textContent = `${scene.name}: ${scene.title}`;
     $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${each.name} (${each.kind})`, i)));
     $("prove").firstChild.textContent = `Prove it with ${scene.renders} images `;

@@ -60,6 +60,9 @@ export class View {
       ...this.state.lights.map((p, i) => ({ which: i, name: this.state.lights.length > 1 ? `lamp ${i + 1}` : "lamp", pose: p }))];
   }
 
+  // whether something stands below the horizon: then all of the sphere has to be seen
+  low() { return this.things().some(({ pose: [polar] }) => polar > 90); }
+
   // where a thing is drawn, in px of the page
   spot(which) {
     const box = this.canvas.getBoundingClientRect();
@@ -75,7 +78,7 @@ export class View {
       .filter(({ away }) => away < GRAB).sort((a, b) => (b.at[2] > 0) - (a.at[2] > 0) || a.away - b.away)[0];
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.style.cursor = "grabbing";
-    this.drag = near ? { which: near.each.which, front: near.at[2] >= 0, dx: near.at[0] - x, dy: near.at[1] - y } : { x, y };
+    this.drag = near ? { which: near.each.which, front: near.at[2] >= 0, dx: near.at[0] - x, dy: near.at[1] - y, low: near.each.pose[0] > 90 } : { x, y };
     if (near) this.chosen(near.each.which);
   }
 
@@ -84,7 +87,7 @@ export class View {
     const [x, y] = [event.offsetX, event.offsetY];
     if (this.drag.which === undefined) {
       this.turn -= 0.5 * (x - this.drag.x);
-      this.tilt = Math.min(Math.max(this.tilt + 0.5 * (y - this.drag.y), -10), 90);
+      this.tilt = Math.min(Math.max(this.tilt + 0.5 * (y - this.drag.y), this.low() ? -90 : -10), 90);
       Object.assign(this.drag, { x, y });
       this.draw();
       return;
@@ -95,7 +98,7 @@ export class View {
     if (long > 1) { u /= long; v /= long; }
     const w = Math.sqrt(Math.max(0, 1 - u * u - v * v)) * (this.drag.front ? 1 : -1);
     const to = pose([0, 1, 2].map((k) => u * axes[0][k] + v * axes[1][k] + w * axes[2][k]));
-    this.moved(this.drag.which, [Math.min(to[0], 90), to[1]], false);
+    this.moved(this.drag.which, [Math.min(to[0], this.drag.low ? 180 : 90), to[1]], false);
   }
 
   up() {
@@ -116,7 +119,8 @@ export class View {
     this.canvas.style.height = `${high}px`;
     this.canvas.width = wide * ratio;
     this.canvas.height = high * ratio;
-    Object.assign(this, { cx: wide / 2, cy: 0.6 * high, scale: Math.min(0.43 * wide, 0.54 * high) });
+    const low = this.low();
+    Object.assign(this, { cx: wide / 2, cy: (low ? 0.5 : 0.6) * high, scale: Math.min(0.43 * wide, (low ? 0.44 : 0.54) * high) });
     const pen = this.canvas.getContext("2d"), axes = this.axes();
     pen.scale(ratio, ratio);
     this.labels = new Labels(pen, wide, high);
