@@ -28,15 +28,17 @@ from measure import Correction, Images
 from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from render import Quality, Tolerance
+from render import variant as variants
 from render.build import MANY_WAYS
-from render.large import near_required
+from render.large import LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
 from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
-_ROUGH, _LEAST, _MOST = 4, 3, 6  # renders of other rays: with few rays, with all; two often agree by chance
+_PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
+_ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
@@ -61,6 +63,11 @@ class How:
     def compared(self) -> How:
         """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
         return replace(self, quality=replace(self.quality, **_ALIKE))
+
+    @property
+    def by_pixel(self) -> bool:
+        """Whether rays are random pixel by pixel: in compiled variants all fine pixels share one table."""
+        return (self.variant or variants.choose()).startswith("scalar")
 
     def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
         """Where something is measured, with rays of another seed, counted from the quality's."""
@@ -89,7 +96,7 @@ def steadied(picture: Picture, image: np.ndarray, method: Method, how: How = How
     if not how.active(picture) & MANY_WAYS:
         return (image,)
     pair = image, how.image(picture, _OTHERS)
-    found = measure.correction(Images(pair), picture, method.locator, method.threshold)
+    found = measure.correction(Images(pair, by_pixel=how.by_pixel), picture, method.locator, method.threshold)
     known = np.isfinite(found.sigma) & (found.sigma > 0)  # what can be measured
     noise = np.sqrt(2) * found.sources[RENDERING][known] / (_QUIET * found.sigma[known])
     most = max(noise[np.isfinite(noise)], default=0.0)
@@ -144,8 +151,9 @@ def of_render(
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
-    Where light takes random ways, four renders of few rays do if their noise is below a tenth of sigma or a hundredth
-    of the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
+    Where light takes random ways, four renders of few rays do, or two of a large image, if their noise is below a tenth
+    of sigma or a hundredth of the tolerance; else of all rays, and renders of other rays are added until it is, six at
+    most.
     """
     return _simulated(picture, method, how)
 
@@ -172,14 +180,15 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     def of(images: Images, told: PropagatedValues | None = None) -> Correction:
         return measure.correction(images, picture, *asked, told)
 
-    images: Images | None = None
+    camera, images = picture.scene.camera, None
+    pair = how.by_pixel and camera.width * camera.height > LARGE_RANDOM  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
-        few = tuple(how.rough.image(picture, seed) for seed in range(_ROUGH))
+        few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
         images = _completed(picture, few, (), how)
         found = of(images)
         if _is_quiet(found):
             return found
-    renders = tuple(how.image(picture, seed) for seed in range(_LEAST))
+    renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
@@ -223,7 +232,7 @@ def _completed(
     else:
         direct = partial(alike.direct, active=how.active(picture))
         changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
-    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 
 
 def _steps(
