@@ -47,12 +47,17 @@ _ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 
 
 @dataclass(frozen=True)
 class How:
-    """How noise-free images are made: as `render.image` takes it."""
+    """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too."""
 
     quality: Quality = Quality()
     variant: str | None = None
     effects: str = "auto"
     tolerance: Tolerance = Tolerance()
+    everywhere: bool = False
+
+    def by(self, *methods: Method) -> How:
+        """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
+        return replace(self, everywhere=not all(measure.ESTIMATORS[each.locator].local for each in methods))
 
     @property
     def rough(self) -> How:
@@ -70,7 +75,7 @@ class How:
         return (self.variant or variants.choose()).startswith("scalar")
 
     def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
-        """Where something is measured, with rays of another seed, counted from the quality's."""
+        """With rays of another seed, counted from the quality's."""
         return self._rendered(picture, self.effects, seed)
 
     def active(self, picture: Picture) -> frozenset[str]:
@@ -82,7 +87,7 @@ class How:
         return self._rendered(picture, active - {_BETWEEN}, 0)
 
     def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
-        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=False)
+        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=self.everywhere)
         return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
 
 
@@ -131,6 +136,7 @@ def independent(
     propagated : tuple of PropagatedValues
         What `measure.propagate` says of their mean, by method.
     """
+    how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
     images = _completed(picture, others, measured, how)
     return tuple(
@@ -143,7 +149,7 @@ def of_render(
     picture: Picture, method: Method, image: np.ndarray, propagated: PropagatedValues, how: How = How()
 ) -> Correction:
     """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
-    images, none = _completed(picture, (image,), (), how), np.zeros(len(picture.scene.quantities))
+    images, none = _completed(picture, (image,), (), how.by(method)), np.zeros(len(picture.scene.quantities))
     images = replace(images, known={**images.known, RENDERING: (none, none)})
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
 
@@ -155,7 +161,7 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     of sigma or a hundredth of the tolerance; else of all rays, and renders of other rays are added until it is, six at
     most.
     """
-    return _simulated(picture, method, how)
+    return _simulated(picture, method, how.by(method))
 
 
 @lru_cache(maxsize=64)
