@@ -23,8 +23,8 @@ STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shad
 def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndarray | None = None) -> np.ndarray:
     """Fine pixels that differ from one of their eight neighbours, as a mask; with others within ``reach`` of them.
 
-    ``step`` is the part of the brightest pixel that they must differ by. Only pixels of the mask ``where`` are asked, all
-    if it is not given.
+    ``step`` is the part of the brightest pixel that they must differ by. Only pixels of the mask ``where`` are asked,
+    all if it is not given.
 
     >>> crossed(np.array([[0.0, 0, 0, 1, 1, 1]])).astype(int)
     array([[0, 0, 1, 1, 0, 0]])

@@ -8,12 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import camera_frame, sensor_position
-from imaging.geometry.rays import first_face
+from imaging.geometry.looked_at import looked_at
 from scenes import Picture
 
-_MARGIN = 1e-7  # of the part's size: what passes a triangle's side more closely is decided in double precision
 _UP = 1 - 1e-9  # cosine to the vertical
 
 
@@ -34,14 +31,9 @@ def lent_to(picture: Picture, marked: np.ndarray, start: tuple[int, int], supers
     -------
     ndarray of bool, as ``marked``
     """
-    bodies, camera, sensor = picture.scene.bodies, picture.scene.camera, np.array(list(picture.sensor))
-    asked = maximum_filter(marked, 3)
+    bodies, asked = picture.scene.bodies, maximum_filter(marked, 3)
     pixels = np.argwhere(asked)
-    down, right = ((pixels + start + 0.5) / supersample - 0.5 - image_centre(camera)[::-1]).T
-    axes = camera_frame(camera, sensor)
-    ways = camera.focal_px * axes.forward + right[:, None] * axes.right + down[:, None] * axes.down
-    origins = np.broadcast_to(sensor_position(camera, sensor), ways.shape)
-    face, _ = first_face(bodies, origins, ways, (), margin=_MARGIN)
+    face, _ = looked_at(picture, ((pixels + start + 0.5) / supersample - 0.5)[:, ::-1])
     lent = np.append(~bodies.outer, False)  # the last is what no body is seen in: darkness
     if picture.scene.bright_floor is not None:
         lent[:-1] |= bodies.normals[:, 2] < _UP

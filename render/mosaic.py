@@ -91,7 +91,7 @@ def _held(marked: np.ndarray, side: int) -> np.ndarray:
 
 
 def _halved(marked: np.ndarray) -> np.ndarray:
-    """Which squares of two by two hold a marked pixel; bytes are taken in pairs, for masks of a large image are many."""
+    """Which squares of two by two hold a marked pixel, by pairs of bytes: masks of large images are asked often."""
     padded = np.pad(marked, [(0, size % 2) for size in marked.shape])
     rows = padded[::2] | padded[1::2]
     return rows.view(np.uint16) != 0

@@ -1,7 +1,8 @@
 """The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
 
-Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
-rays, and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
+Reflectances change what light does between faces, and contrasts. Where there is one material, what it does is told by
+the render itself, less its direct light (`validation.dimmed`); else each is rendered reflecting less, with few rays,
+and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
 which is rendered anew alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
 compared have the same rays, one by one, or their difference would be noise. All of them are made where something is
 measured, and with few rays first: where the noise of these is far below sigma or the tolerance, more rays would tell
@@ -33,6 +34,7 @@ from render.build import MANY_WAYS
 from render.large import LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
+from validation.dimmed import of_one_surface
 from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = "reflectance", "light_place"
@@ -138,7 +140,7 @@ def independent(
     """
     how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
-    images = _completed(picture, others, measured, how)
+    images = _completed(picture, others, measured, how, how)
     return tuple(
         measure.correction(images, picture, each.locator, each.threshold, told)
         for each, told in zip(methods, propagated, strict=True)
@@ -149,7 +151,8 @@ def of_render(
     picture: Picture, method: Method, image: np.ndarray, propagated: PropagatedValues, how: How = How()
 ) -> Correction:
     """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
-    images, none = _completed(picture, (image,), (), how.by(method)), np.zeros(len(picture.scene.quantities))
+    how = how.by(method)
+    images, none = _completed(picture, (image,), (), how, how), np.zeros(len(picture.scene.quantities))
     images = replace(images, known={**images.known, RENDERING: (none, none)})
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
 
@@ -190,12 +193,12 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     pair = how.by_pixel and camera.width * camera.height > LARGE_RANDOM  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
-        images = _completed(picture, few, (), how)
+        images = _completed(picture, few, (), how, how.rough)
         found = of(images)
         if _is_quiet(found):
             return found
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
-    images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
+    images = _rebased(images, renders) if images else _completed(picture, renders, (), how, how)
     told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
@@ -229,23 +232,30 @@ def _completed(
     renders: tuple[np.ndarray, ...],
     beside: tuple[np.ndarray, ...],
     how: How,
+    made: How,
 ) -> Images:
-    """With the images, or numbers, of what the scene is not sure of."""
-    first, known, alike = renders[0], _of_unknown_kinds(picture), how.compared
-    changed = {REFLECTANCE: _steps(first, alike.image, picture, _of_other_surfaces(picture))}
+    """With the images, or numbers, of what the scene is not sure of; the renders are ``made`` so."""
+    first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
+    dimmed = None
+    if active & MANY_WAYS == {_BETWEEN}:
+        alone = partial(made.direct, picture, active)
+        dimmed = of_one_surface(picture, first, alone, _u(picture.scene.uncertainty.reflectance))
+    if dimmed is None:
+        others = _steps(first, alike.image, _of_other_surfaces(picture), picture)
+    changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
-        direct = partial(alike.direct, active=how.active(picture))
-        changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
+        direct = partial(alike.direct, active=active)
+        changed[LIGHT] = _steps(first, direct, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 
 
 def _steps(
     first: np.ndarray,
     made: Callable[[Picture], np.ndarray],
-    picture: Picture,
     others: Iterable[Picture],
+    picture: Picture,
 ) -> tuple[np.ndarray, ...]:
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
     changed = [made(other) for other in others]

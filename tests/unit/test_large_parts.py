@@ -74,7 +74,8 @@ def test_bounced_light_is_added_to_direct_light_in_whole_pixels(monkeypatch):
     whole = direct.reshape(SIZE[0], K, SIZE[1], K).mean((1, 3))
     renders = Renders(lambda is_random, rays: whole, again, K, True, False, bounced)
     found = fine_pixels(None, None, renders, 0, RAYS)
-    assert found == pytest.approx(direct + sent.repeat(K, 0).repeat(K, 1))
+    seen = near.repeat(K, 0).repeat(K, 1)
+    assert found == pytest.approx(np.where(seen, direct, 0.0) + sent.repeat(K, 0).repeat(K, 1))
     assert asked == [4, 16]
     assert (counts[8:12, 18:23] == 16).all()
     assert (counts[12:, :] <= 4).all()
