@@ -203,18 +203,20 @@ def test_a_run_on_a_mesh_beside_its_scene_is_reported_from_elsewhere(tmp_path, m
     (here / "plate.ply").write_bytes((BUNDLED / "plate.ply").read_bytes())
     (here / "mine.toml").write_text((BUNDLED / "plate.toml").read_text())
     monkeypatch.chdir(here)
-    run = RunFile(tmp_path / "run", {"campaign": Campaign.of(scenes.load("mine.toml")).model_dump(mode="json")})
-    run.close()
+    campaign = Campaign.of(scenes.load("mine.toml")).model_dump(mode="json", by_alias=True)
+    others = {"seed": 0, "renders": 2, "chunk": 2, "variant": "scalar_rgb", "effects": "auto", "code": "0"}
+    identity = others | {"campaign": campaign} | dict.fromkeys(("quality", "tolerance", "versions"), {})
+    RunFile(tmp_path / "run", identity).close()
     monkeypatch.chdir(there)
     again = RunFile.reopen(tmp_path / "run")
     found = again.campaign().scenes[0].solid
     again.close()
     assert (found.vertices == scenes.load("plate").solid.vertices).all()
-    monkeypatch.setattr(RunFile, "fact", lambda self, key, default=None: _fact(self, key) or default)
+    monkeypatch.setattr(RunFile, "fact", lambda self, key, default=None: _fact(self, key, default))
     with pytest.raises(scenes.InvalidInput, match=r"object.file must be a readable mesh, got plate.ply"):
         RunFile.reopen(tmp_path / "run").campaign()
 
 
-def _fact(store, key, read=RunFile.fact):
+def _fact(store, key, default, read=RunFile.fact):
     """Of a run that does not say where it was started."""
-    return None if key == "directory" else read(store, key)
+    return default if key == "directory" else read(store, key, default)
