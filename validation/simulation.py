@@ -5,8 +5,8 @@ the render itself, less its direct light (`validation.dimmed`); else each is ren
 and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
 which is rendered anew alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
 compared have the same rays, one by one, or their difference would be noise. All of them are made where something is
-measured, and with few rays first: where the noise of these is far below sigma or the tolerance, more rays would tell
-nothing.
+measured (everywhere for estimators that look farther), and with few rays first: where the noise of these is far below
+sigma or the tolerance, more rays would tell nothing.
 """
 
 from __future__ import annotations

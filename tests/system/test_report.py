@@ -205,7 +205,7 @@ def test_a_run_on_a_mesh_beside_its_scene_is_reported_from_elsewhere(tmp_path, m
     monkeypatch.chdir(here)
     campaign = Campaign.of(scenes.load("mine.toml")).model_dump(mode="json", by_alias=True)
     others = {"seed": 0, "renders": 2, "chunk": 2, "variant": "scalar_rgb", "effects": "auto", "code": "0"}
-    identity = others | {"campaign": campaign} | dict.fromkeys(("quality", "tolerance", "versions"), {})
+    identity = others | {"campaign": campaign} | {key: {} for key in ("quality", "tolerance", "versions")}
     RunFile(tmp_path / "run", identity).close()
     monkeypatch.chdir(there)
     again = RunFile.reopen(tmp_path / "run")

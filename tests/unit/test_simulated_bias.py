@@ -354,3 +354,31 @@ def test_a_material_that_cannot_tell_how_it_reflects_less_leaves_the_bias_unknow
         assert (found == {}) == plain
         if not plain:
             assert [each.tolist() for each in found["reflectance"]] == [[np.inf] * len(scene.quantities)] * 2
+
+
+@pytest.mark.parametrize(
+    ("estimators", "everywhere"),
+    [
+        (("gradient", "isophote", "canny"), False),
+        (("strip",), True),
+        (("arrangement",), True),
+        (("canny", "strip"), True),
+    ],
+)
+def test_what_is_measured_from_afar_is_simulated_everywhere(estimators, everywhere):
+    assert How().by(*map(Method, estimators)).everywhere is everywhere
+
+
+@pytest.mark.parametrize(
+    ("width", "variant", "count"), [(96, "scalar_rgb", 4), (2448, "scalar_rgb", 2), (2448, "llvm_mono", 4)]
+)
+def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width, variant, count, monkeypatch):
+    """Of a small image four are cheap; of a compiled variant the pixels have random numbers in common."""
+    asked, size, quiet = [], {"width": width, "height": width}, {"rendering": np.array([0.01])}
+    camera = picture.scene.camera.model_copy(update=size)
+    large = picture.with_scene(picture.scene.model_copy(update={"camera": camera}))
+    monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
+    monkeypatch.setattr(simulation, "_completed", lambda picture, renders, *given: asked.append(renders))
+    monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
+    simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    assert asked == [tuple(range(count))]
