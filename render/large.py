@@ -108,17 +108,20 @@ def fine_pixels(
         divided, asked = _fine(near, k), _fine(~maximum_filter(~near, 3), k)  # beside what is dark there is a step
     fine = renders.again(False, _fine(first, k), divided, ordinary)
     marked, near = crossed(fine, reach, where=asked) & divided, _fine(near, k)
+    lent = near if renders.lent_to is None or not renders.random else renders.lent_to(near)
     if renders.random:
         fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
         even, moving = near & ~marked, True
-        if renders.lent_to is not None and not renders.everywhere:  # elsewhere direct light is known, of fine pixels
-            even = renders.lent_to(even)
+        if not renders.everywhere:  # of fine pixels the direct light is known
+            even = even & lent
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
             moving = _fine(near_required(picture, crop, k, _MOVING), k)
         fine = _with_random(renders, fine, even & moving, even & ~np.asarray(moving), few)
     if renders.everywhere:
         fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
-    fine = _with_edges(renders, fine, marked & near, many)
+    direct = marked & near & ~lent
+    fine = renders.again(False, fine, direct, many) if direct.any() else fine
+    fine = renders.again(renders.random, fine, marked & lent, many)
     beside = near & ~marked & maximum_filter(marked, 3)  # elsewhere it is noise
     missed = crossed(fine, step=MISSED, where=beside)
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
@@ -137,14 +140,6 @@ def _with_random(renders: Renders, fine: np.ndarray, moving: np.ndarray, still: 
     """The image with fine pixels that no edge crosses; fewer rays of those whose noise moves no edge."""
     fine = renders.again(True, fine, moving, rays)
     return renders.again(True, fine, still, max(math.isqrt(rays) // _FEWER, 1) ** 2) if still.any() else fine
-
-
-def _with_edges(renders: Renders, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
-    """The image with fine pixels that an edge crosses, where nothing random is seen of direct light alone."""
-    if not renders.random or renders.lent_to is None:
-        return renders.again(renders.random, fine, marked, rays)
-    random = renders.lent_to(marked)
-    return renders.again(True, renders.again(False, fine, marked & ~random, rays), random, rays)
 
 
 def _fine(pixels: np.ndarray, supersample: int) -> np.ndarray:
