@@ -19,6 +19,7 @@ from imaging.sensor import recorded
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
 from measure.quantities import Found, find
+from measure.render_noise import by_features, by_pixels
 from scenes import InvalidInput, Picture, Quantity
 from scenes.status import MEASURED
 from scenes.status import corrected as status_corrected
@@ -122,12 +123,15 @@ class Images:
         Renders of other rays that say how large the renderer's noise is, and nothing of the bias.
     known : dict of str to pair of ndarray, shape (M,)
         Standard uncertainties of sources that need no image, in the object and in the image.
+    by_pixel : bool
+        Whether rays are random pixel by pixel, so that two renders' pixels tell how noisy they are.
     """
 
     renders: tuple[np.ndarray, ...]
     changed: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     beside: tuple[np.ndarray, ...] = ()
     known: Mapping[str, Pair] = field(default_factory=dict)
+    by_pixel: bool = False
 
 
 def correction(
@@ -160,19 +164,19 @@ def correction(
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
     told = propagated or propagate(images.renders[0], picture, estimator=estimator, threshold=threshold).measurands
     steps = [(name, image) for name, some in images.changed.items() for image in some]
-    stack = [*images.renders, *images.beside, *(image for _, image in steps)]
-    value, value_image, found = _measured(stack, picture, estimator, threshold)
+    levels = _levels((*images.renders, *images.beside, *(image for _, image in steps)), picture)
+    value, value_image, found = _measured(levels, picture, estimator, threshold)
     renders, alike = len(images.renders), len(images.renders) + len(images.beside)
     known = measurands(Pictures.of(picture))
     bias, bias_image = value[:renders].mean(0) - known.value_object, value_image[:renders].mean(0) - known.value
-    noise = _noise_of_renders(found, alike)
+    noise = _noise(images, picture, told, levels[:alike], found, (value[:alike], value_image[:alike]))
     object_, image = (
         {
-            **_by_rays(each[:alike], renders, _scaled(noise, spread)),
+            RENDERING: noise[k] / np.sqrt(renders),
             **_by_steps([name for name, _ in steps], each[alike:] - each[0]),
             **{name: pair[k] for name, pair in images.known.items()},
         }
-        for k, (each, spread) in enumerate(((value, told.covariance), (value_image, told.covariance_image)))
+        for k, each in enumerate((value, value_image))
     )
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
@@ -180,58 +184,68 @@ def correction(
     )  # fmt: skip
 
 
+def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
+    """What the sensor records of noise-free images, (n, height, width)."""
+    camera = picture.scene.camera
+    size = camera.height, camera.width
+    return np.stack([recorded(picture.scene.noise, checked_image(image, size))[0] for image in images])
+
+
 def _measured(
-    stack: list[np.ndarray], picture: Picture, estimator: str, threshold: float | None
+    levels: np.ndarray, picture: Picture, estimator: str, threshold: float | None
 ) -> tuple[np.ndarray, np.ndarray, Found]:
     """Values (n, M) in n noise-free images, in the object and in the image, NaN where there is none, and features."""
-    camera, noise = picture.scene.camera, picture.scene.noise
-    size = camera.height, camera.width
-    found = find(
-        np.stack([recorded(noise, checked_image(image, size))[0] for image in stack]), picture, estimator, threshold
-    )
+    found = find(levels, picture, estimator, threshold)
     measured = np.isin(found.status, MEASURED)
     return np.where(measured, found.plane.value, np.nan), np.where(measured, found.image.value, np.nan), found
 
 
-def _by_rays(values: np.ndarray, renders: int, pooled: np.ndarray) -> dict[str, np.ndarray]:
-    """Standard uncertainty of the mean of the first ``renders`` of values (n, M) by the renderer's noise.
+def _noise(
+    images: Images, picture: Picture, told: PropagatedValues, levels: np.ndarray, found: Found, values: Pair
+) -> Pair:
+    """Standard deviations (M,) by the noise of one render, in the object and in the image.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (n, height, width)
+        Of images that differ by rays alone.
+    values : pair of ndarray, shape (n, M)
+        Measured in them.
+    """
+    spreads, count = (told.covariance, told.covariance_image), len(levels)
+    if count < 2:
+        unknown = np.full(values[0].shape[1], np.inf)
+        return unknown, unknown
+    if images.by_pixel and told.response is not None and told.response_image is not None:
+        blur, responses = picture.scene.camera.blur_px, (told.response, told.response_image)
+        first, second = (by_pixels(levels, response, blur) for response in responses)
+        return _where_known(first, spreads[0]), _where_known(second, spreads[1])
+    part = by_features(found, count)
+    first, second = (
+        _with_pooled(value, _where_known(part * _sigmas(spread), spread))
+        for value, spread in zip(values, spreads, strict=True)
+    )
+    return first, second
+
+
+def _with_pooled(values: np.ndarray, pooled: np.ndarray) -> np.ndarray:
+    """Standard deviations of values (n, M).
 
     Few renders tell the scatter of one quantity badly: it counts as no less than what all lines and circles together
     tell, ``pooled`` (M,).
     """
-    if len(values) < 2:
-        return {RENDERING: np.full(values.shape[1], np.inf)}
-    return {RENDERING: np.fmax(values.std(0, ddof=1), pooled) / np.sqrt(renders)}
+    return np.fmax(values.std(0, ddof=1), pooled)
 
 
-def _scaled(noise: float, covariance: np.ndarray) -> np.ndarray:
-    """A part of the standard deviations of a covariance (M, M); infinite where there is no value."""
+def _sigmas(covariance: np.ndarray) -> np.ndarray:
+    """Standard deviations (M,) of a covariance; 0 where there is no value."""
     variance = np.diag(covariance)
-    known = np.isfinite(variance)
-    return np.where(known, noise * np.sqrt(np.where(known, variance, 1.0)), np.inf)
+    return np.sqrt(np.where(np.isfinite(variance), variance, 0.0))
 
 
-def _noise_of_renders(found: Found, alike: int) -> float:
-    """Scatter of lines and circles over the first images, which differ by rays alone, over that by the camera's noise.
-
-    Root mean square of all their parameters, each feature's made independent by its own covariance; 0 of one image,
-    infinite where no feature is found in all of them.
-    """
-    shape, features = found.shape, []
-    across = np.stack([-shape.normals[..., 1], shape.normals[..., 0]], -1)
-    offset = np.einsum("nej,ej->ne", shape.points - shape.points[0], shape.normals[0])
-    turn = np.einsum("nej,ej->ne", shape.normals, across[0])
-    for e in range(shape.normals.shape[1]):
-        some = slice(2 * e, 2 * e + 2)
-        features.append((np.stack([offset[:, e], turn[:, e]], -1), shape.lines[0, some, some]))
-    features += [(circle.errors, circle.covariance[0]) for circle in found.circles]
-    squares, count = 0.0, 0
-    for moved, covariance in features:
-        if alike > 1 and np.isfinite(moved[:alike]).all() and np.isfinite(covariance).all():
-            away = moved[:alike] - moved[:alike].mean(0)
-            squares += float(np.einsum("ni,ij,nj", away, np.linalg.pinv(covariance, hermitian=True), away))
-            count += away.shape[1] * (alike - 1)
-    return float(np.sqrt(squares / count)) if count else (0.0 if alike == 1 else np.inf)
+def _where_known(deviations: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Standard deviations (M,); infinite where a covariance (M, M) has no value."""
+    return np.where(np.isfinite(np.diag(covariance)), deviations, np.inf)
 
 
 def _by_steps(names: list[str], moved: np.ndarray) -> dict[str, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -41,6 +41,8 @@ class PropagatedValues:
     texture_variance, texture_variance_image : ndarray, shape (M,), or None
         Predicted variances over parts by statistical textures, which are no part of the covariances: they do not
         average over pictures. None where there are no textures, or the light is not known.
+    response, response_image : csr_array, shape (M, height * width), or None
+        Derivatives of the values by the pixels, of grey levels; none of a quantity that has no value.
     """
 
     value: np.ndarray
@@ -52,6 +54,8 @@ class PropagatedValues:
     status: tuple[str, ...]
     texture_variance: np.ndarray | None = None
     texture_variance_image: np.ndarray | None = None
+    response: sparse.csr_array | None = None
+    response_image: sparse.csr_array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +127,14 @@ def propagate(
         if gone and state[m] in status.MEASURED:  # an edge was only found far from its place, where another one is
             state[m] = status.ILL_CONDITIONED
     errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
-    image, plane = (_covariance(part.gradient[0], errors, state) for part in (found.image, found.plane))
+    gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
+    image, plane = (_covariance(gradient, errors, state) for gradient in gradients)
     textures = texture_errors(Pictures.of(picture)) if picture.lights else None
-    values = _values(found, image, plane, state, not photographed, textures)
+    image_response, plane_response = (sparse.csr_array(gradient) @ rows for gradient in gradients)
+    values = replace(
+        _values(found, image, plane, state, not photographed, textures),
+        response=plane_response, response_image=image_response,
+    )  # fmt: skip
     return _of_first(found, rows, errors, values, clean.shape)
 
 
@@ -167,10 +176,14 @@ def _of_lines(
     return rows
 
 
+def _of_measured(gradient: np.ndarray, state: list[str]) -> np.ndarray:
+    """Derivatives of quantities by lines and circles, (M, q), 0 of those that have no value."""
+    return np.where(np.isin(state, status.MEASURED)[:, None], np.nan_to_num(gradient), 0.0)
+
+
 def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> np.ndarray:
     measured = np.isin(state, status.MEASURED)
     lost = np.where(np.eye(len(state), dtype=bool), np.inf, np.nan)
-    gradient = np.where(measured[:, None], np.nan_to_num(gradient), 0.0)
     return np.where(measured[:, None] & measured, gradient @ errors @ gradient.T, lost)
 
 

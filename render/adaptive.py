@@ -20,17 +20,35 @@ MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed t
 STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 
 
-def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP) -> np.ndarray:
+def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndarray | None = None) -> np.ndarray:
     """Fine pixels that differ from one of their eight neighbours, as a mask; with others within ``reach`` of them.
 
-    ``step`` is the part of the brightest pixel that they must differ by.
+    ``step`` is the part of the brightest pixel that they must differ by. Only pixels of the mask ``where`` are asked,
+    all if it is not given.
 
     >>> crossed(np.array([[0.0, 0, 0, 1, 1, 1]])).astype(int)
     array([[0, 0, 1, 1, 0, 0]])
     """
-    span = maximum_filter(fine, 3, mode="nearest") - minimum_filter(fine, 3, mode="nearest")
-    marked = span > step * max(float(fine.max()), np.finfo(float).tiny)
+    least = step * max(float(fine.max()), np.finfo(float).tiny)
+    if where is None:
+        marked = maximum_filter(fine, 3, mode="nearest") - minimum_filter(fine, 3, mode="nearest") > least
+    else:
+        marked = np.zeros(fine.shape, bool)
+        marked[where] = _span(fine, where) > least
     return maximum_filter(marked, 2 * reach + 1) if reach else marked
+
+
+def _span(fine: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Largest less smallest of each marked pixel and its eight neighbours."""
+    wide = np.pad(fine, 1, mode="edge")
+    rows, columns = np.nonzero(where)
+    width, flat = wide.shape[1], wide.ravel()
+    at = (rows + 1) * width + columns + 1
+    low = high = flat[at]
+    for off in (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1):
+        beside = flat[at + off]
+        low, high = np.minimum(low, beside), np.maximum(high, beside)
+    return high - low
 
 
 def bent(fine: np.ndarray, step: float = STEP) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Images of several megapixels: many rays only where the task's edges and circles are measured from.
 
 All fine pixels of 5 megapixels are 80 million. Here a first image of whole pixels shows where brightness steps; only
-those pixels are divided. A fine pixel that an edge crosses gets all its rays where something is measured by it, and few
+those pixels are divided; if only what is measured is to be seen, pixels that nothing is measured by stay dark. A fine
+pixel that an edge crosses gets all its rays where something is measured by it, and few
 elsewhere. Where a single ray is random (interreflection, an aperture, a light of some size), pixels that nothing is
 measured by get the rays of one fine pixel.
 """
@@ -15,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from imaging.geometry.projection import project
+from imaging.geometry.projection import project, project_ideal
 from render.adaptive import MISSED, crossed, limb_pieces
 from scenes import Picture
 
@@ -41,10 +42,12 @@ class Renders:
     random : bool
         Whether there are such effects.
     everywhere : bool
-        Whether pixels that nothing is measured by are rendered with them, and divided.
+        Whether pixels that nothing is measured by are rendered, too; else they are dark.
     bounced : callable, optional
         (mask of whole pixels, rays) to the image of whole pixels of what surfaces send to each other, 0 elsewhere:
         where that alone is random and is to be added to the direct light.
+    lent_to : callable, optional
+        Mask of fine pixels to those of them that what is random may be seen in; all, if not given.
     """
 
     whole: Callable[[bool, int], np.ndarray]
@@ -53,6 +56,7 @@ class Renders:
     random: bool
     everywhere: bool = True
     bounced: Callable[[np.ndarray, int], np.ndarray] | None = None
+    lent_to: Callable[[np.ndarray], np.ndarray] | None = None
 
 
 def whole_pixels(crop: tuple[slice, slice], supersample: int) -> tuple[slice, slice]:
@@ -91,21 +95,35 @@ def fine_pixels(
     near = near_required(picture, crop, k)
     if renders.bounced is not None:
         direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, rays)
-        return direct + _fine(_bounced(renders.bounced, near, near_required(picture, crop, k, _MOVING), few), k)
-    first = renders.whole(False, ordinary)
-    divided = _fine(crossed(first, math.ceil(reach / k)) | near if renders.everywhere else near, k)
+        moving = near_required(picture, crop, k, _MOVING)
+        near = np.ones_like(near) if renders.everywhere else near
+        if renders.lent_to is not None:
+            near = _some(renders.lent_to(_fine(near, k)), k)
+        return direct + _fine(_bounced(renders.bounced, near, moving, few), k)
+    if renders.everywhere:
+        first = renders.whole(False, ordinary)
+        divided, asked = _fine(crossed(first, math.ceil(reach / k)) | near, k), None
+    else:
+        first = np.zeros(near.shape)
+        divided, asked = _fine(near, k), _fine(~maximum_filter(~near, 3), k)  # beside what is dark there is a step
     fine = renders.again(False, _fine(first, k), divided, ordinary)
-    marked, near = crossed(fine, reach) & divided, _fine(near, k)
+    marked, near = crossed(fine, reach, where=asked) & divided, _fine(near, k)
+    lent = near if renders.lent_to is None or not renders.random else renders.lent_to(near)
     if renders.random:
         fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
         even, moving = near & ~marked, True
+        if not renders.everywhere:  # of fine pixels the direct light is known
+            even = even & lent
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
             moving = _fine(near_required(picture, crop, k, _MOVING), k)
         fine = _with_random(renders, fine, even & moving, even & ~np.asarray(moving), few)
     if renders.everywhere:
         fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
-    fine = renders.again(renders.random, fine, marked & near, many)
-    missed = crossed(fine, step=MISSED) & near & ~marked & maximum_filter(marked, 3)  # elsewhere it is noise
+    direct = marked & near & ~lent
+    fine = renders.again(False, fine, direct, many) if direct.any() else fine
+    fine = renders.again(renders.random, fine, marked & lent, many)
+    beside = near & ~marked & maximum_filter(marked, 3)  # elsewhere it is noise
+    missed = crossed(fine, step=MISSED, where=beside)
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
 
 
@@ -129,6 +147,12 @@ def _fine(pixels: np.ndarray, supersample: int) -> np.ndarray:
     return pixels.astype(kind).repeat(supersample, 0).repeat(supersample, 1)
 
 
+def _some(fine: np.ndarray, supersample: int) -> np.ndarray:
+    """Whole pixels one of whose fine ones is marked."""
+    height, width = (size // supersample for size in fine.shape)
+    return fine.reshape(height, supersample, width, supersample).any((1, 3))
+
+
 def near_required(
     picture: Picture, crop: tuple[slice, slice], supersample: int, within: float | None = None
 ) -> np.ndarray:
@@ -142,7 +166,9 @@ def near_required(
     names = [piece for name in scene.required for piece in circles.get(name, (name,))]
     ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
-    places = project(places, np.array(list(picture.sensor)), scene.camera)
+    sensor = np.array(list(picture.sensor))
+    seen = (project, project_ideal) if scene.camera.lens.bends else (project,)  # rendered by a pinhole, bent after
+    places = np.concatenate([made(places, sensor, scene.camera) for made in seen])
     pieces = [np.linspace(*ends, 2 + max(shape)) for each in limbs for ends in limb_pieces(picture, each)]
     places = np.concatenate([places, *pieces])
     x, y = places[np.isfinite(places).all(1)].T

@@ -80,20 +80,28 @@ def mosaic(
 
 
 def _held(marked: np.ndarray, side: int) -> np.ndarray:
-    """Which square tiles hold a marked pixel.
+    """Which square tiles, of a side that is a power of two, hold a marked pixel.
 
     >>> _held(np.array([[0, 0, 1], [0, 0, 0]], bool), 2)
     array([[False,  True]])
     """
-    padded = np.pad(marked, [(0, -size % side) for size in marked.shape])
-    return padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side).any((1, 3))
+    while side > 1:
+        marked, side = _halved(marked), side // 2
+    return marked
+
+
+def _halved(marked: np.ndarray) -> np.ndarray:
+    """Which squares of two by two hold a marked pixel, by pairs of bytes: masks of large images are asked often."""
+    padded = np.pad(marked, [(0, size % 2) for size in marked.shape])
+    rows = padded[::2] | padded[1::2]
+    return rows.view(np.uint16) != 0
 
 
 def _side(marked: np.ndarray, samples: int, sensor: int, most: int) -> int:
     """Side, at most ``most``, of tiles that take the least time, where making a sensor takes as long as some rays."""
     held, taken = marked, {}
     for side in _SIDES:
-        held = _held(held, 2) if side > 1 else held
+        held = _halved(held) if side > 1 else held
         taken[side] = int(np.count_nonzero(held)) * (sensor + side * side * samples)
     return min((side for side in _SIDES if side <= most), key=taken.__getitem__)
 

@@ -15,6 +15,7 @@ from imaging.light.appearance import is_plain
 from imaging.light.backlight import backlights
 from render import variant as variants
 from render.adaptive import bent, crossed, near_edges, refine
+from render.between import lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.large import Renders, fine_pixels, is_large, whole_pixels
 from render.mosaic import mosaic, refine_tiles
@@ -231,12 +232,15 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
         return found[0] - found[1]
 
     if large:
-        apart = scalar and quality.alike and active - sharp == {"interreflection"}
+        between = active - sharp == {"interreflection"}
+        apart, plane = scalar and quality.alike and between, not (picture.scene.solid.curved or part.silhouette)
+        start = crop[0].start, crop[1].start
         scenes_ = {False: (load(sharp, samples, textures), sharp), True: (load(active, few), active)}
         renders = Renders(
             lambda random, count: whole(scenes_[random][1], count, None if random else textures),
             lambda random, *what: again(*scenes_[random], *what, mosaic, (quality.seed, 0)),
             k, sharp != active, quality.everywhere, bounced if apart else None,
+            (lambda marked: lent_to(picture, marked, start, k)) if between and plane else None,
         )  # fmt: skip
         return fine_pixels(picture, crop, renders, math.ceil(k * _defocus(picture)), (samples, few, many))
     loaded = load(sharp, samples, textures)

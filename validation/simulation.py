@@ -1,11 +1,12 @@
 """The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
 
-Reflectances change what light does between faces, and contrasts: each material is rendered reflecting less, with few
-rays, and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
+Reflectances change what light does between faces, and contrasts. Where there is one material, what it does is told by
+the render itself, less its direct light (`validation.dimmed`); else each is rendered reflecting less, with few rays,
+and subtracted from the same render of the scene as it is. Lights that stand elsewhere change the direct light,
 which is rendered anew alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
 compared have the same rays, one by one, or their difference would be noise. All of them are made where something is
-measured, and with few rays first: where the noise of these is far below sigma or the tolerance, more rays would tell
-nothing.
+measured (everywhere for estimators that look farther), and with few rays first: where the noise of these is far below
+sigma or the tolerance, more rays would tell nothing.
 """
 
 from __future__ import annotations
@@ -28,15 +29,18 @@ from measure import Correction, Images
 from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from render import Quality, Tolerance
+from render import variant as variants
 from render.build import MANY_WAYS
-from render.large import near_required
+from render.large import LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
+from validation.dimmed import of_one_surface
 from validation.remeasured import Method
 
 REFLECTANCE, LIGHT = "reflectance", "light_place"
 _BETWEEN = "interreflection"
-_ROUGH, _LEAST, _MOST = 4, 3, 6  # renders of other rays: with few rays, with all; two often agree by chance
+_PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
+_ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
@@ -45,12 +49,17 @@ _ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 
 
 @dataclass(frozen=True)
 class How:
-    """How noise-free images are made: as `render.image` takes it."""
+    """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too."""
 
     quality: Quality = Quality()
     variant: str | None = None
     effects: str = "auto"
     tolerance: Tolerance = Tolerance()
+    everywhere: bool = False
+
+    def by(self, *methods: Method) -> How:
+        """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
+        return replace(self, everywhere=not all(measure.ESTIMATORS[each.locator].local for each in methods))
 
     @property
     def rough(self) -> How:
@@ -62,8 +71,13 @@ class How:
         """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
         return replace(self, quality=replace(self.quality, **_ALIKE))
 
+    @property
+    def by_pixel(self) -> bool:
+        """Whether rays are random pixel by pixel: in compiled variants all fine pixels share one table."""
+        return (self.variant or variants.choose()).startswith("scalar")
+
     def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
-        """Where something is measured, with rays of another seed, counted from the quality's."""
+        """With rays of another seed, counted from the quality's."""
         return self._rendered(picture, self.effects, seed)
 
     def active(self, picture: Picture) -> frozenset[str]:
@@ -75,7 +89,7 @@ class How:
         return self._rendered(picture, active - {_BETWEEN}, 0)
 
     def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
-        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=False)
+        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=self.everywhere)
         return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
 
 
@@ -89,7 +103,7 @@ def steadied(picture: Picture, image: np.ndarray, method: Method, how: How = How
     if not how.active(picture) & MANY_WAYS:
         return (image,)
     pair = image, how.image(picture, _OTHERS)
-    found = measure.correction(Images(pair), picture, method.locator, method.threshold)
+    found = measure.correction(Images(pair, by_pixel=how.by_pixel), picture, method.locator, method.threshold)
     known = np.isfinite(found.sigma) & (found.sigma > 0)  # what can be measured
     noise = np.sqrt(2) * found.sources[RENDERING][known] / (_QUIET * found.sigma[known])
     most = max(noise[np.isfinite(noise)], default=0.0)
@@ -124,8 +138,9 @@ def independent(
     propagated : tuple of PropagatedValues
         What `measure.propagate` says of their mean, by method.
     """
+    how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
-    images = _completed(picture, others, measured, how)
+    images = _completed(picture, others, measured, how, how)
     return tuple(
         measure.correction(images, picture, each.locator, each.threshold, told)
         for each, told in zip(methods, propagated, strict=True)
@@ -136,7 +151,8 @@ def of_render(
     picture: Picture, method: Method, image: np.ndarray, propagated: PropagatedValues, how: How = How()
 ) -> Correction:
     """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
-    images, none = _completed(picture, (image,), (), how), np.zeros(len(picture.scene.quantities))
+    how = how.by(method)
+    images, none = _completed(picture, (image,), (), how, how), np.zeros(len(picture.scene.quantities))
     images = replace(images, known={**images.known, RENDERING: (none, none)})
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
 
@@ -144,10 +160,11 @@ def of_render(
 def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
-    Where light takes random ways, four renders of few rays do if their noise is below a tenth of sigma or a hundredth
-    of the tolerance; else of all rays, and renders of other rays are added until it is, six at most.
+    Where light takes random ways, four renders of few rays do, or two of a large image, if their noise is below a tenth
+    of sigma or a hundredth of the tolerance; else of all rays, and renders of other rays are added until it is, six at
+    most.
     """
-    return _simulated(picture, method, how)
+    return _simulated(picture, method, how.by(method))
 
 
 @lru_cache(maxsize=64)
@@ -172,15 +189,16 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     def of(images: Images, told: PropagatedValues | None = None) -> Correction:
         return measure.correction(images, picture, *asked, told)
 
-    images: Images | None = None
+    camera, images = picture.scene.camera, None
+    pair = how.by_pixel and camera.width * camera.height > LARGE_RANDOM  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
-        few = tuple(how.rough.image(picture, seed) for seed in range(_ROUGH))
-        images = _completed(picture, few, (), how)
+        few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
+        images = _completed(picture, few, (), how, how.rough)
         found = of(images)
         if _is_quiet(found):
             return found
-    renders = tuple(how.image(picture, seed) for seed in range(_LEAST))
-    images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
+    renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
+    images = _rebased(images, renders) if images else _completed(picture, renders, (), how, how)
     told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
@@ -214,23 +232,30 @@ def _completed(
     renders: tuple[np.ndarray, ...],
     beside: tuple[np.ndarray, ...],
     how: How,
+    made: How,
 ) -> Images:
-    """With the images, or numbers, of what the scene is not sure of."""
-    first, known, alike = renders[0], _of_unknown_kinds(picture), how.compared
-    changed = {REFLECTANCE: _steps(first, alike.image, picture, _of_other_surfaces(picture))}
+    """With the images, or numbers, of what the scene is not sure of; the renders are ``made`` so."""
+    first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
+    dimmed = None
+    if active & MANY_WAYS == {_BETWEEN}:
+        alone = partial(made.direct, picture, active)
+        dimmed = of_one_surface(picture, first, alone, _u(picture.scene.uncertainty.reflectance))
+    if dimmed is None:
+        others = _steps(first, alike.image, _of_other_surfaces(picture), picture)
+    changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
-        direct = partial(alike.direct, active=how.active(picture))
-        changed[LIGHT] = _steps(first, direct, picture, _with_lights_moved(picture))
-    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known)
+        direct = partial(alike.direct, active=active)
+        changed[LIGHT] = _steps(first, direct, _with_lights_moved(picture), picture)
+    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 
 
 def _steps(
     first: np.ndarray,
     made: Callable[[Picture], np.ndarray],
-    picture: Picture,
     others: Iterable[Picture],
+    picture: Picture,
 ) -> tuple[np.ndarray, ...]:
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
     changed = [made(other) for other in others]

@@ -232,4 +232,4 @@ def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
     return SeparateEstimator(calipers, parts, different.pop() if len(different) == 1 else None)
 
 
-CANNY = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True)
+CANNY = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True, local=True)

@@ -25,12 +25,15 @@ class EstimatorKind:
         How far off, at most, a length of about 100 px is in an exact image without noise.
     bias_predicted : bool
         Whether its bias is what `imaging.models.bias` says.
+    local : bool
+        Whether it looks at no pixel farther from its edges than the scene's `window_px` and the scale of its filter.
     """
 
     prepare: Callable[[Layout, float], Estimator]
     capture_px: float
     exact_px: float
     bias_predicted: bool = False
+    local: bool = False
 
 
 ESTIMATORS: Registry[EstimatorKind] = Registry("estimator")

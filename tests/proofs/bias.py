@@ -88,11 +88,11 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
     """Of a picture, its reflectances and lights drawn anew in each trial."""
     scene, rng = picture.scene, np.random.default_rng(seed)
     method = Method(estimator or measure.best_estimator(scene))
-    off = simulation.simulated(picture, method)
+    off, everywhere = simulation.simulated(picture, method), not measure.ESTIMATORS[method.locator].local
     true, left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
-        clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=False))
+        clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=everywhere))
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
         left.append((found.value[0] - true) / np.sqrt(off.u_bias**2 - off.sources[RENDERING] ** 2 + off.beside**2))

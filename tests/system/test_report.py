@@ -12,8 +12,10 @@ import pytest
 
 import scenes
 import validation
+from scenes.load import BUNDLED
 from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at
 from validation.batch.campaign import Campaign
+from validation.batch.store import RunFile
 from validation.cli.main import app
 
 pytestmark = pytest.mark.render
@@ -191,3 +193,30 @@ def test_report_as_json(found, capsys):
 def test_not_a_run_directory(tmp_path):
     with pytest.raises(scenes.InvalidInput, match="DIR must be a run directory of `ice validate`, got"):
         app(["report", str(tmp_path)], standalone_mode=False)
+
+
+def test_a_run_on_a_mesh_beside_its_scene_is_reported_from_elsewhere(tmp_path, monkeypatch, capsys):
+    """The scene is named without a folder, as one who stands in it does; without where that was it cannot be read."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    for each in (here, there):
+        each.mkdir()
+    (here / "plate.ply").write_bytes((BUNDLED / "plate.ply").read_bytes())
+    (here / "mine.toml").write_text((BUNDLED / "plate.toml").read_text())
+    monkeypatch.chdir(here)
+    campaign = Campaign.of(scenes.load("mine.toml")).model_dump(mode="json", by_alias=True)
+    others = {"seed": 0, "renders": 2, "chunk": 2, "variant": "scalar_rgb", "effects": "auto", "code": "0"}
+    identity = others | {"campaign": campaign} | {key: {} for key in ("quality", "tolerance", "versions")}
+    RunFile(tmp_path / "run", identity).close()
+    monkeypatch.chdir(there)
+    again = RunFile.reopen(tmp_path / "run")
+    found = again.campaign().scenes[0].solid
+    again.close()
+    assert (found.vertices == scenes.load("plate").solid.vertices).all()
+    monkeypatch.setattr(RunFile, "fact", lambda self, key, default=None: _fact(self, key, default))
+    with pytest.raises(scenes.InvalidInput, match=r"object.file must be a readable mesh, got plate.ply"):
+        RunFile.reopen(tmp_path / "run").campaign()
+
+
+def _fact(store, key, default, read=RunFile.fact):
+    """Of a run that does not say where it was started."""
+    return default if key == "directory" else read(store, key, default)

@@ -90,3 +90,12 @@ def test_pixels_near_required_edges_of_a_large_image(top, left, height, width, k
     # margin: counted pixels, at corners of the line of pixels
     assert (found != expected).mean() < 4e-3  # at corners of the line of pixels
     assert 0.1 < found.mean() < 0.9  # margin: some pixels, not all
+
+
+def test_only_pixels_that_are_asked_for_are_crossed(rng):
+    """The same of them as of the whole image, also at its border."""
+    fine, asked = rng.random((9, 12)).round(1), rng.random((9, 12)) < 0.5
+    for step in (0.6, 0.7, 0.8):
+        expected = crossed(fine, step=step) & asked
+        assert 0 < expected.sum() < asked.sum()
+        assert (crossed(fine, step=step, where=asked) == expected).all()

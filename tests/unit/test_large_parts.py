@@ -74,8 +74,31 @@ def test_bounced_light_is_added_to_direct_light_in_whole_pixels(monkeypatch):
     whole = direct.reshape(SIZE[0], K, SIZE[1], K).mean((1, 3))
     renders = Renders(lambda is_random, rays: whole, again, K, True, False, bounced)
     found = fine_pixels(None, None, renders, 0, RAYS)
-    assert found == pytest.approx(direct + sent.repeat(K, 0).repeat(K, 1))
+    seen = near.repeat(K, 0).repeat(K, 1)
+    assert found == pytest.approx(np.where(seen, direct, 0.0) + sent.repeat(K, 0).repeat(K, 1))
     assert asked == [4, 16]
     assert (counts[8:12, 18:23] == 16).all()
     assert (counts[12:, :] <= 4).all()
     assert not counts[~near].any()
+
+
+def test_what_nothing_is_measured_by_stays_dark_and_has_no_edge_at_its_border(monkeypatch):
+    """Few rays up to the border, all at an edge within, random ones only where others' light may be seen."""
+    truth = np.full((SIZE[0] * K, SIZE[1] * K), 20.0)
+    truth[:, 31:] = 50.0
+    near, lent = np.zeros(SIZE, bool), np.zeros(truth.shape, bool)
+    near[:, 8:24], lent[:, 36:] = True, True
+    monkeypatch.setattr(large, "near_required", lambda *_: near)
+    counts = {kind: np.zeros(truth.shape, int) for kind in (False, True)}
+
+    def again(is_random, fine, marked, rays):
+        counts[is_random][marked] = rays
+        return np.where(marked, truth, fine)
+
+    renders = Renders(None, again, K, True, False, lent_to=lambda marked: marked & lent)
+    found = fine_pixels(None, tuple(slice(0, size * K) for size in SIZE), renders, 0, RAYS)
+    assert found == pytest.approx(np.where(near.repeat(K, 0).repeat(K, 1), truth, 0.0))
+    assert (counts[False][:, 30:32] == 256).all(), "an edge of direct light alone"
+    assert (counts[False][:, [*range(16, 30), *range(32, 48)]] == 4).all()
+    assert (counts[True][:, 36:48] == 16).all()
+    assert not counts[True][:, :36].any()

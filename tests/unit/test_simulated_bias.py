@@ -13,7 +13,7 @@ from imaging.geometry.projection import project
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from measure import Correction, Images
-from measure.correction import _by_rays
+from measure.correction import _with_pooled
 from render import Quality, Tolerance
 from scenes import Picture, Pose
 from tests.oracle import block_image
@@ -66,11 +66,10 @@ def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small_task1, pict
     assert beside.sources["rendering"] == pytest.approx(both.sources["rendering"] * math.sqrt(2))
 
 
-def test_standard_uncertainty_of_a_mean_of_renders():
-    """Values 1, 2, 3, 6 scatter by the root of 14/3, the mean of the first two of them by that over the root of two."""
+def test_few_renders_scatter_by_no_less_than_all_features_tell():
+    """Values 1, 2, 3, 6 scatter by the root of 14/3."""
     values = np.array([[1.0, 5.0], [2.0, 5.0], [3.0, 5.0], [6.0, 5.0]])
-    told = _by_rays(values, 2, np.array([0.5, 0.5]))["rendering"]
-    assert told == pytest.approx([math.sqrt(14 / 3 / 2), 0.5 / math.sqrt(2)])
+    assert _with_pooled(values, np.array([0.5, 0.5])) == pytest.approx([math.sqrt(14 / 3), 0.5])
 
 
 def test_the_renders_noise_counts_in_the_image_by_the_images_own_scatter(picture, exact):
@@ -315,8 +314,8 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
     how = _Rendered()
     assert simulation.independent(picture, methods, measured, ("one", "two"), how) == (1, 2)
     assert [(given[2], given[3], given[4]) for given in asked] == [("strip", None, "one"), ("isophote", 0.4, "two")]
-    of, renders, beside, told = asked[0][0]
-    assert (of, beside, told) == (picture, measured, how)
+    of, renders, beside, *made = asked[0][0]
+    assert (of, beside, made) == (picture, measured, [how.by(*methods)] * 2)
     assert [each.flat[0] for each in renders] == [1, 2, 3]
 
 
@@ -355,3 +354,31 @@ def test_a_material_that_cannot_tell_how_it_reflects_less_leaves_the_bias_unknow
         assert (found == {}) == plain
         if not plain:
             assert [each.tolist() for each in found["reflectance"]] == [[np.inf] * len(scene.quantities)] * 2
+
+
+@pytest.mark.parametrize(
+    ("estimators", "everywhere"),
+    [
+        (("gradient", "isophote", "canny"), False),
+        (("strip",), True),
+        (("arrangement",), True),
+        (("canny", "strip"), True),
+    ],
+)
+def test_what_is_measured_from_afar_is_simulated_everywhere(estimators, everywhere):
+    assert How().by(*map(Method, estimators)).everywhere is everywhere
+
+
+@pytest.mark.parametrize(
+    ("width", "variant", "count"), [(96, "scalar_rgb", 4), (2448, "scalar_rgb", 2), (2448, "llvm_mono", 4)]
+)
+def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width, variant, count, monkeypatch):
+    """Of a small image four are cheap; of a compiled variant the pixels have random numbers in common."""
+    asked, size, quiet = [], {"width": width, "height": width}, {"rendering": np.array([0.01])}
+    camera = picture.scene.camera.model_copy(update=size)
+    large = picture.with_scene(picture.scene.model_copy(update={"camera": camera}))
+    monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
+    monkeypatch.setattr(simulation, "_completed", lambda picture, renders, *given: asked.append(renders))
+    monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
+    simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    assert asked == [tuple(range(count))]

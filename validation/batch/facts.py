@@ -100,6 +100,7 @@ class _Predicted(BaseModel):
 _Scalar = str | int | float | bool | None
 _KINDS: dict[str, TypeAdapter] = {
     "identity": TypeAdapter(_Identity),
+    "directory": TypeAdapter(Annotated[str, Field(max_length=10_000)], config=_Strict),
     "predicted": TypeAdapter(_Predicted),
     "seconds": TypeAdapter(dict[str, _NotNegative], config=_Strict),
     "wall": TypeAdapter(_NotNegative, config=_Strict),

@@ -165,9 +165,10 @@ class RunFile:
         return found
 
     def campaign(self) -> Campaign:
-        """The campaign that the run works through."""
+        """The campaign that the run works through; its parts' files are found from where the run was started."""
+        context = {"directory": Path(self.fact("directory", ""))}
         try:
-            return Campaign.model_validate(self.identity()["campaign"])
+            return Campaign.model_validate(self.identity()["campaign"], context=context)
         except ValidationError as error:
             raise self._damaged(f"its campaign: {describe(error)}") from None
 
@@ -318,6 +319,7 @@ class RunFile:
             )
         if there is None:
             self.note("identity", identity)
+            self.note("directory", str(Path.cwd()))
         elif there != identity:
             texts = list(itertools.islice(_differences(there, identity), 3))
             raise InvalidInput(

@@ -222,7 +222,8 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     numbers["measurands"] = measurands.predicted(predicted, biased)
     clock.lap("predict")
     renders: tuple[np.ndarray, ...] = ()
-    used, way = methods(scene), simulation.How(how.quality, variant, how.effects, how.tolerance)
+    used = methods(scene)
+    way = simulation.How(how.quality, variant, how.effects, how.tolerance).by(*used)
     photographed = image is not None
     if not photographed:
         image = render.image(

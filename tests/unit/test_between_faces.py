@@ -1,0 +1,93 @@
+"""Where light from other surfaces may be seen, and how much of it is left where all reflect less."""
+
+import numpy as np
+import pytest
+
+import scenes
+from imaging.geometry.looked_at import looked_at
+from imaging.geometry.projection import project_ideal
+from imaging.light.between import left_of_dimmed
+from imaging.pictures import Pictures
+from render.between import lent_to
+from scenes import Picture
+from validation.dimmed import of_one_surface
+
+
+@pytest.fixture(scope="module")
+def picture():
+    scene = scenes.load("bracket")
+    return Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+
+def test_faces_are_seen_where_they_are_projected(picture):
+    """The middle of each triangle that is turned to the sensor and hidden by none; outside there is nothing."""
+    bodies, sensor = picture.scene.bodies, np.array(list(picture.sensor))
+    middles = bodies.triangles.mean(1)
+    seen = project_ideal(middles, sensor, picture.scene.camera)
+    faces, places = looked_at(picture, np.concatenate([seen, [[-500.0, -500.0]]]))
+    met = np.linalg.norm(places[:-1] - middles, axis=1) < 1e-6 * bodies.extent
+    assert met.sum() >= 4
+    assert (faces[:-1][met] == bodies.triangle_faces[met]).all()
+    assert faces[-1] == -1
+
+
+def test_only_faces_within_the_hull_are_lent_light(picture):
+    """A fine pixel in the middle of each triangle; before a floor those that do not look up, and the floor, as well."""
+    camera, bodies, k = picture.scene.camera, picture.scene.bodies, 2
+    sensor = np.array(list(picture.sensor))
+    floor = picture.with_scene(picture.scene.with_(floor={"reflectance": 0.3, "height": -1.0}))
+    for each, expected in ((picture, ~bodies.outer), (floor, ~bodies.outer | (bodies.normals[:, 2] < 0.999))):
+        seen = project_ideal(bodies.triangles.mean(1), sensor, camera)
+        faces, _ = looked_at(each, seen)
+        for (x, y), face in zip(seen, faces, strict=True):
+            marked = np.zeros((3, 3), bool)
+            marked[1, 1] = True
+            start = round((y + 0.5) * k - 0.5) - 1, round((x + 0.5) * k - 0.5) - 1
+            around = looked_at(each, np.array([(x + i / k, y + j / k) for i in (-1, 0, 1) for j in (-1, 0, 1)]))[0]
+            if (around == face).all() and face >= 0:
+                assert lent_to(each, marked, start, k)[1, 1] == expected[face]
+        far = np.ones((1, 1), bool)
+        assert lent_to(each, far, (0, 0), k)[0, 0] == (each is floor)
+
+
+def test_what_is_left_of_light_that_met_two_surfaces_or_more(picture):
+    """Less than of two of them, more than of five; of a black part's, that met no third one, of two."""
+    part, inner = 0.1, np.flatnonzero(~picture.scene.bodies.outer)
+    triangles = np.flatnonzero(np.isin(picture.scene.bodies.triangle_faces, inner))
+    points, faces = picture.scene.bodies.triangles[triangles].mean(1), picture.scene.bodies.triangle_faces[triangles]
+    left = left_of_dimmed(Pictures.of(picture), part, points, faces)
+    lit = np.isfinite(left)
+    assert lit.any()
+    assert (left[lit] < 0.9**2).all()
+    assert (left[lit] > 0.9**5).all()
+    scene = picture.scene
+    dark = picture.with_scene(scene.tried(material=scene.material.dimmed(0.999)))
+    least = left_of_dimmed(Pictures.of(dark), part, points, faces)
+    assert least[lit] == pytest.approx(0.9**2, rel=2e-3)
+
+
+def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatch):
+    """Direct light less by a tenth, other light by what closed form tells."""
+    scene = picture.scene
+    height, width, dark = scene.camera.height, scene.camera.width, scene.noise.dark_level
+    direct = np.full((height, width), dark + 50.0)
+    render = direct.copy()
+    y, x = np.mgrid[:height, :width]
+    faces, _ = looked_at(picture, np.stack([x, y], -1).reshape(-1, 2).astype(float))
+    inner = ((faces >= 0) & ~np.append(scene.bodies.outer, True)[faces]).reshape(height, width)
+    assert inner.any()
+    render[inner] += 8.0
+    monkeypatch.setattr(
+        "validation.dimmed.left_of_dimmed", lambda pictures, part, points, faces: np.full(len(faces), 0.7)
+    )
+    found = of_one_surface(picture, render, lambda: direct, 0.1)
+    assert found[~inner] == pytest.approx(render[~inner] - 5.0)
+    assert found[inner] == pytest.approx(render[inner] - 5.0 - 0.3 * 8.0, abs=1e-6)
+
+
+def test_other_scenes_are_rendered(picture):
+    scene = picture.scene
+    rendered = np.full((scene.camera.height, scene.camera.width), 90.0)
+    floor = picture.with_scene(scene.with_(floor={"reflectance": 0.3, "height": -1.0}))
+    assert of_one_surface(floor, rendered, lambda: rendered, 0.1) is None
+    assert of_one_surface(picture, rendered, lambda: rendered, 0.0) is None
