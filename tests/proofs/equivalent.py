@@ -6,6 +6,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
+    "planner/search/exhaustive.py: _NONE = np.inf, - 2, -1": "numbers of no pair, before one is found",
+    'validation/batch/job.py: return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[: 15]':
+        "a digit less of a digest",
     "planner/view_sets.py: told = zip(self.views[-1].prediction.measurands, self.combination.variances, strict=True)":
         "names and tolerances are those of the scene, in each picture the same",
     "imaging/light/revolved.py: turn, level = np.stack([np.cos(angle), np.sin(angle)], 1), np.ones((fine, 1))":

@@ -59,7 +59,7 @@ def folder(tmp_path_factory):
 COMMANDS = {
     "measure": ("measure", "picture.png", "plate.toml", *POSE),
     "budget": ("budget", "plate.toml", *POSE),
-    "budget, rendered, as pages": ("budget", "plate.toml", *POSE, "--render", "--out", "budget"),
+    "budget, rendered, as pages": ("budget", "plate.toml", *POSE, "--render", "--out", "pages/budget"),
     "validate": ("validate", "plate.toml", "--renders", "20", "--workers", "1", "--out", "run", "--fresh"),
     "plan, as pages": ("plan", "plate.toml", "--sensor", "20,0", "--step", "30", "--check", "1", "--out", "plan"),
     "predict": ("predict", "plate.toml"),

@@ -226,3 +226,10 @@ def test_corners_are_where_two_sharp_edges_meet_or_more():
     assert [sorted(rod.vertex_names[i] for i in edge.ends) for edge in rod.sharp] == [
         ["v1", "v2"], ["v1", "v3"], ["v2", "v4"], ["v3", "v4"]
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 25.4])
+def test_a_mesh_in_another_unit_is_as_many_times_as_large(scale, tmp_path):
+    path = tmp_path / "box.stl"
+    trimesh.creation.box((1, 2, 3)).export(path)
+    assert np.ptp(mesh.read(path, scale).vertices, axis=0) == pytest.approx(scale * np.array([1, 2, 3]), rel=1e-6)

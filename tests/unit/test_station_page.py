@@ -632,7 +632,8 @@ def test_names_stand_side_by_side_where_camera_and_lamp_are_near(camera, aligned
     """Within 0.7 of half the picture along both axes; the one on the left to the left. All is 2 wide and high."""
     figure = plt.figure()
     axis, part = figure.add_subplot(), np.array([[-1.0, -1], [1, 1]])
-    places = [("camera", np.array(camera), "k"), ("lamp", np.zeros(2), "k")]
+    lamp = np.array([0.15, 0.1])
+    places = [("camera", camera + lamp, "k"), ("lamp", lamp, "k")]
     try:
         station_sketch._labels(axis, places, part, np.zeros(2))
         assert [text.get_ha() for text in axis.texts] == aligned
