@@ -259,7 +259,7 @@ def test_a_search_by_bounds_finds_what_is_best_where_levels_are_cut_off(task1, e
 
 def test_pictures_are_combined_with_the_squares_of_their_weights():
     """Two pictures of unlike scatter and one of them lost at times; the mean error in the object, sigma not squared."""
-    ok = SimpleNamespace(status="ok", name="width", unit="cm", value_object=5.0)
+    ok = SimpleNamespace(status="ok", name="width", unit="cm", value_object=5.0, tolerance=None)
     views = [SimpleNamespace(sensor=k, light=k, prediction=SimpleNamespace(measurands=(ok,))) for k in (0, 1)]
     variances = np.array([[[4e-6]], [[1e-6]]])
     both = combined(variances, np.array([["ok"], ["ok"]]), np.zeros((2, 1)))
@@ -267,7 +267,10 @@ def test_pictures_are_combined_with_the_squares_of_their_weights():
     rng = np.random.default_rng(6)
     values = [5.0 + 1e-4 + v * rng.normal(size=(1, 300, 1)) for v in (2e-3, 1e-3)]
     values[1][0, 4:6] = np.nan
-    shots = {(k, k): views_check._Shot(values[k], variances[k] * (1.2, 0.9)[k]) for k in (0, 1)}
+    off = SimpleNamespace(
+        bias=np.array([3e-4]), u_bias=np.array([1e-4]), beside=np.array([2e-5]), simulated=("ok",)
+    )  # fmt: skip
+    shots = {(k, k): views_check._Shot(values[k], variances[k] * (1.2, 0.9)[k], off) for k in (0, 1)}
     chosen = SimpleNamespace(views=views, combination=both)
     ((row, joined),) = views_check._rows(None, chosen, shots)
     wanted = 0.2 * values[0][0, :, 0] + 0.8 * values[1][0, :, 0]
@@ -279,9 +282,12 @@ def test_pictures_are_combined_with_the_squares_of_their_weights():
     assert row.empirical == pytest.approx(statistics.variance(good.tolist()))
     assert row.ratio == pytest.approx(row.empirical / row.predicted)
     assert row.bias == pytest.approx(good.mean() - 5.0)
+    assert (row.correction, row.u_bias) == (pytest.approx(3e-4), pytest.approx(1e-4))
+    assert row.render_noise == pytest.approx(2e-5 * math.hypot(0.2, 0.8))
+    assert (row.status, row.judged) == ("ok", True)
     freedom = 297
     ends = [row.ratio * freedom / stats.chi2.ppf(q, freedom) for q in (0.975, 0.025)]
     assert row.ratio_interval == pytest.approx(ends)
     told = views_check.judge([(row, joined)], 1.0)
-    assert told.verdict.bias.largest == pytest.approx(abs(row.bias) / math.sqrt(row.predicted))
+    assert told.verdict.bias.largest == pytest.approx(abs(row.bias) / math.hypot(math.sqrt(row.predicted), 1e-4))
     assert told.verdict.agrees

@@ -685,18 +685,18 @@ def test_requests_that_are_no_http_are_not_logged_and_errors_of_ours_are():
 @pytest.mark.parametrize(
     ("took", "large", "where", "size", "shown"),
     [
-        (0.51, False, "slowly", (2048, 512), True), (0.49, True, "quickly", (512, 2049), False),
-        (math.inf, True, "slowly", (1024, 1024), True), (math.inf, False, "quickly", (1024, 1025), False),
+        (0.51, False, "slowly", (2048, 512), True), (0.49, True, "aside", (512, 2049), False),
+        (math.inf, True, "slowly", (1024, 1024), True), (math.inf, False, "aside", (1024, 1025), False),
     ],
 )  # fmt: skip
 def test_what_follows_at_rest(task1, took, large, where, size, shown, monkeypatch):
-    """A close look of more than half a second, or of a large part, in a process; a picture of up to 2^20 px."""
+    """A close look of more than half a second, or of a large part, in a process, else in a thread; a picture of up to 2^20."""
     camera = task1.camera.model_copy(update={"width": size[0], "height": size[1]})
     scene, said = task1.model_copy(update={"camera": camera}), []
 
     class Kept:
-        async def quickly(self, work, *arguments):
-            return await self._done("quickly", work, arguments)
+        async def aside(self, work, *arguments):
+            return await self._done("aside", work, arguments)
 
         async def slowly(self, work, *arguments):
             return await self._done("slowly", work, arguments)

@@ -39,7 +39,7 @@ def test_a_unit_length_at_a_ball_is_as_long_as_its_ends_images_are_apart(task1, 
 
 
 def test_what_lies_beside_an_object_is_seen_at_the_images_first_corner(task1, monkeypatch):
-    """The outer corner of the first pixel, as far away as the camera stands."""
+    """The outer corner of the first pixel."""
     pictures, asked = Pictures.of(Picture.of(task1, (35, 130), (20, 40))), []
     monkeypatch.setattr(preview, "seen_by_rays", lambda pictures, rays: asked.append(rays) or np.array([7.5, 1.0]))
     assert preview._beside(pictures, task1) == 7.5
@@ -47,7 +47,7 @@ def test_what_lies_beside_an_object_is_seen_at_the_images_first_corner(task1, mo
     assert rays.shape == (1, 3)
     place = sensor_position(task1.camera, pictures.sensors) + rays[0]
     assert project(place[None], pictures.sensors, task1.camera)[0] == pytest.approx([-0.5, -0.5], abs=1e-6)
-    assert rays[0] @ frame(pictures.sensors).forward == pytest.approx(task1.camera.distance)
+    assert rays[0] @ frame(pictures.sensors).forward == pytest.approx(task1.camera.focal_px)
 
 
 @pytest.mark.parametrize(("size", "count"), [((1024, 1024), 10), ((1025, 1024), 0), ((64, 48), 10), ((1, 1 << 21), 0)])

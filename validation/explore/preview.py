@@ -114,7 +114,7 @@ def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
 
 def _beside(pictures: Pictures, scene: Scene) -> float:
     """Signal of what lies beside the object: that of the image's first corner."""
-    corner = rays(-image_centre(scene.camera), pictures.sensors, scene.camera)
+    corner = rays(-0.5 - image_centre(scene.camera), pictures.sensors, scene.camera)
     return float(seen_by_rays(pictures, corner[None])[0])
 
 
