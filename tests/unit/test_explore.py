@@ -690,7 +690,7 @@ def test_requests_that_are_no_http_are_not_logged_and_errors_of_ours_are():
     ],
 )  # fmt: skip
 def test_what_follows_at_rest(task1, took, large, where, size, shown, monkeypatch):
-    """A close look of more than half a second, or of a large part, in a process, else in a thread; a picture of up to 2^20."""
+    """A close look of more than half a second, or of a large part, in a process; a picture of up to 2^20 px."""
     camera = task1.camera.model_copy(update={"width": size[0], "height": size[1]})
     scene, said = task1.model_copy(update={"camera": camera}), []
 
