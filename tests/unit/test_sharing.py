@@ -1,6 +1,7 @@
 """Several lights that share a given total: searches against every combination evaluated one by one."""
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import planner
 import scenes
 from planner.search.constraints import Constraints
 from planner.search.grid import ViewingSpace
-from planner.search.lights import search_shared, shares_of, shares_of_two, with_shares
+from planner.search.lights import Mixture, _Turns, search_shared, shares_of, shares_of_two, with_shares
 from planner.search.objective import Aim, SearchProblem
 from scenes import InvalidInput
 
@@ -118,3 +119,17 @@ def test_a_backlight_falls_out_for_a_hole():
     limits = Constraints(sensor_polar_deg=(0, 1), light_polar_deg=(20, 60))
     found = planner.plan(bore, step_deg=40, constraints=limits, refined=False)
     assert found.shares == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("role", [0, 1, 2])
+def test_a_turn_moves_the_sensor_among_its_places_or_one_light_among_theirs(role):
+    sensors, places = np.array([[1.0, 2], [3, 4], [5, 6]]), np.array([[10.0, 20], [30, 40]])
+    asked = []
+    turns = SimpleNamespace(sensors=sensors, places=places, _best=lambda *given: asked.append(given))
+    here = Mixture(1.0, (0.4, 0.6), np.array([7.0, 8.0]), np.array([50.0, 60, 70, 80]))
+    _Turns._moved(turns, here, role)
+    ((shares, at, lit),) = asked
+    assert shares == (0.4, 0.6)
+    expected = np.tile(np.concatenate([here.sensor, here.lights]), (3 if role == 0 else 2, 1))
+    expected[:, 2 * role : 2 * role + 2] = sensors if role == 0 else places
+    assert np.hstack([at, lit]).tolist() == expected.tolist()
