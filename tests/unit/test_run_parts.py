@@ -99,3 +99,16 @@ def test_a_machine_is_named_by_its_model_and_its_first_processors_instructions(m
     text = "model name\t: Chip 7\nflags\t\t: sse avx\n\nmodel name\t: Chip 7\nflags\t\t: sse\n"
     monkeypatch.setattr(machine.Path, "read_text", lambda *_: text)
     assert machine._processor() == ("Chip 7", {"sse", "avx"})
+
+
+@pytest.mark.parametrize(("known", "done"), [({}, 3), ({"wall": 40.0}, 3), ({"wall": 40.0}, 0)])
+def test_the_time_of_a_run_goes_on_from_what_it_had_taken(known, done, monkeypatch):
+    """From 0 where it begins, and only where something was done; the clock goes 2.5 s meanwhile."""
+    noted, clock = {}, iter([10.0, 12.5])
+    store = SimpleNamespace(fact=lambda name, default: known.get(name, default), note=noted.__setitem__)
+    options = SimpleNamespace(workers=3, seed=1, executor=None, dask=None)
+    batch = SimpleNamespace(options=options, store=store, done=5, total=9, variant="scalar_rgb")
+    batch.finish = lambda crew: setattr(batch, "done", batch.done + done)
+    monkeypatch.setattr(job.time, "perf_counter", lambda: next(clock))
+    job._finish(batch)
+    assert noted == ({"wall": known.get("wall", 0.0) + 2.5, "workers": 3} if done else {})
