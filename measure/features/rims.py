@@ -28,6 +28,7 @@ from scenes import Circle, Curved, Picture, status
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places
+_FINER = 3  # times as many on an arc
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
 _CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
@@ -155,7 +156,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         return limb_tool(picture, solid.round(name), moved)
     optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
-    angle = angles_of(nominal, places_around(pictures, nominal, SPACING * optics.scale_px, _MOST))
+    angle = angles_of(nominal, _places(pictures, nominal, optics))
     circle = _with_errors(nominal, moved)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
@@ -179,6 +180,19 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     recorded_normals = gradient / size[:, None]
     locator = gradient_along(optics, angle[keep], held(places[keep], optics), recorded_normals[keep], size[keep])
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
+
+
+def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
+    """How many places there are on a rim; on an arc as many as are looked at.
+
+    The variance of an arc's radius goes as its length to the power of -5, so that it must begin and end where it is
+    predicted to, within a small part of `SPACING`.
+    """
+    if circle.ends is None:
+        return places_around(pictures, circle, SPACING * optics.scale_px, _MOST)
+    if pictures.lights:
+        return look(pictures, circle).shift.size
+    return places_around(pictures, circle, SPACING / _FINER * optics.scale_px, _MOST)
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
