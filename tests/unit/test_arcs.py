@@ -94,7 +94,7 @@ def test_what_is_too_short_is_none(turn, step, count):
 
 @pytest.mark.parametrize(("off", "count"), [(2e-4, 2), (4e-3, 0)])
 def test_vertices_off_the_circle_count_beside_the_height_of_the_arc(off, count):
-    """A quarter of a circle of 10 mm is 2.93 mm high; every other vertex stands out by less, or more, than 1e-3 of it."""
+    """A quarter of a circle of 10 mm is 2.93 mm high; vertices stand out by less, or more, than 1e-3 of it."""
     rounded = parts.arc((10.0, 10.0), 10.0, 180, 270)
     away = (rounded - 10) / 10
     rounded = rounded + off * np.where(np.arange(len(rounded)) % 2, 1.0, 0.0)[:, None] * away
