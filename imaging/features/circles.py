@@ -101,20 +101,20 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     across = np.einsum("...ni,...nij->...nj", normal, slope)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
     arc, far = speed * circle.turn / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
-    turn, off_ends = circle.turn / (2 * np.pi), within_ends(pictures, circle, angle)
+    turn = circle.turn / (2 * np.pi)
+    off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
     if seen is not None:
-        squared = np.where(seen_along(pictures, circle, angle) & off_ends, seen.squared, 0.0)
-        return Rim(design, arc, squared, seen.noise_variance, seen.good, turn, _kept(circle, off_ends))
+        squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
+        return Rim(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
-    squared = np.where(off_ends, squared, 0.0)
-    return Rim(design, arc, squared, noise, clear, turn, _kept(circle, off_ends))
+    return Rim(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends)
 
 
-def _kept(circle: Circle, off_ends: np.ndarray) -> np.ndarray | None:
-    """Which places are off an arc's ends; None of what has none."""
-    return None if circle.ends is None else off_ends
+def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
+    """Squared contrast, none near an arc's ends."""
+    return squared if off_ends is None else np.where(off_ends, squared, 0.0)
 
 
 def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
