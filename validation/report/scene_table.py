@@ -145,7 +145,7 @@ def _side(circle: dict[str, Any]) -> str:
 
 
 def _arc(circle: dict[str, Any]) -> str:
-    turn = f" arc, {circle['turn']:.0f} degrees" if "turn" in circle else ""
+    turn = f", arc of {circle['turn']:.0f} degrees" if "turn" in circle else ""
     return f"{_side(circle)}{turn}"
 
 
