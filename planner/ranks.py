@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.circles import LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE
 from imaging.features.seen import unit_normals
 from imaging.models.errors import Errors
@@ -43,7 +44,10 @@ def least_contrast(evaluated: Errors) -> np.ndarray:
 def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     """Status of each quantity, from the edges and circles that it needs, the same way, shape (..., M)."""
     known, edges = evaluated.measurands, edge_ranks(evaluated, clutter)
-    rims = [np.where(crowded, _CLUTTER, _OK) for crowded in evaluated.crowded[: len(known.circles)]]
+    rims = [
+        np.select([left < LEAST_SEEN, crowded], [_SHORT, _CLUTTER], _OK)
+        for left, crowded in zip(evaluated.left, evaluated.crowded, strict=True)
+    ]
     rims += [np.array(_OK)] * (len(known.circles) - len(rims))
     lead = evaluated.variances.shape[:-1]
     single = np.stack([np.broadcast_to(each, lead) for each in (*np.moveaxis(edges, -1, 0), *rims)], -1)

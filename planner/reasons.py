@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.features.circles import LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE
 from imaging.models.bias import NEGLIGIBLE
 from imaging.models.errors import Errors
@@ -37,6 +38,8 @@ def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, st
         return _clutter(evaluated, bias_image, m, [names[e] for e in guilty])
     if not guilty:
         rims = [name for name, needs in zip(known.circles, known.depends()[m][len(names) :], strict=True) if needs]
+        if status == SHORT:
+            return _short_arc(evaluated, rims)
         return f"too little is seen of {_joined(rims or known.quantities[m].edges)}, or it is too faint"
     return {NOT_VISIBLE: _hidden, SHORT: _short, LOW_CONTRAST: _faint}[status](evaluated, guilty)
 
@@ -65,6 +68,16 @@ def _short(evaluated: Errors, edges: list[int]) -> str:
     ends = f": {_px(lost)} at its ends lie too near to other edges" if lost > free else ""
     return (
         f"edge {view.names[worst]} {seen} {length} in this picture; at least {_px(lost + MIN_USABLE)} are needed{ends}"
+    )
+
+
+def _short_arc(evaluated: Errors, names: list[str]) -> str:
+    """Of the arc of which least is left."""
+    left = dict(zip(evaluated.measurands.circles, evaluated.left, strict=True))
+    worst = min(names, key=lambda name: round(float(left[name]), 6))
+    return (
+        f"{360 * float(left[worst]):.2g} degrees of arc {worst} lie well off its ends in this picture;"
+        f" at least {360 * LEAST_SEEN:.0f} are needed"
     )
 
 

@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from imaging.features.limb_outline import limb_outline
 from imaging.features.projected_edges import circles, projected_edges
-from imaging.features.rim_sides import equal_angles, radials
+from imaging.features.rim_sides import angles_of, radials
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project
 from imaging.pictures import Pictures
@@ -90,9 +90,10 @@ def _around(picture: Picture) -> list[np.ndarray]:
         if isinstance(circle, Curved):
             pieces += limb_pieces(picture, circle)
             continue
-        places = circle.centre + circle.radius * radials(circle, equal_angles())
+        places = circle.centre + circle.radius * radials(circle, angles_of(circle))
         rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
-        pieces += list(np.stack([rim, np.roll(rim, -1, 0)], 1))
+        whole = np.stack([rim, np.roll(rim, -1, 0)], 1)
+        pieces += list(whole if circle.ends is None else whole[:-1])
     return pieces
 
 

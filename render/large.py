@@ -160,7 +160,7 @@ def near_required(
     those ``within`` so many standard deviations of scale and blur together of where they are."""
     scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
-    circles = {circle.name: circle.edges for circle in scene.solid.circles}
+    circles = {circle.name: circle.edges for circle in scene.solid.rims}
     limbs = [each for each in scene.solid.curved if each.name in scene.required]
     circles |= dict.fromkeys((each.name for each in limbs), ())
     names = [piece for name in scene.required for piece in circles.get(name, (name,))]

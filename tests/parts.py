@@ -150,3 +150,75 @@ def newcomers_plate() -> trimesh.Trimesh:
     bores = [Hole(x, y, radius, evenly(72), 0.0, 8.0) for x, y, radius in ((8, 8, 3), (8, 22, 3), (39, 15, 4))]
     profile = [(0.0, 0.0), (50.0, 0.0), (50.0, 6.0), (48.0, 6.0), (48.0, 8.0), (0.0, 8.0)]
     return prism(profile, 30.0, [*bores, Slot(23.0, 15.0, 2.0, 10.0, 24, 0.0, 8.0)])
+
+
+def arc(centre: tuple[float, float], radius: float, begin: float, stop: float, step: float = 3.75) -> np.ndarray:
+    """Points (n, 2) on an arc from one angle to another, degrees, clockwise where the second is less."""
+    angle = np.radians(np.linspace(begin, stop, round(abs(stop - begin) / step) + 1))
+    return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
+
+
+def plate(outline: np.ndarray, height: float, holes: list[Slot] = ()) -> trimesh.Trimesh:
+    """What a counter-clockwise outline (n, 2) bounds, z from 0 to a height; its Delaunay triangles must have its sides.
+
+    Raises
+    ------
+    ValueError
+        If they have not.
+    """
+    points = np.concatenate([outline, *(hole.rim(0)[:, :2] for hole in holes)])
+    found = points[Delaunay(points).simplices]
+    found = found[_inside(found.mean(1), outline)]
+    for hole in holes:
+        found = found[~(hole.away(found) <= hole.radius * (1 + 1e-9)).all(1)]
+    top = np.concatenate([found, np.full((*found.shape[:2], 1), height)], -1)
+    one, two = found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]
+    top = np.where((one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0])[:, None, None], top, top[:, ::-1])
+    low, high = (np.column_stack([outline, np.full(len(outline), z)]) for z in (0.0, height))
+    low2, high2 = np.roll(low, -1, 0), np.roll(high, -1, 0)
+    sides = np.concatenate([np.stack([low, low2, high], 1), np.stack([low2, high2, high], 1)])
+    parts = [top, top[:, ::-1] * [1, 1, 0], sides, *map(_wall, holes)]
+    made = trimesh.Trimesh(**_merged(np.concatenate(parts)), process=False)
+    if not made.is_volume:
+        raise ValueError("outline must be sides of its points' Delaunay triangles, got others")
+    return made
+
+
+def _inside(points: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    """Whether points (n, 2) lie within an outline: a ray to the right crosses it an odd number of times."""
+    start, stop = outline, np.roll(outline, -1, 0)
+    above = (start[:, 1] > points[:, 1, None]) != (stop[:, 1] > points[:, 1, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (points[:, 1, None] - start[:, 1]) / (stop[:, 1] - start[:, 1])
+    return (above & (points[:, 0, None] < start[:, 0] + share * (stop[:, 0] - start[:, 0]))).sum(1) % 2 == 1
+
+
+def cornered(turn: float, radius: float = 10.0) -> trimesh.Trimesh:
+    """A plate of 8 mm whose one corner, at the origin, is rounded by a tangent arc of ``turn`` degrees about (10, 10).
+
+    Its sides at the corner are 25 mm long beyond the arc.
+    """
+    rounded = arc((radius, radius), radius, 225 - turn / 2, 225 + turn / 2)
+    away = [np.array([1.0, -1.0]) @ turned(side * turn / 2).T / np.sqrt(2) for side in (-1, 1)]
+    ends = rounded[0] - 25 * away[0], rounded[-1] + 25 * away[1]
+    return plate(np.concatenate([[ends[0]], rounded, [ends[1]], [[38.0, 38.0]]]), 8.0)
+
+
+def turned(degrees: float) -> np.ndarray:
+    """Turn in the plane (2, 2), counter-clockwise."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def slotted() -> trimesh.Trimesh:
+    """50 x 30 x 8 mm with a slot whose round ends, of 6 mm radius, are about (15, 15) and (35, 15)."""
+    corners = np.array([[0, 0], [50, 0], [50, 30], [0, 30]], float)
+    return plate(corners, 8.0, [Slot(25.0, 15.0, 6.0, 20.0, 48, 0.0, 8.0)])
+
+
+def notched(turn: float = 180.0, radius: float = 8.0) -> trimesh.Trimesh:
+    """50 x 30 x 8 mm with a part of a bore, ``turn`` degrees of it, at the middle of its edge along x."""
+    depth = radius * np.cos(np.radians(turn / 2))
+    bore = arc((25.0, -depth), radius, 90 + turn / 2, 90 - turn / 2)
+    far = np.array([[50, 0], [50, 30], [0, 30], [0, 0]], float)
+    return plate(np.concatenate([bore, far]), 8.0)

@@ -14,21 +14,22 @@ from imaging.features.locator import reach
 from imaging.features.rim_look import look
 from imaging.features.rim_sides import (
     RIM_POINTS,
+    angles_of,
     clearance,
     contrast_along,
-    equal_angles,
     outward_normals,
     radials,
     seen_along,
     shading_shift,
     steady,
+    within_ends,
 )
 from imaging.features.seen import plane_axes
 from imaging.pictures import Pictures
 from scenes import Circle
 
 LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of it is taken and its circle is `clutter`
-LEAST_SEEN = 0.1  # part of the rim that must have contrast
+LEAST_SEEN = 0.1  # of a whole turn: what of a rim must have contrast; an arc is too short where less lies off its ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,10 @@ class Rim:
         Whether what the locator finds there is known. In one picture `RimLook.good`; in many whether it is undisturbed:
         the far rim of the wall beside, where the wall is seen, the straight edges around the circle's face, and jumps
         of the contrast along the rim are `locator.reach` away.
+    turn : float
+        How much of a whole turn the points stand for, 1 but for arcs.
+    off_ends : ndarray of bool, shape (..., n), optional
+        Which points of an arc are `locator.reach` off its ends; others have no contrast.
     """
 
     design: np.ndarray
@@ -57,12 +62,23 @@ class Rim:
     squared: np.ndarray
     noise_variance: np.ndarray | float
     clear: np.ndarray
+    turn: float = 1.0
+    off_ends: np.ndarray | None = None
+
+    @property
+    def left(self) -> np.ndarray:
+        """Part of a whole turn that lies off the ends of an arc, shape (...); 1 of what has no ends."""
+        if self.off_ends is None:
+            return np.ones(self.squared.shape[:-1])
+        return np.broadcast_to(self.turn * self.off_ends.mean(-1), self.squared.shape[:-1])
 
     @property
     def crowded(self) -> np.ndarray:
         """Whether so little of what is seen is undisturbed that all of it has to be taken, bool, shape (...)."""
         seen = self.squared > 0
-        return (seen & self.clear).mean(-1) < LEAST_CLEAR * np.maximum(seen.mean(-1), LEAST_CLEAR)
+        clear = (seen & self.clear).mean(-1)
+        found = clear < LEAST_CLEAR * np.maximum(seen.mean(-1), LEAST_CLEAR)
+        return found if self.off_ends is None else found | (self.turn * clear < LEAST_SEEN)
 
     @property
     def counted(self) -> np.ndarray:
@@ -78,27 +94,34 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     """
     scene = pictures.scene
     seen = look(pictures, circle) if fall_off and pictures.closely else None
-    angle = equal_angles(RIM_POINTS if seen is None else seen.shift.size)
+    angle = angles_of(circle, RIM_POINTS if seen is None else seen.shift.size)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
     normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("...ni,...nij->...nj", normal, slope)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
-    arc, far = speed * 2 * np.pi / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
+    arc, far = speed * circle.turn / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
+    turn = circle.turn / (2 * np.pi)
+    off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
-        return Rim(design, arc, squared, seen.noise_variance, seen.good)
+        return Rim(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
-    return Rim(design, arc, squared, noise, clear)
+    return Rim(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends)
+
+
+def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
+    """Squared contrast, none near an arc's ends."""
+    return squared if off_ends is None else np.where(off_ends, squared, 0.0)
 
 
 def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
     """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
     information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
-    enough = np.ones(information.shape[:-2], bool) if counted is None else counted.sum(-1) > 3
-    return _covariance(information, enough)
+    enough = circle.left >= LEAST_SEEN
+    return _covariance(information, enough if counted is None else enough & (counted.sum(-1) > 3))
 
 
 def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
@@ -108,7 +131,7 @@ def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) 
     noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
     edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
     that is used; infinite where the pieces are so short that this would not be positive. Disturbed points and those of
-    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of the rim must be left.
+    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of a turn must be left.
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
@@ -119,7 +142,7 @@ def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) 
         for weight in (circle.arc, ends)
     )
     scatter = 2 * np.sqrt(np.pi) * scale * information - 2 * scale**2 * at_ends
-    inverse = _covariance(information, (used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
+    inverse = _covariance(information, (circle.turn * used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
     return np.where(good, kappa2 * known @ scatter @ known, inverse)

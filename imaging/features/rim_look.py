@@ -14,7 +14,7 @@ import numpy as np
 from imaging import sensor
 from imaging.features.locator import edge_blur
 from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
-from imaging.features.rim_sides import RIM_POINTS, equal_angles, outward_normals, radials
+from imaging.features.rim_sides import RIM_POINTS, angles_of, begin_of, outward_normals, radials
 from imaging.geometry.lens import image_centre, lens_jacobian
 from imaging.geometry.projection import from_axis, rays
 from imaging.light.appearance import seen_by_rays
@@ -51,17 +51,22 @@ class RimLook:
         Mean of both sides, grey levels^2.
     good : ndarray of bool, shape (n,)
         Where the shift can be trusted: the crossing is near, about as steep as a lone step's, and as its neighbours.
+    begin, turn : float
+        Of an arc the angle at which it begins, and how much of a turn it takes, rad.
     """
 
     shift: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray
     good: np.ndarray
+    begin: float = 0.0
+    turn: float = 2 * np.pi
 
     def at(self, angle: np.ndarray) -> RimLook:
         """The same at other angles (m,), between the places; good where both neighbours are."""
-        count = self.shift.size
-        place = (angle / (2 * np.pi) * count - 0.5) % count
+        count, whole = self.shift.size, self.turn == 2 * np.pi
+        place = (angle - self.begin) / self.turn * count - 0.5
+        place = place % count if whole else np.clip(place, 0, count - 1)
         first, share = place.astype(int) % count, place - place.astype(int)
         then = (first + 1) % count
         told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
@@ -71,9 +76,10 @@ class RimLook:
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
     """Number of places on a rim, about ``spacing`` px apart in one picture: `RIM_POINTS`, or 2 to ``most`` times it."""
-    places = circle.centre + circle.radius * radials(circle, equal_angles())
+    places = circle.centre + circle.radius * radials(circle, angles_of(circle))
     rim = from_axis(places, pictures.sensors, pictures.scene.camera)
-    length = np.nan_to_num(np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)).sum()
+    steps = np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)
+    length = np.nan_to_num(steps if circle.ends is None else steps[1:]).sum()
     return RIM_POINTS * int(np.clip(np.ceil(length / (spacing * RIM_POINTS)), 1, most))
 
 
@@ -84,7 +90,7 @@ def look(pictures: Pictures, circle: Circle) -> RimLook:
 
 def _look(pictures: Pictures, circle: Circle) -> RimLook:
     scene = pictures.scene
-    angle = equal_angles(places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
+    angle = angles_of(circle, places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
     normals, width, where = _outline(pictures, circle, angle)
     levels = _levels(pictures, circle, angle, normals, width, where)
     alone = zero_of_steps(where, _SHARES)
@@ -98,7 +104,8 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
-    return RimLook(shift, np.nan_to_num(slope) ** 2, noise, good & _steady(moved, slope))
+    squared = np.nan_to_num(slope) ** 2
+    return RimLook(shift, squared, noise, good & _steady(moved, slope), begin_of(circle), circle.turn)
 
 
 def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:

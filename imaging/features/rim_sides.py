@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from imaging.features.locator import edge_blur
+from imaging.features.locator import edge_blur, reach
 from imaging.features.seen import plane_axes
 from imaging.geometry.projection import from_axis, jacobian_ideal
 from imaging.geometry.rays import first_face
@@ -25,6 +25,36 @@ _STEP = 0.25  # px that a slope is taken over
 def equal_angles(count: int = RIM_POINTS) -> np.ndarray:
     """Angles all around a rim."""
     return 2 * np.pi * (np.arange(count) + 0.5) / count
+
+
+def angles_of(circle: Circle, count: int = RIM_POINTS) -> np.ndarray:
+    """The same of a circle; of an arc from its beginning to its end, so that nothing is sought where it is not."""
+    if circle.ends is None:
+        return equal_angles(count)
+    return begin_of(circle) + circle.turn * (np.arange(count) + 0.5) / count
+
+
+def begin_of(circle: Circle) -> float:
+    """Angle at which an arc begins, rad; 0 of a whole circle."""
+    if circle.ends is None:
+        return 0.0
+    one, two = plane_axes(circle.axis)
+    first = circle.ends[0] - circle.centre
+    return float(np.arctan2(first @ two, first @ one))
+
+
+def within_ends(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Whether places at angles of an arc are farther from its ends than disturbs a locator, bool, shape (..., n).
+
+    Where it is not the place counts as none: the boundary goes on otherwise there.
+    """
+    if circle.ends is None:
+        return np.ones((*pictures.sensors.shape[:-1], angle.size), bool)
+    scene = pictures.scene
+    there = _image(pictures, circle.centre + circle.radius * radials(circle, angle))
+    ends = _image(pictures, circle.ends)
+    nearest = np.linalg.norm(there[..., None, :] - ends[..., None, :, :], axis=-1).min(-1)
+    return nearest >= reach(scene.locator.scale_px, scene.camera.blur_px)
 
 
 def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
@@ -137,28 +167,38 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
     """Distance in the image from places of a rim to the nearest boundary that disturbs them, px, shape (..., n).
 
     Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the
-    sensor, beside the place or seen through the hole.
+    sensor, beside the place or seen through the hole; of an arc also the edges of its wall at its ends.
     """
     solid, radial = pictures.scene.solid, radials(circle, angle)
     points = circle.centre + circle.radius * radial
     there = _image(pictures, points)
     nearest = np.full(there.shape[:-1], np.inf)
-    for other in solid.circles:
+    for other in solid.circles if circle.ends is None else solid.rims:
         if _coaxial(circle, other):
-            spokes = radials(other, equal_angles())
+            spokes = radials(other, angles_of(other))
             far = other.centre + other.radius * spokes
             wall = -spokes if other.hole else spokes
             turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
+            turned[..., -1] &= other.ends is None
             nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), turned))
-    ends = _image(pictures, _straight_around(solid, circle.face))
+    ends = _image(pictures, _straight_around(solid, circle))
     return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
 
 
 @lru_cache(maxsize=64)
-def _straight_around(solid: Solid, face: int) -> np.ndarray:
-    """Ends of the straight edges of a face, those of one after the other, shape (2 E, 3)."""
-    own = {name for rim in solid.circles for name in rim.edges}
-    ends = [edge.ends for edge in solid.edges if face in edge.faces and edge.name not in own]
+def _straight_around(solid: Solid, circle: Circle) -> np.ndarray:
+    """Ends of the straight edges of a circle's face, those of one after the other, shape (2 E, 3).
+
+    Of an arc's also the other edges at its ends that are no facets'.
+    """
+    own = {name for rim in (*solid.circles, circle) for name in rim.edges}
+    edges = [edge for edge in solid.edges if circle.face in edge.faces and edge.name not in own]
+    if circle.ends is not None:
+        last = {tuple(end) for end in circle.ends.tolist()}
+        at = [v for v in dict.fromkeys(v for name in circle.edges for v in solid.edge(name).ends)
+              if tuple(solid.vertices[v].tolist()) in last]  # fmt: skip
+        edges += [edge for v in at for edge in solid.meeting[v] if edge.name not in own and edge.kind != "smooth"]
+    ends = [edge.ends for edge in dict.fromkeys(edges)]
     return solid.vertices[np.array(ends, int).ravel()].reshape(-1, 3)
 
 

@@ -206,7 +206,7 @@ def side_signals(
 
 def edge_contrast(pictures: Pictures, names: tuple[str, ...], fractions: np.ndarray) -> EdgeContrast:
     """Recorded contrast and noise at fractions (n,) or (..., E, n) of each edge's length in space."""
-    if not is_separable(pictures.scene):
+    if not names or not is_separable(pictures.scene):
         return of_sides(
             pictures.scene, side_signals(pictures, names, edge_points(pictures.scene.solid, names, fractions))
         )

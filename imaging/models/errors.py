@@ -40,6 +40,8 @@ class Errors:
         where it cannot be found.
     crowded : tuple of ndarray of bool, shape (...)
         Whether something disturbs most of each circle.
+    left : tuple of ndarray, shape (...)
+        Part of a whole turn that lies off the ends of each arc; 1 of whole circles and limbs.
     joint : tuple of ndarray, optional
         Variances in the image and in the object where a model finds them jointly, not edge by edge.
     """
@@ -50,6 +52,7 @@ class Errors:
     noise_variance: np.ndarray
     circles: tuple[np.ndarray, ...]
     crowded: tuple[np.ndarray, ...]
+    left: tuple[np.ndarray, ...] = ()
     joint: tuple[np.ndarray, np.ndarray] | None = None
 
     @cached_property
@@ -119,7 +122,8 @@ def combined(
         circles = tuple(circle_covariance(each) for each in rims)
     noise = np.broadcast_to(noise_variance, contrast2.shape)
     crowded = tuple(each.crowded for each in rims)
-    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded)
+    left = tuple(each.left for each in rims)
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded, left)
 
 
 def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> Rim:

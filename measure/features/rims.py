@@ -15,7 +15,7 @@ from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
 from imaging.features.rim_look import RimLook, look, places_around
 from imaging.features.rim_outline import facets, smooth_outline
-from imaging.features.rim_sides import clearance, equal_angles, outward_normals, radials, seen_along
+from imaging.features.rim_sides import angles_of, clearance, outward_normals, radials, seen_along, within_ends
 from imaging.features.seen import plane_axes
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
@@ -28,6 +28,7 @@ from scenes import Circle, Curved, Picture, status
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
 _MOST = 64  # times the planner's places
+_FINER = 3  # times as many on an arc
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
 _CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
@@ -155,7 +156,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         return limb_tool(picture, solid.round(name), moved)
     optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
-    angle = equal_angles(places_around(pictures, nominal, SPACING * optics.scale_px, _MOST))
+    angle = angles_of(nominal, _places(pictures, nominal, optics))
     circle = _with_errors(nominal, moved)
     one, two = plane_axes(circle.axis)
     radial = radials(circle, angle)
@@ -171,7 +172,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     seen = look(pictures, nominal).at(angle) if pictures.lights else None
     if seen is not None:
         inward = inward - seen.shift
-    arc = speed * 2 * np.pi / angle.size
+    arc = speed * nominal.turn / angle.size
     weight, state = _weights(pictures, nominal, angle, places, arc, optics, seen)
     taken = (weight > 0) & np.isfinite(inward)
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
@@ -179,6 +180,19 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     recorded_normals = gradient / size[:, None]
     locator = gradient_along(optics, angle[keep], held(places[keep], optics), recorded_normals[keep], size[keep])
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
+
+
+def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
+    """How many places there are on a rim; on an arc as many as are looked at.
+
+    The variance of an arc's radius goes as its length to the power of -5, so that it must begin and end where it is
+    predicted to, within a small part of `SPACING`.
+    """
+    if circle.ends is None:
+        return places_around(pictures, circle, SPACING * optics.scale_px, _MOST)
+    if pictures.lights:
+        return look(pictures, circle).shift.size
+    return places_around(pictures, circle, SPACING / _FINER * optics.scale_px, _MOST)
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
@@ -196,8 +210,11 @@ def _weights(
     """
     margin = optics.window_px + 4 * optics.scale_px + 1
     inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(-1)
-    shown = inside & seen_along(pictures, circle, angle)
-    if shown.mean() < LEAST_SEEN:
+    turn, off_ends = circle.turn / (2 * np.pi), within_ends(pictures, circle, angle)
+    if turn * off_ends.mean() < LEAST_SEEN:
+        return np.zeros(off_ends.size), status.SHORT
+    shown = inside & off_ends & seen_along(pictures, circle, angle)
+    if turn * shown.mean() < LEAST_SEEN:
         return np.zeros(shown.size), status.NOT_VISIBLE
     if seen is None:
         strong, weight = shown, arc
@@ -205,9 +222,9 @@ def _weights(
     else:
         strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
         weight, clear = arc * seen.squared / seen.noise_variance, seen.good
-        if strong.mean() < LEAST_SEEN:
+        if turn * strong.mean() < LEAST_SEEN:
             return np.zeros(shown.size), status.LOW_CONTRAST
     part = (strong & clear).mean()
-    if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or part < LEAST_SEEN:
+    if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or turn * part < LEAST_SEEN:
         return np.where(strong, weight, 0.0), status.CLUTTER
     return np.where(strong & clear, weight, 0.0), status.OK

@@ -166,7 +166,7 @@ def _check_corner(solid: Solid, key: str, corner: Corner) -> None:
 
 
 def _check_centre(solid: Solid, key: str, centre: Centre) -> None:
-    known = [circle.name for circle in solid.circles]
+    known = [circle.name for circle in solid.rims]
     if centre.circle not in known:
         raise ValueError(f"{key}.circle must be one of {', '.join(known) or '(none here)'}, got {centre.circle!r}")
 

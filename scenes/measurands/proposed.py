@@ -1,4 +1,4 @@
-"""Measurands that a part offers: bores, distances of holes, widths between parallel edges, shafts, corners.
+"""Measurands that a part offers: bores, distances of holes, widths between parallel edges, shafts, corners, slots.
 
 What a drawing of the part would ask for, with the general tolerances of ISO 2768-1, class m; for `ice new`, whose user
 keeps what is wanted.
@@ -22,7 +22,8 @@ _GENERAL = (6, 0.1), (30, 0.2), (120, 0.3), (400, 0.5), (1000, 0.8), (2000, 1.2)
 _SHARE = 0.2  # of a length: more than that no drawing tolerates
 _SAME = 1e-6  # of the part's size: in one plane; rad: parallel
 _DIGITS = 9  # by which lengths are put in order: what differs by rounding alone stays in the part's own order
-_MOST = {"diameter": 16, "holes": 8, "width": 16, "shaft": 4, "corners": 8}  # of each sort
+_MOST = {"diameter": 16, "holes": 8, "width": 16, "shaft": 4, "corners": 8, "arc": 8, "slot": 4}  # of each sort
+_ROUND_END = np.radians(150.0)  # of an arc: less is a rounded corner, which no drawing asks for by its own
 
 
 def proposed(solid: Solid, unit: Unit) -> tuple[Measurand, ...]:
@@ -47,6 +48,8 @@ def proposed(solid: Solid, unit: Unit) -> tuple[Measurand, ...]:
         "width": _widths(solid),
         "shaft": _shafts(solid),
         "corners": _corner_distances(solid),
+        "arc": _arc_diameters(solid),
+        "slot": _slot_lengths(solid),
     }
     found = (each for sort, rows in sorts.items() for each in islice(rows, _MOST[sort]))
     return tuple(
@@ -90,6 +93,39 @@ def _hole_distances(solid: Solid) -> Iterator[_Row]:
         if apart > near:
             features = Centre(circle=one.name), Centre(circle=other.name)
             yield f"distance {one.name} {other.name}", "distance", features, apart
+
+
+def _arc_diameters(solid: Solid) -> Iterator[_Row]:
+    """Of half bores and round ends, a slot's once."""
+    told = {arc.name for _, _, arc in _slots(solid)}
+    for arc in sorted(_round_ends(solid), key=lambda each: _largest(each.radius)):
+        if arc.name not in told:
+            yield f"diameter {arc.name}", "diameter", (Centre(circle=arc.name),), 2 * arc.radius
+
+
+def _slot_lengths(solid: Solid) -> Iterator[_Row]:
+    """Between the centres of the round ends of slots, the longest first."""
+    for apart, one, other in sorted(_slots(solid), key=lambda slot: _largest(slot[0])):
+        features = Centre(circle=one.name), Centre(circle=other.name)
+        yield f"distance {one.name} {other.name}", "distance", features, apart
+
+
+def _round_ends(solid: Solid) -> list[Circle]:
+    return [arc for arc in solid.arcs if arc.turn >= _ROUND_END]
+
+
+def _slots(solid: Solid) -> list[tuple[float, Circle, Circle]]:
+    """Round ends of one face, as wide as each other, which turn away from each other: how far apart, and both."""
+    found = []
+    for one, other in combinations(_round_ends(solid), 2):
+        way = other.centre - one.centre
+        apart, near = float(np.linalg.norm(way)), _SAME * solid.extent
+        alike = one.face == other.face and one.hole == other.hole and abs(one.radius - other.radius) <= 10 * near
+        if alike and apart > near:
+            beyond = [(arc.around(3)[1] - arc.centre) @ way / (apart * arc.radius) for arc in (one, other)]
+            if beyond[0] < _SAME - 1 and beyond[1] > 1 - _SAME:
+                found.append((apart, one, other))
+    return found
 
 
 def _plane_number(solid: Solid, face: int) -> int:

@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
 from scenes.parts import bodies
+from scenes.parts.arcs import arcs
 from scenes.parts.chains import Chain
 from scenes.parts.facets import Facets, facets
 from scenes.parts.joined import joined
@@ -123,9 +124,9 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
 
     Coplanar triangles become faces, collinear pieces one edge. Vertices where sharp edges meet are named v1, v2, ... in
     the order of their (x, y, z), sharp edges e1, e2, ... in the order of their ends, circles c1, c2, ... in that of
-    their centres, plane faces f1, f2, ... in that of their centroids. The rest is there to hide, shade and be seen, but
-    to measure nothing by: pieces of a circle c1.1, c1.2, ..., of other curved edges r1, ..., edges inside curved
-    surfaces s1, ..., their vertices p1, ...
+    their centres, then arcs of circles in that of their middles, plane faces f1, f2, ... in that of their centroids.
+    The rest is there to hide, shade and be seen, but to measure nothing by: pieces of a circle c1.1, c1.2, ..., of
+    other curved edges r1, ..., edges inside curved surfaces s1, ..., their vertices p1, ...
 
     Raises
     ------
@@ -160,7 +161,8 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])
     plain = _assembled(mesh, group, used, pieces, loops, circular)
-    return replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
+    found = replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
+    return replace(found, arcs=arcs(found))
 
 
 def _told(told: Told, mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], circular: list[Rim]) -> Facets:

@@ -91,14 +91,14 @@ def rims(loops: list[list[tuple[int, ...]]], vertices: np.ndarray, normals: np.n
         for loop in boundaries_:
             if len(loop) >= MIN_SEGMENTS:
                 centre, radius, off = circle_through(vertices[list(loop)], normals[face])
-                if off <= _ROUND * radius and _stepped(vertices[list(loop)], radius):
+                steps = np.linalg.norm(np.roll(vertices[list(loop)], -1, 0) - vertices[list(loop)], axis=1) / radius
+                if off <= _ROUND * radius and stepped(steps):
                     found.append(Rim(face, loop, centre, radius))
     return found
 
 
-def _stepped(points: np.ndarray, radius: float) -> bool:
-    """Whether the way from each to the next is a step around a circle, not a chord that cuts a part of it off."""
-    step = np.linalg.norm(np.roll(points, -1, 0) - points, axis=1) / radius
+def stepped(step: np.ndarray) -> bool:
+    """Whether each way to the next (n,), radii, is a step around a circle, not a chord that cuts a part of it off."""
     return bool(step.max() <= max(_WIDEST * np.median(step), _STEP))
 
 

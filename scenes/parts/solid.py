@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from scenes.parts.curved import Curved
+from scenes.parts.surfaces import axes_beside
 
 if TYPE_CHECKING:
     import trimesh
@@ -37,7 +39,7 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """A circular edge: the rim of a hole, or the end of a cylinder.
+    """A circular edge: the rim of a hole, or the end of a cylinder; whole, or an arc of one.
 
     Attributes
     ----------
@@ -52,6 +54,8 @@ class Circle:
         The straight edges that stand for it in the mesh.
     hole : bool
         Whether the wall looks towards the axis.
+    ends : ndarray, shape (2, 3), optional
+        Of an arc the places where it begins and ends, counter-clockwise around the axis; None of a whole circle.
     """
 
     name: str
@@ -61,6 +65,22 @@ class Circle:
     face: int
     edges: tuple[str, ...]
     hole: bool
+    ends: np.ndarray | None = None
+
+    @cached_property
+    def turn(self) -> float:
+        """How much of a turn it takes, rad: 2 pi for a whole circle."""
+        if self.ends is None:
+            return 2 * math.pi
+        first, last = self.ends - self.centre
+        return math.atan2(np.cross(first, last) @ self.axis, first @ last) % (2 * math.pi)
+
+    def around(self, count: int) -> np.ndarray:
+        """So many places around it, or from one end to the other, in equal steps, shape (count, 3)."""
+        first = axes_beside(self.axis)[0] if self.ends is None else self.ends[0] - self.centre
+        first = first - (first @ self.axis) * self.axis
+        first, angle = first / np.linalg.norm(first), np.linspace(0, self.turn, count)[:, None]
+        return self.centre + self.radius * (np.cos(angle) * first + np.sin(angle) * np.cross(self.axis, first))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +101,7 @@ class Solid:
     triangle_faces : ndarray of int, shape (T,), optional
         The face of each triangle.
     circles : tuple of Circle
+        Whole ones.
     holes : tuple of tuple of tuple of int
         Vertex indices of each face's inner boundaries, clockwise seen from outside; empty where no face has any.
     face_names : tuple of str
@@ -94,6 +115,8 @@ class Solid:
     regions : ndarray of int, shape (F,), optional
         Number of the curved surface that each face is a facet of, those that continue it smoothly among them; -1 for
         plane faces. Where not given, faces at a smooth edge are facets.
+    arcs : tuple of Circle
+        Circular edges that are no whole circles.
     """
 
     vertex_names: tuple[str, ...]
@@ -109,6 +132,7 @@ class Solid:
     triangle_sources: np.ndarray | None = None
     mended: tuple[str, ...] = ()
     regions: np.ndarray | None = None
+    arcs: tuple[Circle, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.face_names:
@@ -247,13 +271,18 @@ class Solid:
         there = Counter(end for edge in self.sharp for end in edge.ends)
         return tuple(name for i, name in enumerate(self.vertex_names) if there[i] > 1)
 
+    @property
+    def rims(self) -> tuple[Circle, ...]:
+        """The circular edges: whole circles, then arcs."""
+        return self.circles + self.arcs
+
     def circle(self, name: str) -> Circle:
         """The named circular edge."""
-        return next(circle for circle in self.circles if circle.name == name)
+        return next(circle for circle in self.rims if circle.name == name)
 
     def round(self, name: str) -> Circle | Curved:
         """The named circular edge or curved surface."""
-        return next(each for each in (*self.circles, *self.curved) if each.name == name)
+        return next(each for each in (*self.rims, *self.curved) if each.name == name)
 
     def mesh(self) -> trimesh.Trimesh:
         """The surface as triangles, vertices merged, normals outwards."""
@@ -354,6 +383,7 @@ def assembled(first: Solid, *others: Solid) -> Solid:
         triangles=np.concatenate(triangles),
         triangle_faces=np.concatenate(owners),
         circles=first.circles,
+        arcs=first.arcs,
         curved=first.curved,
         face_names=tuple(face_names),
         regions=np.concatenate(regions),

@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -22,7 +23,7 @@ from scenes.files.door import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
 from scenes.parts.curved import Curved
 from scenes.parts.facets import Facets
-from scenes.parts.solid import Solid
+from scenes.parts.solid import Circle, Solid
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Surface, Torus
 from scenes.parts.walls import exact_walls
 from scenes.units import Unit, in_unit
@@ -110,7 +111,9 @@ class StepPart:
         body = trimesh.Trimesh(self.triangles.reshape(-1, 3), np.arange(self.triangles.size // 3).reshape(-1, 3))
         with np.errstate(all="ignore"):  # triangles of no area
             found = mesh.solid(body, self._facets)
-        return replace(found, face_names=self._face_names(found), circles=self._exact(found))
+        circles = tuple(exact or circle for circle, exact in self._exact(found.circles, found.extent))
+        arcs = tuple(exact for _, exact in self._exact(found.arcs, found.extent) if exact)  # others are of splines
+        return replace(found, face_names=self._face_names(found), circles=circles, arcs=arcs)
 
     def _facets(self, ends: np.ndarray, sources: np.ndarray, of_faces: np.ndarray) -> Facets:
         """What chains (C, 2, 3) between triangles ``sources`` (C, 2) are; faces by a triangle each, (F,)."""
@@ -160,21 +163,18 @@ class StepPart:
                 names[face] = wanted
         return tuple(names)
 
-    def _exact(self, solid: Solid) -> tuple:
-        """The mesh's circles with the centres, axes and radii of the edges that they stand for."""
+    def _exact(self, circles: tuple[Circle, ...], extent: float) -> Iterator[tuple[Circle, Circle | None]]:
+        """The mesh's circles, each with that of the centre, axis and radius of the edge that it stands for, if any."""
         known = [edge for edge in self.edges if edge.kind == "circle"]
-        if not known:
-            return solid.circles
-        places = np.array([[*edge.centre, *edge.radii] for edge in known])
-        found = []
-        for circle in solid.circles:
+        places = np.array([[*edge.centre, *edge.radii] for edge in known]).reshape(-1, 4)
+        for circle in circles:
             off = np.abs(places - [*circle.centre, circle.radius]).max(1)
+            if off.min(initial=np.inf) > _SAME * extent:
+                yield circle, None
+                continue
             edge = known[int(off.argmin())]
-            if off.min() <= _SAME * solid.extent:
-                (radius,), axis = edge.radii, edge.axis * math.copysign(1.0, float(edge.axis @ circle.axis))
-                circle = replace(circle, centre=edge.centre, axis=axis, radius=radius)
-            found.append(circle)
-        return tuple(found)
+            (radius,), axis = edge.radii, edge.axis * math.copysign(1.0, float(edge.axis @ circle.axis))
+            yield circle, replace(circle, centre=edge.centre, axis=axis, radius=radius)
 
 
 def read(path: Path, unit: Unit = "mm", body: str | int | None = None) -> StepPart:

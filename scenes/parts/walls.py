@@ -62,7 +62,7 @@ def exact_walls(
     """
     near = _SAME * solid.extent
     kinds = _kinds(surfaces, near)[owners]
-    taken = {part.name for part in (*solid.circles, *solid.edges)} | set(solid.vertex_names)
+    taken = {part.name for part in (*solid.rims, *solid.edges)} | set(solid.vertex_names)
     found: list[Curved] = []
     for faces in _pieces(solid, kinds):
         owner = int(owners[faces[0]])

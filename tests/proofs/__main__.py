@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from tests.proofs.affine_fits import affine_fits
+from tests.proofs.arcs import arcs
 from tests.proofs.bias import bias
 from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
@@ -27,6 +28,7 @@ from tests.proofs.uneven import uneven
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command()(affine_fits)
+app.command()(arcs)
 app.command()(bias)
 app.command()(boards)
 app.command()(conditions)

@@ -6,7 +6,6 @@ import sys
 import tomllib
 from importlib.util import find_spec
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,7 +171,7 @@ def test_the_worker_is_silent(tmp_path):
 
 
 def test_circles_of_the_mesh_are_those_of_the_edges_that_they_stand_for():
-    """Centre, axis and radius of the nearest edge, the axis along the mesh's own; the mesh's where none is near."""
+    """Centre, axis and radius of the nearest edge, the axis along the mesh's own; None where none is near."""
 
     def edge(kind, centre, axis, *radii):
         return step.StepEdge(kind, (0, 1), np.zeros((2, 3)), np.array(centre, float), np.array(axis, float), radii)
@@ -190,13 +189,14 @@ def test_circles_of_the_mesh_are_those_of_the_edges_that_they_stand_for():
         edge("circle", small.centre, small.axis, small.radius + 3e-4),
     )
     part = step.StepPart((), (), edges, np.zeros((0, 3, 3)), np.zeros(0, int))
-    found = part._exact(SimpleNamespace(circles=circles, extent=10.0))
+    made, found = zip(*part._exact(circles, 10.0), strict=True)
+    assert made == circles
     assert found[0].centre.tolist() == edges[1].centre.tolist()
     assert found[0].axis.tolist() == near.axis.tolist()
     assert found[0].radius == near.radius + 2e-6
-    assert found[1:] == (far, small)
+    assert found[1:] == (None, None)
     bare = step.StepPart((), (), edges[:1], np.zeros((0, 3, 3)), np.zeros(0, int))
-    assert bare._exact(SimpleNamespace(circles=circles, extent=10.0)) is circles
+    assert list(bare._exact(circles, 10.0)) == [(near, None), (far, None), (small, None)]
 
 
 @kernel

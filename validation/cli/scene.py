@@ -48,7 +48,7 @@ def new_command(
     facts = {
         "file": str(path),
         "edges": len(made.solid.sharp),
-        "circles": len(made.solid.circles),
+        "circles": len(made.solid.rims),
         "measurands": asked,
         "sensor": look and list(look.sensor),
         "light": look and list(look.light),

@@ -163,12 +163,14 @@ def overlay(scene: Scene, picture: Picture, told: Answer) -> dict[str, Any]:
 
 def _circles(scene: Scene) -> list[str]:
     needed = {name for quantity in scene.quantities for name in quantity.edges}
-    return [circle.name for circle in scene.solid.circles if circle.name in needed]
+    return [circle.name for circle in scene.solid.rims if circle.name in needed]
 
 
 def _rim(scene: Scene, name: str) -> np.ndarray:
     """Points around a circle, shape (n, 3)."""
     circle = scene.solid.circle(name)
+    if circle.ends is not None:
+        return circle.around(_CHORDS + 1)
     helper = np.eye(3)[np.argmin(np.abs(circle.axis))]
     one = np.cross(circle.axis, helper)
     one /= np.linalg.norm(one)

@@ -38,7 +38,7 @@ def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
     _faces(axis, view)
     for edge in scene.solid.sharp:
         _edge(axis, view, edge)
-    for circle in scene.solid.circles:
+    for circle in scene.solid.rims:
         _circle(axis, view, circle)
     for name in scene.solid.corner_names:
         _vertex(axis, view, name)

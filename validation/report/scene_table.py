@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,7 +14,7 @@ from scenes import AnyLight, Curved, Mesh, Scene
 from scenes.measurands.features import place_of
 from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
-from scenes.parts.solid import Edge, Solid
+from scenes.parts.solid import Circle, Edge, Solid
 from validation.report.cells import table, zone
 from validation.strict_json import plain
 
@@ -27,11 +28,7 @@ def facts(scene: Scene) -> dict[str, Any]:
         "units": scene.units,
         "vertices": [{"name": name, "at": solid.vertex(name)} for name in solid.corner_names],
         "edges": [_edge(solid, edge) for edge in solid.sharp],
-        "circles": [
-            {"name": circle.name, "centre": circle.centre, "axis": circle.axis, "diameter": 2 * circle.radius,
-             "hole": circle.hole}
-            for circle in solid.circles
-        ],
+        "circles": list(map(_circle, solid.rims)),
         "faces": [_face(scene, f) for f in range(len(solid.faces)) if solid.plane[f]],
         "cylinders": list(map(_cylinder, facets.values())),
         "surfaces": [_surface(wall, facets.get(wall.name)) for wall in scene.all_walls.curved],
@@ -43,6 +40,14 @@ def facts(scene: Scene) -> dict[str, Any]:
 def _edge(solid: Solid, edge: Edge) -> dict[str, Any]:
     ends = [solid.vertex_names[end] for end in edge.ends]
     return {"name": edge.name, "ends": ends, "length": solid.length(edge), "convex": edge.convex}
+
+
+def _circle(circle: Circle) -> dict[str, Any]:
+    told = {
+        "name": circle.name, "centre": circle.centre, "axis": circle.axis, "diameter": 2 * circle.radius,
+        "hole": circle.hole,
+    }  # fmt: skip
+    return told if circle.ends is None else told | {"turn": math.degrees(circle.turn)}
 
 
 def _face(scene: Scene, f: int) -> dict[str, Any]:
@@ -93,7 +98,7 @@ def _tables(scene: Scene) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str
         for each in known["edges"]
     ]  # fmt: skip
     yield "Circles", ("name", *"xyz", "diameter", ""), [
-        (each["name"], *_place(each["centre"]), _number(each["diameter"]), _side(each)) for each in known["circles"]
+        (each["name"], *_place(each["centre"]), _number(each["diameter"]), _arc(each)) for each in known["circles"]
     ]  # fmt: skip
     yield "Cylinders among the facets", ("name", *"xyz", "axis", "diameter", "residual", ""), [
         (each["name"], *_place(each["point"]), _direction(each["axis"]), _number(each["diameter"]),
@@ -137,6 +142,11 @@ def _direction(axis: list[float] | None) -> str:
 
 def _side(circle: dict[str, Any]) -> str:
     return "hole" if circle["hole"] else "outer"
+
+
+def _arc(circle: dict[str, Any]) -> str:
+    turn = f", arc of {circle['turn']:.0f} degrees" if "turn" in circle else ""
+    return f"{_side(circle)}{turn}"
 
 
 def _surface(wall: Curved, recognised: Recognised | None) -> dict[str, Any]:

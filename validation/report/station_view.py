@@ -94,6 +94,8 @@ def _outline(picture: Picture, feature) -> list[np.ndarray]:
         return [_seen(picture, solid.vertices[list(solid.edge(feature.edge).ends)])]
     if isinstance(feature, Centre):
         circle = solid.circle(feature.circle)
+        if circle.ends is not None:
+            return [_seen(picture, circle.around(_CHORDS + 1))]
         return [_seen(picture, _round(circle.centre, circle.axis, circle.radius))]
     if isinstance(feature, Wall):
         eye = sensor_position(picture.scene.camera, np.array(list(picture.sensor)))
