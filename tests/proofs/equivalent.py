@@ -6,6 +6,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
+    "imaging/models/texture.py: middle = edge_points(scene.solid, (name,), np.array([0.5]))[-1]":
+        "of one edge the last is the first",
     "planner/search/exhaustive.py: _NONE = np.inf, - 2, -1": "numbers of no pair, before one is found",
     'validation/batch/job.py: return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[: 15]':
         "a digit less of a digest",

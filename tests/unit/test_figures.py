@@ -154,6 +154,7 @@ def test_a_calibrations_arrows_are_its_residuals_enlarged(calibrated):
     """By 200: the largest round number that makes the root mean square arrow at most a fiftieth of 640 px."""
     figure, boards, left = calibrated(3, 0.05)
     (axis,) = figure.axes
+    assert figure.get_size_inches().tolist() == [9, 9 * 480 / 640 + 1.2]  # of the picture's shape, and lines of words
     assert axis.get_title() == "Residuals x 200: 0.0500 px rms, ok, p = 0.43; +: the axis"
     for arrows, board, rest in zip(axis.collections, boards, left, strict=True):
         assert arrows.get_offsets() == pytest.approx(board.corners)

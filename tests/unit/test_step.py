@@ -1,6 +1,7 @@
 """Parts from STEP files: exact surfaces, names, units, circles, and what is refused. Without the kernel, its record."""
 
 import json
+import math
 import subprocess
 import sys
 import tomllib
@@ -236,3 +237,10 @@ def test_a_part_cut_as_splines_is_the_same_part(tmp_path, monkeypatch):
     exact = 60 * 40 * 10 - np.pi * (6**2 + 3**2) * 10
     chords = 10 * (6**2 + 3**2) * np.pi * (2 * np.pi / 96) ** 2 / 6  # of polygons of 96 sides
     assert exact < volume < exact + 1.5 * chords
+
+
+def test_a_cone_has_the_radius_of_its_middle():
+    """From 1 at its first end to 5 at its last; the file's own point is where it is 1, and may be its tip."""
+    made = step._cone(np.array([7.0, 0, 0]), np.array([0, 0, 1.0]), 1.0, math.atan(0.5), [0.0, 8.0], True)
+    assert np.asarray(made.point).tolist() == [7, 0, 4]
+    assert (made.radius, made.ends) == (pytest.approx(3.0), (-4.0, 4.0))
