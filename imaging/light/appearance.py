@@ -241,7 +241,7 @@ def _separable_contrast(scene: Scene, strength: np.ndarray, r2: np.ndarray) -> E
 def paper_contrast2(pictures: Pictures, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:
     """Squared contrast of eq. 10 with eq. 1's intensities: no fall-off, no end of the scale; shape (..., E, n)."""
     scene = pictures.scene
-    if is_separable(scene):
+    if names and is_separable(scene):
         return (paper_step(pictures, names) ** 2)[..., None] / edge_distance2(pictures, names, fractions)
     sides = side_signals(pictures, names, edge_points(scene.solid, names, fractions), fall_off=False)
     return (sides[..., 0, :] - sides[..., 1, :]) ** 2

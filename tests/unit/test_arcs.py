@@ -14,11 +14,12 @@ from imaging.features.locator import reach
 from imaging.features.rim_look import look
 from imaging.features.rim_sides import angles_of, equal_angles, radials, within_ends
 from imaging.pictures import Pictures
+from scenes import Picture
 from scenes.measurands.proposed import proposed
 from scenes.parts import mesh
 from scenes.parts.arcs import LEAST_TURN, arcs
 from tests import parts
-from tests.proofs.arcs import scene_of
+from tests.proofs.arcs import as_if_whole, scene_of
 
 kernel = pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
 
@@ -202,6 +203,16 @@ def test_a_short_arc_is_said_to_be(tmp_path):
     assert pytest.approx(0.1) == LEAST_SEEN
     near = scene.with_(camera=scene.camera.model_copy(update={"distance": 100.0}))
     assert planner.predict(near, (20, 230), (40, 20)).measurands[0].status == "ok"
+
+
+@pytest.mark.parametrize("model", ["calibrated", "bound", "paper"])
+def test_a_convex_part_of_which_no_straight_edge_is_asked_for(corner, model):
+    """Every model has its variance, hundreds of times what a whole circle would have."""
+    scene, arc, _ = corner
+    expected = planner.predict(scene, (20, 230), (40, 20), model=model).measurands[0]
+    assert expected.status == "ok"
+    whole = as_if_whole(Picture.of(scene, (20, 230), (40, 20)), arc)[2, 2]
+    assert expected.variance_object > 20**2 / 2 * 4 * whole
 
 
 def test_slots_and_half_bores_are_proposed():
