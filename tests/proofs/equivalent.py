@@ -6,6 +6,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
+    "imaging/features/rim_sides.py: return circle.face, next(face for face in solid.edge(circle.edges[-1]).faces "
+    "if face != circle.face)": "the wall beside a circle is the same at its last edge",
+    "scenes/measurands/taper.py: return Evaluated(2 * DEGREE / sign * angle, {number: np.full(np.shape(angle), "
+    "2 * DEGREE * sign)})": "a sign is its own inverse",
     "measure/features/conic.py: weights = np.minimum(1 / np.diag(full), 1e+300)": "the same number",
     "validation/cost/trial.py: work.measure_chunk(case, self.image, self.seed, 1, 2)  # prepares the estimators":
         "other noise of images that nobody looks at",

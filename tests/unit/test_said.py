@@ -308,3 +308,15 @@ def test_an_effect_beyond_its_bound_is_exit_status_1(holds, code, monkeypatch):
     monkeypatch.setattr(effects_check, "check", lambda *_, **__: rows)
     assert [row.holds for row in rows] == list(holds)
     assert ice("effects", "task1", *["--check"] * bool(rows), "--json").returncode == code
+
+
+@pytest.mark.parametrize("count", [30, 33])
+def test_of_many_shapes_the_others_are_counted(count):
+    """Below the thirty best, in the first of the table's columns."""
+    shape = SimpleNamespace(
+        kind="ellipse", centre=(10.0, 20.0), sizes=(8.0, 5.0), support=0.9, contrast=12.0, score=3.0
+    )  # fmt: skip
+    found = photograph.table(SimpleNamespace(found=(), candidates=[shape] * count))
+    assert len(found.columns) == 7
+    cells = list(found.columns[0].cells)
+    assert cells[30:] == (["and 3 more"] if count > 30 else [])
