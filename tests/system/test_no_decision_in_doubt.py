@@ -62,6 +62,7 @@ COMMANDS = {
     "budget, rendered, as pages": ("budget", "plate.toml", *POSE, "--render", "--out", "pages/budget"),
     "validate": ("validate", "plate.toml", "--renders", "20", "--workers", "1", "--out", "run", "--fresh"),
     "plan, as pages": ("plan", "plate.toml", "--sensor", "20,0", "--step", "30", "--check", "1", "--out", "plan"),
+    "plan of several pictures": ("plan", "plate.toml", "--sensor", "20,0", "--step", "30", "--views", "1"),
     "predict": ("predict", "plate.toml"),
     "predict, rendered": ("predict", "plate.toml", *POSE, "--render"),
 }
