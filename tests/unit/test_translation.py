@@ -1,5 +1,7 @@
 """Everything moved by P, and the camera looking at P: the same picture, the same prediction, the same decisions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ import planner
 import render
 import scenes
 from scenes import Floor, Obstacle, Picture
-from scenes.parts.solid import Circle, Solid
+from scenes.parts.solid import Solid
 from tests.oracle import axes
 from validation.hard.scenes_for import with_solid
 
@@ -20,7 +22,7 @@ ELSEWHERE = (35, 70), (20, 200)
 def moved(scene, by=P):
     """Object, obstacles, floor and what the camera looks at, moved; lights and sensor go with what is looked at."""
     old = scene.solid
-    circles = tuple(Circle(**{**vars(circle), "centre": circle.centre + by}) for circle in old.circles)
+    circles = tuple(replace(circle, centre=circle.centre + by) for circle in old.circles)
     body = Solid(
         old.vertex_names, old.vertices + by, old.faces, old.edges, old.triangles + by, old.triangle_faces, circles
     )
