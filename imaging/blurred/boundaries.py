@@ -13,6 +13,7 @@ import numpy as np
 
 from imaging.blurred.segment import Segments
 from imaging.geometry.projection import camera_frame, depth, edge_points, facing, from_axis
+from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
 from imaging.light.appearance import face_signal, is_plain, side_signals
 from imaging.light.between import light_between
@@ -126,9 +127,7 @@ def _pairs(pictures: Pictures, places: Places, far: float) -> tuple[np.ndarray, 
     lengths = ((last - first) * t).sum(-1)
     along = [end[..., 0] * t[..., 0] + end[..., 1] * t[..., 1] for end in ends]
     across = [end[..., 1] * t[..., 0] - end[..., 0] * t[..., 1] for end in ends]
-    sides = facing(bodies, pictures.sensor_at)[:, [edge.faces for edge in bodies.edges]]
-    slight = np.array([edge.name in bodies.slight for edge in bodies.edges], bool)
-    seen = np.where(slight, sides.sum(-1) == 1, sides.any(-1))[:, None]
+    seen = boundaries(bodies, bodies.edges, facing(bodies, pictures.sensor_at))[:, None]
     beside = (np.minimum(*across) < far) & (np.maximum(*across) > -far)
     reached = (np.maximum(*along) > places.fractions.min(-1)[..., None] * lengths - far) & (
         np.minimum(*along) < places.fractions.max(-1)[..., None] * lengths + far

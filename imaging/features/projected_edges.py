@@ -14,7 +14,7 @@ import numpy as np
 from imaging.features.locator import reach
 from imaging.geometry.lens import image_centre, recorded
 from imaging.geometry.projection import depth, facing, from_axis
-from imaging.geometry.visibility import longest_span, turned
+from imaging.geometry.visibility import boundaries, longest_span, turned
 from imaging.pictures import Pictures
 from scenes import Centre, Corner, Edge, Scene, Solid, Wall
 from scenes.measurands.features import place_of
@@ -193,7 +193,5 @@ def _trim(solid: Solid, edge: Edge, end: int, corners: dict, seen: np.ndarray, c
         sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
-        sides = seen[..., list(other.faces)]
-        there = sides.sum(-1) == 1 if other.name in solid.slight else sides.any(-1)
-        trim = np.where(there, np.fmax(trim, needed), trim)
+        trim = np.where(boundaries(solid, (other,), seen)[..., 0], np.fmax(trim, needed), trim)
     return trim

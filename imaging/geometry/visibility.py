@@ -8,6 +8,7 @@ where 0 < a + b < 1. So the interval is exact, and no ray has to be cast.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -140,6 +141,23 @@ def turned(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     faces = list(edge.faces)
     towards = above(positions, solid.normals[faces], solid.offsets[faces])
     return towards if edge.convex else towards & towards.all(-1, keepdims=True)
+
+
+def boundaries(solid: Solid, edges: Sequence[Edge], faces: np.ndarray) -> np.ndarray:
+    """Which of E edges a picture shows as lines, bool, shape (..., E).
+
+    A face of the edge is seen; of a slight bend inside of a curved surface (`Solid.slight`) one, and not the other.
+
+    Parameters
+    ----------
+    edges : sequence of Edge
+        Of the solid.
+    faces : ndarray of bool, shape (..., F)
+        The solid's faces that are seen.
+    """
+    sides = faces[..., np.array([edge.faces for edge in edges], int).reshape(-1, 2)]
+    slight = np.array([edge.name in solid.slight for edge in edges], bool)
+    return np.where(slight, sides.sum(-1) == 1, sides.any(-1))
 
 
 def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:

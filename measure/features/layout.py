@@ -12,12 +12,13 @@ from imaging.blurred.arrangement import Arrangement, arrangement_of, polygon_arr
 from imaging.features.projected_edges import corner_features, projected_edges, straight
 from imaging.geometry.lens import signed_confusion
 from imaging.geometry.projection import depth, facing, project_ideal
+from imaging.geometry.visibility import boundaries
 from imaging.light.appearance import is_plain
 from imaging.models.bias import cluttered
 from imaging.pictures import Pictures
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
-from scenes import Picture, Scene
+from scenes import Edge, Picture, Scene, Solid
 
 BACKGROUND = -1
 
@@ -170,11 +171,11 @@ def layout_of(picture: Picture) -> Layout:
     seen = facing(solid, pictures.sensor_at)
     wanted = picture.lights and names  # beside no edge nobody asks for it
     shadings = face_shadings(pictures) if wanted else [None] * len(solid.faces)
-    turned = [edge for edge in solid.edges if seen[list(edge.faces)].any()]  # trimmed for whatever the light may be
+    turned = _boundaries(solid, seen)  # trimmed for whatever the light may be
     if any(shadings):
         seen = seen & np.array([shading is not None for shading in shadings])
     required = [solid.edge(name) for name in view.names]
-    shown = [edge for edge in solid.edges if seen[list(edge.faces)].any()]
+    shown = _boundaries(solid, seen)
     order = sorted(
         np.flatnonzero(seen), key=lambda f: -depth(solid.vertices[list(solid.faces[f])], pose, scene.camera).mean()
     )
@@ -230,6 +231,10 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         defocus=np.zeros((count, 2)),
         arrangement=polygon_arrangement(corners, optics.blur_px),
     )
+
+
+def _boundaries(solid: Solid, seen: np.ndarray) -> list[Edge]:
+    return [edge for edge, there in zip(solid.edges, boundaries(solid, solid.edges, seen), strict=True) if there]
 
 
 def _defocus(scene: Scene, pose: np.ndarray, required) -> np.ndarray:

@@ -5,9 +5,15 @@ import pytest
 from skimage.draw import polygon2mask
 
 import scenes
+from imaging.features.locator import MIN_USABLE, reach
+from imaging.features.projected_edges import projected_edges
+from imaging.pictures import Pictures
+from measure.features.calipers import edge_calipers
 from measure.features.layout import BACKGROUND, layout_of, polygon_layout
 from measure.features.optics import Optics
+from scenes import status
 from tests.oracle import axes
+from tests.parts import newcomers_plate
 
 OPTICS = Optics((60, 80), 0.7, 4.0)
 CORNERS = np.array([[20.0, 12.0], [62.0, 18.0], [55.0, 47.0], [17.0, 40.0]])
@@ -114,3 +120,54 @@ def test_faces_beside_an_edge_are_told_by_their_middle(pose, task1):
 def _seen(scene, face, pose):
     corner = scene.solid.vertices[scene.solid.faces[face][0]]
     return (scene.camera.distance * axes(pose)[0] - corner) @ scene.solid.normals[face] > 0
+
+
+@pytest.fixture(scope="module")
+def slotted(tmp_path_factory):
+    """A plate with a slot of 4 x 14 mm, its round ends in steps of 7.5 degrees; sides of slot, plate and step."""
+    file = tmp_path_factory.mktemp("slotted") / "plate.stl"
+    newcomers_plate().export(file)
+    pairs = {"slot": ("e10", "e12"), "plate": ("e5", "e8"), "step": ("e14", "e16")}
+    asked = [{"name": k, "kind": "width", "features": [{"edge": e} for e in pair]} for k, pair in pairs.items()]
+    return scenes.Scene.model_validate({
+        "name": "slotted", "units": "mm", "object": {"kind": "mesh", "units": "mm", "file": str(file)},
+        "camera": {"width": 640, "height": 512, "focal_px": 1250.0, "distance": 217.0, "look_at": [25.0, 15.0, 4.0],
+                   "blur_px": 0.5},
+        "material": {"diffuse_reflectance": 0.8}, "light": {"distance": 217.0}, "noise": {"sigma": 1.5},
+        "measurands": asked,
+    })  # fmt: skip
+
+
+def _left(scene, pose):
+    """By name: the layout's calipers, and the planner's lengths and trims, px, without the image's borders."""
+    view = projected_edges(Pictures.of(scenes.Picture.of(scene, pose)))
+    clear = reach(scene.locator.scale_px, scene.camera.blur_px)
+    calipers = edge_calipers(layout_of(scenes.Picture.of(scene, pose)), clear, -1e9, 0.0)
+    told = zip(view.names, view.visible, view.lengths, view.trims, strict=True)
+    return {f.name: (f, *each) for f, (_, *each) in zip(calipers, told, strict=True)}, clear
+
+
+def test_no_edge_is_trimmed_at_the_seam_of_its_side_and_a_round_end(slotted):
+    """From 20 degrees beside the vertical the seams run along the slot's sides (1 in 38), and are no boundaries.
+
+    The arcs turn away from the sides, so that the reach itself is left out at both ends.
+    """
+    found, clear = _left(slotted, (20, 0))
+    for name in ("e10", "e12"):
+        caliper, _, length, trims = found[name]
+        assert length > 50
+        assert caliper.status == status.OK
+        assert caliper.positions[[0, -1]] == pytest.approx([clear, length - clear], abs=1e-9)
+        assert trims == pytest.approx([clear, clear], abs=1e-9)
+
+
+@pytest.mark.parametrize("pose", [(20, 0), (20, 90), (35, 180), (50, 300), (70, 5), (75, 181)])
+def test_what_is_left_of_an_edge_is_what_the_planner_says(pose, slotted):
+    """At bends of curved walls too: those are boundaries where one side is turned away, and only there."""
+    for caliper, visible, length, trims in _left(slotted, pose)[0].values():
+        left = length - trims.sum()
+        assert (caliper.status == status.NOT_VISIBLE) == (not visible)
+        if visible:
+            assert (caliper.status == status.SHORT) == (left < MIN_USABLE)
+        if caliper.positions.size:
+            assert caliper.positions[[0, -1]] == pytest.approx([trims[0], length - trims[1]], abs=1e-9)
