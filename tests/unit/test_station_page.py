@@ -424,8 +424,8 @@ def test_the_view_from_above_shows_azimuth_0(plate, azimuth, monkeypatch):
         assert way / np.linalg.norm(way) == pytest.approx([np.cos(turn), -np.sin(turn)], abs=1e-9)
         (left, right), (low, high) = above.get_xlim(), above.get_ylim()
         for x, y in (arrow.xy, arrow.get_position(), letter.get_position()):
-            assert left < x < right
-            assert low < y < high
+            assert left + 0.06 * (right - left) < x < right - 0.06 * (right - left)  # margin: by half a letter's size
+            assert low + 0.06 * (high - low) < y < high - 0.06 * (high - low)  # margin: by half a letter's size
         placed = [line.get_xydata()[0] for line in above.lines if line.get_marker() in ("*", "s")]
         assert len(placed) == 2
         away = [np.linalg.norm(place - arrow.xy) for place in placed]

@@ -18,8 +18,8 @@ from validation.report.canvas import TEXT, inline
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
-AZIMUTH = "Azimuth: from the part's x axis (arrow), counterclockwise from above."
-_CORNERS = np.array([[0.88, 0.12], [0.88, 0.88], [0.12, 0.88]])  # in parts of a view; in the fourth stands the scale
+AZIMUTH = "Arrow: the part's x axis, azimuth 0°, counted counterclockwise."
+_CORNERS = np.array([[0.84, 0.16], [0.84, 0.84], [0.16, 0.84]])  # in parts of a view; in the fourth stands the scale
 _VIEWS = ("from the side", "from above")
 
 
@@ -119,9 +119,9 @@ def _azimuth(axis, flat: np.ndarray, places: list[np.ndarray]) -> None:
     size, along = high - low, np.array([1.0, 0.0, 0.0]) @ flat
     corners = low + _CORNERS * size
     away = [min(np.linalg.norm(place - corner) for place in places) for corner in corners]
-    centre, half = corners[np.argmax(np.round(away, 6))], 0.06 * size[0] * along
+    centre, half = corners[np.argmax(np.round(away, 6))], 0.05 * size[0] * along
     axis.annotate("", centre + half, xytext=centre - half, arrowprops={"arrowstyle": "->", "lw": 1.2})
-    axis.text(*(centre + 1.7 * half), "x", fontsize=TEXT, ha="center", va="center")
+    axis.text(*(centre + 1.8 * half), "x", fontsize=TEXT, ha="center", va="center")
 
 
 def _scale(axis, units: str) -> None:
