@@ -133,7 +133,7 @@ def test_a_notebook_shows_pictures_once_validation_is_there(results, task1, monk
         shown = found._repr_html_()
         assert shown.count('<svg role="img"') == 1
         assert "<table>" in shown
-    assert "The part as the camera sees it. 1 distance: no tolerance given" in picture._repr_html_()
+    assert "What is measured, drawn from the model. 1 distance: no tolerance given" in picture._repr_html_()
     assert results["Views"]._repr_html_().count('<svg role="img"') == 3  # from above, and both pictures
     assert "<svg" not in results["Budget"]._repr_html_()
     assert "<svg" not in picture.unlit()._repr_html_()

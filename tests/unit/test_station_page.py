@@ -24,6 +24,7 @@ from validation.report import (
     page,
     proof_figures,
     requirements,
+    settings_table,
     source_words,
     station,
     station_sketch,
@@ -111,6 +112,8 @@ def rig():
         (0.0049, "ok", None, Grade.OPEN),
         (0.0049, "clutter", TOLERANCE, Grade.DOUBT),
         (0.0049, "clutter", None, Grade.DOUBT),
+        (0.0049, "short", TOLERANCE, Grade.MISSING),
+        (None, "not_visible", None, Grade.MISSING),
     ],
 )
 def test_grades_are_of_half_the_zone(u, status, tolerance, grade):
@@ -171,8 +174,58 @@ def test_of_many_requirements_the_numbers_are_named():
     doubtful = [required(k, status="short", name=f"r{k}") for k in range(1, 6)]
     (line,) = wording.wrong([*doubtful, required(6)])
     assert line.startswith("Requirements no. 1, 2, 3, 4 and 5, status short: ")
-    assert wording.sentence([*doubtful, required(6)]).endswith("5 of 6 requirements are not proven: their values must "
-                                                               "not be relied on.")  # fmt: skip
+    several = wording.sentence([*doubtful, required(6)])
+    assert several.endswith(f"5 of 6 requirements are not measured: {MEANINGS['short']}.")
+
+
+def test_what_has_no_value_is_not_measured_and_what_has_one_is_not_proven():
+    short, hidden = required(1, status="short", name="a"), required(2, status="not_visible", name="b")
+    doubtful = required(3, status="clutter", name="c")
+    assert wording.sentence([short, doubtful]) == (
+        f"C (no. 3) is not proven: its value must not be relied on. A (no. 1) is not measured: {MEANINGS['short']}."
+    )
+    assert wording.sentence([short, hidden, doubtful]).endswith("A (no. 1) and b (no. 2) are not measured: they have "
+                                                                "no value.")  # fmt: skip
+    lines = station_table.lines([doubtful, short])
+    assert [line.cells[7] for line in lines] == ["not measured: short", "not proven: clutter"]
+    assert [line.cells[5] for line in lines] == ["-", "-"]
+
+
+def test_nothing_is_wrong_where_all_are_usable_and_those_below_the_aim_are_named():
+    well, within = required(), required(2, u=0.012, name="slot")
+    assert wording.nothing_wrong([well]) == "Nothing."
+    assert wording.nothing_wrong([well, within]) == ("Nothing is wrong; slot (no. 2) is less precise than aimed at.")
+    both = [within, dataclasses.replace(within, number=3, name="step")]
+    assert wording.nothing_wrong([well, *both]).endswith(
+        "slot (no. 2) and step (no. 3) are less precise than aimed at."
+    )
+
+
+def test_a_run_is_titled_by_its_part():
+    """Its own title first; that of a campaign without one names the scene of the setting that is shown."""
+
+    def told(title, name, part):
+        scene = SimpleNamespace(title=part, name="block")
+        return page._title(SimpleNamespace(title=title, scene=name),
+                           SimpleNamespace(picture=SimpleNamespace(scene=scene)))  # fmt: skip
+
+    assert told("Own", "large", "A block") == "Own"
+    assert told("", "block", "") == "block"
+    assert told("", "large", "A block") == "A block (campaign large)"
+    assert told("", "large", "") == "block (campaign large)"
+
+
+def test_the_table_of_settings_speaks_of_camera_and_lamp_and_explains_its_statuses(monkeypatch):
+    rows = [setting(0, ("a", 0.01, "ok"), ("b", 0.1, "ok")), setting(1, ("a", 0.01, "ok"), ("b", 0.1, "short"))]
+    monkeypatch.setattr(settings_table, "names", lambda found, some: (["noise.sigma", "sensor", "light"], {
+        row.index: ["1", "(1.0, 2.0)", "(3.0, 4.0)"] for row in some}))  # fmt: skip
+    made = settings_table.table(SimpleNamespace(rows=rows), {"a": 0.1, "b": 1.0}, 1)
+    assert made.columns == ["setting", "noise.sigma", "camera", "lamp", "largest sigma", "proven",
+                            "not proven, by status"]  # fmt: skip
+    assert [row[-2:] for row in made.rows] == [["2 of 2", "-"], ["1 of 2", "short 1"]]
+    assert f" short: {MEANINGS['short']}." in made.note
+    assert "proven: value and sigma can be relied on" in made.note
+    assert "ok:" not in made.note
 
 
 def test_what_is_wrong_is_told_with_its_number():
@@ -225,8 +278,8 @@ def test_one_that_cannot_be_measured_takes_nothing_from_the_others(plate):
     states = ["ok", "low_contrast", "ok", "ok", "ok"]
     made = requirements.requirements(plate, sigmas, [0.0] * 5, found, states)
     assert [each.U is None for each in made] == [False, True, False, False, False]
-    assert made[1].grade == Grade.DOUBT
-    assert "Bore (no. 2) is not proven" in wording.sentence(made)
+    assert made[1].grade == Grade.MISSING
+    assert "Bore (no. 2) is not measured: too little" in wording.sentence(made)
     whole = {each.name: each.U for each in planner.budget(plate).measurands}
     assert pytest.approx(whole["length"]) == made[2].U
 
@@ -355,6 +408,33 @@ def test_lamps_are_drawn_where_they_stand(name, monkeypatch):
             plt.close(figure)
 
 
+@pytest.mark.parametrize("azimuth", [0.0, 85.0, 200.0])
+def test_the_view_from_above_shows_azimuth_0(plate, azimuth, monkeypatch):
+    """An arrow along the part's x axis as the view turns it, within the view, away from camera and lamp; no other."""
+    picture = Picture.of(plate.scene, (20, azimuth), (30, azimuth + 130))
+    kept = []
+    monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure) or "")
+    station_sketch.draw(picture)
+    try:
+        side, above = (figure.axes[0] for figure in kept)
+        assert not any(text.get_text() == "x" for text in side.texts)
+        (arrow,) = (text for text in above.texts if getattr(text, "arrow_patch", None) is not None)
+        (letter,) = (text for text in above.texts if text.get_text() == "x")
+        way, turn = np.array(arrow.xy) - arrow.get_position(), np.radians(azimuth)
+        assert way / np.linalg.norm(way) == pytest.approx([np.cos(turn), -np.sin(turn)], abs=1e-9)
+        (left, right), (low, high) = above.get_xlim(), above.get_ylim()
+        for x, y in (arrow.xy, arrow.get_position(), letter.get_position()):
+            assert left + 0.06 * (right - left) < x < right - 0.06 * (right - left)  # margin: by half a letter's size
+            assert low + 0.06 * (high - low) < y < high - 0.06 * (high - low)  # margin: by half a letter's size
+        placed = [line.get_xydata()[0] for line in above.lines if line.get_marker() in ("*", "s")]
+        assert len(placed) == 2
+        away = [np.linalg.norm(place - arrow.xy) for place in placed]
+        assert min(away) > 0.2 * (right - left)  # margin: the arrow and its letter are 0.2 long
+    finally:
+        for figure in kept:
+            plt.close(figure)
+
+
 def test_a_bars_parts_add_to_u_in_per_cent_of_the_tolerance(rig):
     found = planner.budget(rig)
     sources, table = budget_figure.parts(found.measurands, [0.02])
@@ -453,12 +533,22 @@ def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
     verdict = SimpleNamespace(agrees=agrees, reasons=reasons, inside=1, rows=1)
     rows = [row(0, ("ok", 1.0)), row(1, ("short", None)), row(2, ("ok", None)), row(3, ("ok", 1.1))]
     found = SimpleNamespace(verdict=verdict, rows=rows)
-    first = {"wrong": ["It is dark."], "next": "Bring light.", "need": "none", "checked": ""}
+    first = {
+        "wrong": ["It is dark."],
+        "next": "Bring light.",
+        "need": "none",
+        "checked": "",
+        "simulated": page.SIMULATED,
+    }
     told = page._of_run(first, found, SimpleNamespace(number=1))
-    after = "In 2 of the 3 other settings, not shown here, not everything is proven: short 1, not measured 1."
+    after = "In 2 of the 3 other settings, not shown here, not everything is proven: "
+    after += f"{MEANINGS['short']} (status short), once; not measured, once."
     assert told["wrong"][-2:] == ["It is dark.", after]
     if agrees:
-        assert told["checked"].startswith("Checked: 60 noisy pictures of each setting were measured")
+        scatter = "of each setting, measured, is as predicted."
+        assert told["checked"] == f"Check: the scatter of 60 simulated pictures {scatter}"
+        photographed = page._of_run(first | {"simulated": ""}, found, SimpleNamespace(number=1))
+        assert photographed["checked"] == f"Check: the scatter of 60 photographs {scatter}"
         assert (len(told["wrong"]), told["need"], told["next"]) == (2, "none", "Bring light.")
     else:
         assert told["wrong"][0].startswith("The predicted uncertainties did not pass their check: ")
@@ -473,6 +563,17 @@ def test_numbers_in_sentences_lead_to_rows_that_there_are(plate, tmp_path):
     assert sorted(map(int, rows)) == list(range(1, 1 + len(plate.scene.quantities)))
     assert set(re.findall(r'href="#requirement-(\d+)"', written)) <= set(rows)
     assert page.linked("no. 1, 3 and 4", [1, 4]).count("<a ") == 2
+
+
+def test_a_bar_has_the_colour_of_its_balloon(plate, tmp_path, monkeypatch):
+    """Of a requirement that is usable, whose balloon has another border."""
+    made = station.of_picture(plate)
+    usable = dataclasses.replace(made.requirements[0], status="ok", U=0.5 * made.requirements[0].tolerance.half)
+    one = dataclasses.replace(made, requirements=(usable, *made.requirements[1:]))
+    written = page.write_station(one, "Plate", tmp_path / "plan.html").read_text()
+    look = station_table.LOOKS[Grade.WITHIN]
+    assert look.fill != look.border
+    assert f'style="width: 50.00%; background: {look.fill}"' in written
 
 
 def test_grades_differ_without_colour():
@@ -497,6 +598,8 @@ def test_the_page_of_a_picture_needs_no_render(plate, tmp_path):
     written = page.write_station(station.of_picture(plate), "A <b>plate</b>", tmp_path / "plan.html").read_text()
     assert "A &lt;b&gt;plate&lt;/b&gt;" in written
     assert "Drawn from the model" in written
+    assert written.index(page.SIMULATED) < written.index('id="sentence"')
+    assert page.SIMULATED not in str(page.first_screen(station.of_picture(plate), is_simulated=False).values())
     assert written.count('<svg role="img"') == 4
     assert all(status in MEASURED for status in (each.status for each in requirements.predicted(plate)))
 

@@ -18,6 +18,16 @@ MODELS = {
     "bound": "what no unbiased measurement can beat (model bound)",
 }
 PLACES = "sensor, light: (angle from the vertical, azimuth), degrees."
+PLACED = "camera, lamp: (angle from the vertical, azimuth), degrees."  # on pages, which have no options to name
+
+
+def placed(heading: str) -> str:
+    """A column's heading as a page says it, where nothing is a key.
+
+    >>> placed("sensor"), placed("light"), placed("noise.sigma")
+    ('camera', 'lamp', 'noise.sigma')
+    """
+    return {"sensor": "camera", "light": "lamp"}.get(heading, heading)
 
 
 def table(

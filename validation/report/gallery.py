@@ -76,8 +76,8 @@ def page() -> str:
         "# Gallery",
         "The bundled scenes, each rendered at its first setting, with what is measured in it (`ice scenes` lists them, "
         "`ice validate NAME` proves one). Blue circles: measured precisely enough, U at most a quarter of the "
-        "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; white "
-        "octagons: not proven.",
+        "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; "
+        "octagons: white not proven, red not measured.",
     ]
     return "\n\n".join(parts + [_entry(scenes.load(name)) for name in scenes.names()]) + "\n"
 

@@ -33,6 +33,7 @@ LOOKS = {
     Grade.OVER: Look("#8c1a11", "#8c1a11", "#ffffff", "D", _DIAMOND),
     Grade.OPEN: Look("#e4e4e4", "#333333", "#000000", "o", _CIRCLE),
     Grade.DOUBT: Look("#ffffff", "#8c1a11", "#000000", "8", _OCTAGON),
+    Grade.MISSING: Look("#8c1a11", "#8c1a11", "#ffffff", "8", _OCTAGON),
 }
 MEANS = {
     Grade.WELL: f"{Grade.WELL} (U at most {100 * WELL:.0f} % of the tolerance)",
@@ -40,4 +41,5 @@ MEANS = {
     Grade.OVER: f"{Grade.OVER} (U larger than the tolerance)",
     Grade.OPEN: str(Grade.OPEN),
     Grade.DOUBT: f"{Grade.DOUBT} (do not rely on the value)",
+    Grade.MISSING: f"{Grade.MISSING} (there is no value)",
 }

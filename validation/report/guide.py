@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenes.status import counted, is_trusted, legend
+from scenes.status import MEANINGS, is_trusted, legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report.cells import pose
@@ -142,18 +143,23 @@ def plain_verdict(found: Validation) -> str:
     if not verdict.agrees:
         reasons = ", and ".join(_WRONG.get(reason, reason) for reason in verdict.reasons) or "no test was passed"
         return f"No: {reasons} than was predicted." if "scatter" in reasons else f"No: {reasons}."
-    images = max(row.main.n for row in found.rows)
     return (
-        f"Yes: {images} noisy pictures of each setting were measured, and the values scatter as predicted; "
+        f"Yes: {images(found)} noisy pictures of each setting were measured, and the values scatter as predicted; "
         f"{verdict.inside} of {verdict.rows} lie in their 95 % interval, where chance alone leaves "
         f"{_expected(verdict.rows)}."
     )
 
 
-def checked(found: Validation) -> str:
-    """The same in short, of a run that agrees."""
-    images = max(row.main.n for row in found.rows)
-    return f"Checked: {images} noisy pictures of each setting were measured, and the values scatter as predicted."
+def checked(found: Validation, is_simulated: bool = True) -> str:
+    """The same in short, of a run that agrees, of simulated pictures or of photographs."""
+    what = "simulated pictures" if is_simulated else "photographs"
+    each = " of each setting" if len(found.rows) > 1 else ""
+    return f"Check: the scatter of {images(found)} {what}{each}, measured, is as predicted."
+
+
+def images(found: Validation) -> int:
+    """How many pictures of a setting were measured, the most of all settings."""
+    return max(row.main.n for row in found.rows)
 
 
 def contradiction(found: Validation) -> str:
@@ -177,8 +183,22 @@ def elsewhere(found: Validation, number: int | None) -> list[str]:
     if not doubtful:
         return []
     which = "the other setting" if len(others) == 1 else f"{doubtful} of the {len(others)} other settings"
-    told = counted(state for each in states for state in each)
-    return [f"In {which}, not shown here, not everything is proven: {told}."]
+    told = Counter(state for each in states for state in each).most_common()
+    why = "; ".join(f"{_meant(state)}, {_times(count)}" for state, count in told)
+    return [f"In {which}, not shown here, not everything is proven: {why}."]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _meant(state: str) -> str:
+    """A status with what it means.
+
+    >>> _meant("short"), _meant("not measured")
+    ('too little of an edge is left in the image (status short)', 'not measured')
+    """
+    return f"{MEANINGS[state]} (status {state})" if state in MEANINGS else state
 
 
 def _unproven(row: Row) -> list[str]:
@@ -224,14 +244,14 @@ def next_line(found: Validation, scene: str | None, directory: Path) -> str:
 
 def advice(agrees: bool) -> dict[str, str]:
     """How to read each table of the report and what to do next, by its name in `page_tables`."""
-    wrong = "Rows with * that lie together (one sensor, one light) point to a cause: `ice effects SCENE --check`."
+    wrong = "Rows with * that lie together (one place of camera or lamp) point to a cause: `ice effects SCENE --check`."
     right = "About one row in 20 has a * by chance; `ice validate SCENE --accuracy 0.02` narrows the intervals."
     return {
         "ratios": f"The prediction holds where the interval of a row contains 1. {right if agrees else wrong}",
         "variances": "In a row propagated and measured should be alike, the bound below both; where it is far below, "
         "`ice measure --estimator arrangement` comes near it.",
         "units": "Compare sigma, what one picture scatters by, with your tolerance; where it is too large, "
-        "`ice plan SCENE` looks for better places of sensor and light.",
+        "`ice plan SCENE` looks for better places of camera and lamp.",
         "estimators": "A method is as predicted where each p-value is above the limit beside it; use one that is.",
         "effects": "What is off was left out because it changes little; `ice effects SCENE --check` renders each.",
         "refused": "Mend the scene by the reason given; `ice validate` with the same options continues a stopped run.",

@@ -30,7 +30,9 @@ def _(found: Picture) -> str:
     try:
         asked = predicted(found) if found.scene.features else ()
         label = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in asked)
-        view = station_view.draw(found, asked, None, f"The part as the camera sees it. {label}", f"n{next(_NUMBER)}")
+        view = station_view.draw(
+            found, asked, None, f"What is measured, drawn from the model. {label}", f"n{next(_NUMBER)}"
+        )
     except InvalidInput:
         return ""
     return f'<div style="max-width: 30em">{view}</div>'

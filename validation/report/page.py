@@ -32,9 +32,9 @@ from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
 from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
-from validation.report.wording import Need, need, next_step, sentence, what, wrong
+from validation.report.wording import Need, need, next_step, nothing_wrong, sentence, what, wrong
 
-SIMULATED = "All is simulated: no camera was used, and no part was judged"
+SIMULATED = "Simulated: no camera was used; nothing is said of any real part."
 
 
 @dataclass(frozen=True)
@@ -60,14 +60,14 @@ class Section:
 
 def write(campaign: Campaign, found: Validation, store: RunFile, station: Station, directory: Path) -> list[Path]:
     """Write report.html and report.md of a run to a directory; their paths."""
+    first = _of_run(first_screen(station, not store.identity().get("photos")), found, station)
     sections = [_proof(campaign, found, store), *_budget(station.budget)]
     if len(found.rows) > 1:
-        sections.insert(0, _settings(campaign, found, station))
+        sections.insert(0, _settings(campaign, found, station, bool(first["simulated"])))
     if found.refused:
         sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
     sections.append(_done(found, store))
-    first = _of_run(first_screen(station, not store.identity().get("photos")), found, station)
-    context = _context(station, first, found.title or found.scene, sections) | {"agrees": found.verdict.agrees}
+    context = _context(station, first, _title(found, station), sections) | {"agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
     paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
@@ -107,25 +107,27 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     """What the template of a page's first screen takes; of photographs nothing is simulated."""
     found, picture = station.requirements, station.picture
     told = station_sketch.told(picture)
-    simulated = f". {SIMULATED}" if is_simulated else ""
     number = f"Setting {station.number}. " if station.number else ""
-    how = "" if station.image is not None else " Drawn from the model: no shadows, no light between surfaces."
+    made = ", rendered" if is_simulated else ", in a photograph"
+    how = f"{made}." if station.image is not None else ". Drawn from the model: no shadows, no light between surfaces."
     how += station_view.enlarged(picture)
     named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
-        "what": f"{what(found)}, numbered in the picture, from one picture of one camera{simulated}",
+        "what": f"{what(found)}, numbered in the picture, from one picture of one camera",
+        "simulated": SIMULATED if is_simulated else "",
         "sentence": sentence(found),
         "wrong": wrong(found),
+        "nothing": nothing_wrong(found),
         "next": next_step(found),
         "need": need(found),
         "checked": "",
         "is_sky": False,
         "sketch": station_sketch.draw(picture),
-        "view": station_view.draw(picture, found, station.image, f"The part as the camera sees it. {named}."),
-        "sketched": f"Camera and lamp to scale: {told}.",
-        "caption": f"{number}What is measured, as the camera sees it.{how}",
+        "view": station_view.draw(picture, found, station.image, f"What is measured{how} {named}."),
+        "sketched": f"Camera and lamp to scale: {told}. {station_sketch.AZIMUTH}",
+        "caption": f"{number}What is measured{how}",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
         "lines": station_table.lines(found),
@@ -134,11 +136,20 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     }
 
 
+def _title(found: Validation, station: Station) -> str:
+    """Of a run its own, or the part's with the name of the campaign that has none."""
+    scene = station.picture.scene
+    part = scene.title or scene.name
+    if found.title:
+        return found.title
+    return part if found.scene == scene.name else f"{part} (campaign {found.scene})"
+
+
 def _of_run(first: dict[str, Any], found: Validation, station: Station) -> dict[str, Any]:
     """The first screen with what a run says of it: whether it agrees, and what is not proven elsewhere."""
     wrong, after = first["wrong"], guide.elsewhere(found, station.number)
     if found.verdict.agrees:
-        return first | {"checked": guide.checked(found), "wrong": wrong + after}
+        return first | {"checked": guide.checked(found, bool(first["simulated"])), "wrong": wrong + after}
     steps = [guide.why_not(found), first["next"] if wrong else ""]
     return first | {
         "wrong": [guide.contradiction(found), *wrong, *after],
@@ -188,9 +199,12 @@ def markdown(text: str) -> str:
     return " ".join(text.split())
 
 
-def _settings(campaign: Campaign, found: Validation, station: Station) -> Section:
+def _settings(campaign: Campaign, found: Validation, station: Station, is_simulated: bool) -> Section:
     table = settings_table.table(found, halves_of(campaign), station.number)
-    answer = f"{len(found.rows)} settings were measured; shown above is setting {station.number}, the best."
+    done = "simulated and measured" if is_simulated else "measured"
+    many = f"{guide.images(found)} {'noisy pictures' if is_simulated else 'photographs'} of each"
+    shown = f"shown above is setting {station.number}, the best"
+    answer = f"{len(found.rows)} settings were {done}, {many}; {shown}."
     return Section("All settings, the best first", answer, tables=[table])
 
 

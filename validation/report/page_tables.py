@@ -12,6 +12,7 @@ from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import guide
+from validation.report.cells import placed
 from validation.report.run_cells import (
     failed,
     far,
@@ -46,7 +47,7 @@ class Table:
 def _key(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
     """First columns of a table of settings, and their cells by setting."""
     headings, cells = names(found, rows)
-    return ["setting", *headings], {index: [str(index + 1), *row] for index, row in cells.items()}
+    return ["setting", *map(placed, headings)], {index: [str(index + 1), *row] for index, row in cells.items()}
 
 
 def ratios(found: Validation, reasons: Mapping[str, str] = MappingProxyType({})) -> Table:

@@ -14,7 +14,7 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from scenes import InvalidInput, Picture, Tolerance
 from scenes.results import finite
-from scenes.status import is_trusted
+from scenes.status import MEASURED, is_trusted
 from validation.report import cells, source_words
 
 WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
@@ -28,11 +28,12 @@ class Grade(StrEnum):
     OVER = "too uncertain"
     OPEN = "no tolerance given"
     DOUBT = "not proven"
+    MISSING = "not measured"
 
     @property
     def fails(self) -> bool:
         """Whether nothing can be decided with such a measurement."""
-        return self in (Grade.DOUBT, Grade.OVER)
+        return self in (Grade.MISSING, Grade.DOUBT, Grade.OVER)
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ class Requirement:
 
     @property
     def grade(self) -> Grade:
+        if self.status not in MEASURED:
+            return Grade.MISSING
         if not is_trusted(self.status):
             return Grade.DOUBT
         if self.tolerance is None:

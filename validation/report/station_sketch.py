@@ -18,6 +18,8 @@ from validation.report.canvas import TEXT, inline
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
+AZIMUTH = "Arrow: the part's x axis, azimuth 0°, counted counterclockwise."
+_CORNERS = np.array([[0.84, 0.16], [0.84, 0.84], [0.16, 0.84]])  # in parts of a view; in the fourth stands the scale
 _VIEWS = ("from the side", "from above")
 
 
@@ -52,7 +54,11 @@ def draw(picture: Picture) -> Markup:
     drawn = []
     for (right, up), title in zip(axes_of(picture), _VIEWS, strict=True):
         figure, panel = plt.subplots(figsize=_SIZE, layout="constrained")
-        _panel(panel, np.stack([right, up], -1), picture, eye, [lamp for lamp in lamps if len(lamp)])
+        flat, shining = np.stack([right, up], -1), [lamp for lamp in lamps if len(lamp)]
+        _panel(panel, flat, picture, eye, shining)
+        if up[2] == 0:
+            _azimuth(panel, flat, [place.reshape(-1, 3).mean(0) @ flat for place in (eye, *shining)])
+        _scale(panel, scene.units)
         panel.set_title(title, fontsize=TEXT)
         label = f"Sketch to scale, seen {title}: {told(picture)}."
         drawn.append(inline(figure, f"sketch-{title.split()[-1]}", label))
@@ -72,7 +78,6 @@ def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: lis
     axis.plot(*camera, "s", color=_CAMERA, ms=9)
     places = [("camera", camera, _CAMERA), *(("lamp", lamp.mean(0) @ flat, _LAMP) for lamp in lamps[:1])]
     _labels(axis, places, np.array([scene.solid.vertices @ flat]).reshape(-1, 2), middle)
-    _scale(axis, scene.units)
 
 
 def _part(axis, points: np.ndarray) -> None:
@@ -106,6 +111,17 @@ def _labels(axis, places: list, part: np.ndarray, middle: np.ndarray) -> None:
     axis.set(aspect="equal", xticks=[], yticks=[])
     for side in axis.spines.values():
         side.set_color("#cccccc")
+
+
+def _azimuth(axis, flat: np.ndarray, places: list[np.ndarray]) -> None:
+    """An arrow along the part's x axis, azimuth 0, in the corner that is farthest from camera and lamps."""
+    low, high = np.array([axis.get_xlim(), axis.get_ylim()]).T
+    size, along = high - low, np.array([1.0, 0.0, 0.0]) @ flat
+    corners = low + _CORNERS * size
+    away = [min(np.linalg.norm(place - corner) for place in places) for corner in corners]
+    centre, half = corners[np.argmax(np.round(away, 6))], 0.05 * size[0] * along
+    axis.annotate("", centre + half, xytext=centre - half, arrowprops={"arrowstyle": "->", "lw": 1.2})
+    axis.text(*(centre + 1.8 * half), "x", fontsize=TEXT, ha="center", va="center")
 
 
 def _scale(axis, units: str) -> None:

@@ -13,15 +13,16 @@ from validation.report.page_tables import Table
 from validation.report.requirements import WELL, Grade, Requirement
 
 COLUMNS = (
-    "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / tolerance", "measurement", "limited by",
+    "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / half zone", "measurement", "limited by",
 )  # fmt: skip
 PART = (
-    f"U / tolerance: U over half of the tolerance zone; up to {100 * WELL:.0f} % the measurement is precise enough, up "
-    "to 100 % usable."
+    "U / half zone: U over half of the tolerance zone (of ±0.02 mm over 0.02 mm), in words: per cent of the tolerance; "
+    f"up to {100 * WELL:.0f} % the measurement is precise enough, up to 100 % usable."
 )
 NOTE = (
-    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left, ± its standard "
-    f"uncertainty. U: expanded uncertainty (95 %), by all that is not exactly known. {PART} limited by: what adds most "
+    "sigma: standard deviation of one picture's value, by noise. bias: mean error once the simulated correction, where "
+    "one was made, is taken off, ± its standard uncertainty where that is known. "
+    f"U: expanded uncertainty (95 %), by all that is not exactly known. {PART} limited by: what adds most "
     "to U, and its share of U²."
 )
 
@@ -41,7 +42,7 @@ class Line:
 def lines(found: Sequence[Requirement], *, units: bool = True) -> list[Line]:
     """One a requirement, those that fail first; ``cells`` from its name on, as `COLUMNS`, each with its unit, or with
     ``units`` off the nominal value alone."""
-    worst = [each for grade in (Grade.DOUBT, Grade.OVER) for each in found if each.grade == grade]
+    worst = [each for grade in (Grade.MISSING, Grade.DOUBT, Grade.OVER) for each in found if each.grade == grade]
     return [
         Line(each.number, LOOKS[each.grade], _cells(each, each.unit if units else ""),
              None if each.ratio is None else min(each.ratio, 1.0), each.grade.fails)
@@ -69,7 +70,7 @@ def table(found: Sequence[Requirement]) -> Table:
 def _cells(each: Requirement, unit: str) -> tuple[str, ...]:
     places = decimals(each.sigma) if math.isfinite(each.sigma) else 3
     part = "-" if each.ratio is None else cells.percent(each.ratio)
-    doubtful = each.grade == Grade.DOUBT
+    doubtful = each.grade in (Grade.MISSING, Grade.DOUBT)
     sigma = "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}"
     whole = "-" if each.U is None or doubtful else f"{each.U:.{decimals(each.U)}f}"
     return (

@@ -219,7 +219,7 @@ def balloons(anchors: list[np.ndarray], size: np.ndarray, corner: np.ndarray) ->
 
 def _requirement(axis, each: Requirement, lines: list[np.ndarray], anchor: np.ndarray, spot: np.ndarray) -> None:
     look = LOOKS[each.grade]
-    style = (0, (3, 1.5)) if each.grade == Grade.DOUBT else "-"
+    style = (0, (3, 1.5)) if each.grade in (Grade.MISSING, Grade.DOUBT) else "-"
     for line in lines:
         axis.plot(*line.T, color="white", lw=4.5, alpha=0.9, solid_capstyle="round")
         axis.plot(*line.T, color=look.border, lw=2, ls=style)

@@ -21,7 +21,7 @@ from validation.report.canvas import TEXT, WIDTH, inline
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
 from validation.report.requirements import Requirement
-from validation.report.wording import need, next_step, sentence, what, wrong
+from validation.report.wording import need, next_step, nothing_wrong, sentence, what, wrong
 
 _P = 0.95
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
@@ -36,14 +36,14 @@ def write(found: planner.Views, path: Path) -> Path:
     scene, last = found.scene, found.sets[-1]
     asked = requirements(last)
     first = {
-        "what": f"{what(asked)}, numbered in the pictures, from {_pictures(len(last.views))} together. "
-        f"{page.SIMULATED}",
-        "sentence": sentence(asked), "wrong": wrong(asked), "next": next_step(asked),
+        "what": f"{what(asked)}, numbered in the pictures, from {_pictures(len(last.views))} together",
+        "simulated": page.SIMULATED,
+        "sentence": sentence(asked), "wrong": wrong(asked), "nothing": nothing_wrong(asked), "next": next_step(asked),
         "need": need(asked), "checked": "", "is_sky": True,
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),
-        "caption": "What is taken from each picture, as the camera sees it. Drawn from the model: no shadows.",
+        "caption": "What is taken from each picture. Drawn from the model: no shadows.",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in dict.fromkeys(each.grade for each in asked)],
         "columns": (*station_table.COLUMNS[:-1], "taken from"), "lines": station_table.lines(asked),
         "note": station_table.note(asked, _NOTE),
@@ -120,8 +120,8 @@ def _poses(found: planner.ViewSet) -> Table:
         told = view.prediction.measurands
         taken = [each.name for each, used in zip(told, found.combination.used[number - 1], strict=True) if used]
         rows.append([str(number), cells.pose(view.sensor), cells.pose(view.light), ", ".join(taken) or "nothing"])
-    return Table("Where the pictures are taken", ["picture", "sensor", "light", "taken from it"], rows,
-                 "Places of sensor and light: (angle from the vertical, azimuth), degrees.", words=True)  # fmt: skip
+    return Table("Where the pictures are taken", ["picture", "camera", "lamp", "taken from it"], rows,
+                 "Places of camera and lamp: (angle from the vertical, azimuth), degrees.", words=True)  # fmt: skip
 
 
 def _numbers(found: planner.Views) -> Table:

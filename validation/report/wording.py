@@ -41,7 +41,7 @@ def what(found: Sequence[Requirement]) -> str:
 def sentence(found: Sequence[Requirement]) -> str:
     """How well all of them are measured; of the part itself it says nothing."""
     parts = []
-    for grade in (Grade.WELL, Grade.WITHIN, Grade.OVER, Grade.OPEN, Grade.DOUBT):
+    for grade in (Grade.WELL, Grade.WITHIN, Grade.OVER, Grade.OPEN, Grade.DOUBT, Grade.MISSING):
         if some := [each for each in found if each.grade == grade]:
             subject = _count(len(some), len(found)) if grade == Grade.WELL else _which(some, found)
             parts.append(f"{subject} {_how(grade, some)}")
@@ -60,6 +60,9 @@ def _how(grade: Grade, some: Sequence[Requirement]) -> str:
         return "measured too uncertainly: U is larger than the tolerance"
     if grade == Grade.OPEN:
         return f"measured{_known(some)}; no tolerance is given to compare with"
+    if grade == Grade.MISSING:
+        states = {each.status for each in some}
+        return f"not measured: {MEANINGS[states.pop()] if len(states) == 1 else 'they have no value'}"
     return f"not proven: {'its value' if len(some) == 1 else 'their values'} must not be relied on"
 
 
@@ -87,6 +90,12 @@ def wrong(found: Sequence[Requirement]) -> list[str]:
         whose = "" if len(some) == len(found) else f" for {_named(some, found)}"
         lines.append(f"no tolerance is given{whose}: whether U is small enough cannot be told.")
     return [line[0].upper() + line[1:] for line in lines]
+
+
+def nothing_wrong(found: Sequence[Requirement]) -> str:
+    """What is said where nothing is wrong: also which are less precise than aimed at."""
+    within = [each for each in found if each.grade == Grade.WITHIN]
+    return f"Nothing is wrong; {_which(within, found)} less precise than aimed at." if within else "Nothing."
 
 
 def next_step(found: Sequence[Requirement]) -> str:
