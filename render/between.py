@@ -1,21 +1,25 @@
 """Which fine pixels may show light that surfaces send to each other: others need no rays for it.
 
-From a face on the convex hull of all bodies no other is seen. Before a floor that holds for faces that look up.
+From a face on the convex hull of all bodies no other is seen. Before a floor that holds for faces that look up. A face
+that is seen nearly edge-on may lie between the middles of pixels: pixels that its edges cross may show it, too.
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from scipy.ndimage import maximum_filter
 
 from imaging.geometry.looked_at import looked_at
+from imaging.geometry.projection import facing, project_ideal, sensor_position
 from scenes import Picture
 
 _UP = 1 - 1e-9  # cosine to the vertical
+_FARTHEST = 1 << 20  # fine pixels from the frame
 
 
 def lent_to(picture: Picture, marked: np.ndarray, start: tuple[int, int], supersample: int) -> np.ndarray:
-    """Those of some fine pixels in whose middle, or in a neighbour's, a face is seen that others may send light to.
+    """Those of some fine pixels in which, or in a neighbour of which, a face is seen that others may send light to.
 
     Parameters
     ----------
@@ -40,4 +44,23 @@ def lent_to(picture: Picture, marked: np.ndarray, start: tuple[int, int], supers
         lent[-1] = True
     found = np.zeros(marked.shape, bool)
     found[tuple(pixels.T)] = lent[face]
+    found |= _crossed(picture, lent[:-1], marked.shape, start, supersample)
     return maximum_filter(found, 3) & marked
+
+
+def _crossed(
+    picture: Picture, lent: np.ndarray, shape: tuple[int, int], start: tuple[int, int], supersample: int
+) -> np.ndarray:
+    """Which fine pixels the edges of such faces (F,) that look at the sensor may cross, hidden or not."""
+    bodies, camera, sensor = picture.scene.bodies, picture.scene.camera, np.array(list(picture.sensor))
+    seen = lent & facing(bodies, sensor_position(camera, sensor))
+    edges = [edge.ends for edge in bodies.edges if seen[list(edge.faces)].any()]
+    found = np.zeros(shape, np.uint8)
+    if not edges:
+        return found.astype(bool)
+    places = (project_ideal(bodies.vertices, sensor, camera) + 0.5) * supersample - 0.5 - np.array(start)[::-1]
+    if np.isnan(places).any():  # what stands behind the sensor
+        return np.ones(shape, bool)
+    lines = np.rint(np.clip(places, -_FARTHEST, _FARTHEST)).astype(np.int32)[np.array(edges)]
+    cv2.polylines(found, list(lines[:, :, None]), isClosed=False, color=1)
+    return found.astype(bool)

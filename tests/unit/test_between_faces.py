@@ -5,11 +5,12 @@ import pytest
 
 import scenes
 from imaging.geometry.looked_at import looked_at
-from imaging.geometry.projection import project_ideal
+from imaging.geometry.projection import facing, project_ideal, sensor_position
 from imaging.light.between import left_of_dimmed
 from imaging.pictures import Pictures
 from render.between import lent_to
 from scenes import Picture
+from tests.system.test_station_pages import newcomers
 from validation.dimmed import of_one_surface
 
 
@@ -44,10 +45,36 @@ def test_only_faces_within_the_hull_are_lent_light(picture):
             marked[1, 1] = True
             start = round((y + 0.5) * k - 0.5) - 1, round((x + 0.5) * k - 0.5) - 1
             around = looked_at(each, np.array([(x + i / k, y + j / k) for i in (-1, 0, 1) for j in (-1, 0, 1)]))[0]
-            if (around == face).all() and face >= 0:
+            if (around == face).all() and face >= 0 and (expected[face] or _away(each, expected, (x, y)) > 3 / k):
                 assert lent_to(each, marked, start, k)[1, 1] == expected[face]
         far = np.ones((1, 1), bool)
         assert lent_to(each, far, (0, 0), k)[0, 0] == (each is floor)
+
+
+def _away(picture, lent, place):
+    """Distance from a place of the image to the nearest edge of such a face that looks at the sensor, px."""
+    bodies, camera, sensor = picture.scene.bodies, picture.scene.camera, np.array(list(picture.sensor))
+    seen = lent & facing(bodies, sensor_position(camera, sensor))
+    ends = np.array([edge.ends for edge in bodies.edges if seen[list(edge.faces)].any()])
+    start, stop = np.moveaxis(project_ideal(bodies.vertices, sensor, camera)[ends], 1, 0)
+    way = stop - start
+    along = np.clip(((place - start) * way).sum(1) / (way**2).sum(1), 0, 1)
+    return np.linalg.norm(start + along[:, None] * way - place, axis=1).min()
+
+
+def test_a_wall_narrower_than_a_pixel_is_lent_light_though_no_middle_shows_it(tmp_path):
+    """The sides of a slot, seen nearly along its walls: every fine pixel that its upper edges cross."""
+    scene = newcomers(tmp_path)
+    picture, k = Picture.of(scene, (20, 0), (20, 45)), 2
+    ends = scene.solid.vertices[[list(scene.solid.edge(name).ends) for name in ("e10", "e12")]]
+    points = ends[:, None, 0] + np.linspace(0.02, 0.98, 40)[:, None] * (ends[:, None, 1] - ends[:, None, 0])
+    at = project_ideal(points.reshape(-1, 3), np.array([20.0, 0.0]), scene.camera)
+    fine = np.rint((at + 0.5) * k - 0.5).astype(int)
+    marked = np.zeros((k * scene.camera.height, k * scene.camera.width), bool)
+    marked[fine[:, 1], fine[:, 0]] = True
+    faces, _ = looked_at(picture, (fine + 0.5) / k - 0.5)
+    assert scene.bodies.outer[faces].any()  # some middles show what is lent nothing
+    assert lent_to(picture, marked, (0, 0), k)[fine[:, 1], fine[:, 0]].all()
 
 
 def test_what_is_left_of_light_that_met_two_surfaces_or_more(picture):
