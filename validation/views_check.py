@@ -19,7 +19,7 @@ from scenes.status import counted, is_trusted
 from validation import simulation, statistics
 from validation.batch.measurands import independent
 from validation.defaults import DEFAULT_SEED
-from validation.remeasured import GRADIENT, Sample, batches, propagated, remeasured
+from validation.remeasured import GRADIENT, Sample, batches, remeasured
 
 IMAGES = 300  # of each picture: a variance is known to 8 %
 _PIXELS = 1 << 23  # of the images measured at a time
@@ -146,7 +146,7 @@ def _key(view: planner.View) -> tuple[Pose, Pose]:
 
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
     rng, how = np.random.default_rng(seed), simulation.How(quality)
-    renders = simulation.steadied(picture, propagated(picture, quality)[0], GRADIENT, how)
+    renders = simulation.steadied(picture, how.image(picture), GRADIENT, how)
     clean = simulation.mean_of(picture, renders)
     known = measure.propagate(clean, picture, estimator=GRADIENT.locator).measurands
     (off,) = simulation.independent(picture, (GRADIENT,), renders, (known,), how)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import camera_frame, sensor_position
+from imaging.geometry.projection import rays, sensor_position
 from imaging.geometry.rays import first_face
 from scenes import Picture
 
@@ -29,8 +29,7 @@ def looked_at(picture: Picture, seen: np.ndarray) -> tuple[np.ndarray, np.ndarra
         Where on them, scene units; the sensor's place where there is none.
     """
     camera, sensor = picture.scene.camera, np.array(list(picture.sensor))
-    axes, (right, down) = camera_frame(camera, sensor), (seen - image_centre(camera)).T
-    ways = camera.focal_px * axes.forward + right[:, None] * axes.right + down[:, None] * axes.down
+    ways = rays(seen - image_centre(camera), sensor, camera)
     origins = np.broadcast_to(sensor_position(camera, sensor), ways.shape)
     faces, t = first_face(picture.scene.bodies, origins, ways, (), margin=_MARGIN)
     return faces, origins + np.where(faces >= 0, t, 0.0)[:, None] * ways

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from render import Quality
 from scenes import Pose
 from validation import views_check
 
@@ -45,7 +46,7 @@ def test_a_picture_is_measured_in_batches(monkeypatch, pixels):
     clean = SimpleNamespace(size=pixels)
     picture = SimpleNamespace(scene=SimpleNamespace(noise=None))
     off = SimpleNamespace(bias=np.array([0.5, np.nan]))
-    monkeypatch.setattr(views_check, "propagated", lambda picture, quality: (clean, known))
+    monkeypatch.setattr(views_check.simulation.How, "image", lambda how, picture: clean)
     monkeypatch.setattr(views_check.simulation, "steadied", lambda picture, image, method, how: (image,))
     monkeypatch.setattr(views_check.simulation, "independent", lambda picture, methods, renders, told, how: (off,))
     propagated = SimpleNamespace(measurands=known)
@@ -58,7 +59,7 @@ def test_a_picture_is_measured_in_batches(monkeypatch, pixels):
         return (SimpleNamespace(object=np.arange(2.0 * sum(sizes)).reshape(-1, 2)),)
 
     monkeypatch.setattr(views_check, "remeasured", remeasured)
-    found = views_check._shot(picture, 3, 5, (1, 2), None)
+    found = views_check._shot(picture, 3, 5, (1, 2), Quality())
     assert sizes == ([15] if pixels == 6 else [2] * 7 + [1])
     assert found.values.shape == (3, 5, 2)
     assert found.values[1, 0].tolist() == [9.5, 11.0]  # less what is known of the bias
