@@ -6,7 +6,8 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from render.phenomena import Tolerance, choose, effects
 from render.phenomena.pose import shaken
-from render.renderer import Quality, image
+from render.quality import Quality
+from render.renderer import image
 from render.sensor import expose, variance
 from render.series import shots
 

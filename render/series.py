@@ -8,7 +8,8 @@ import numpy as np
 
 from render.phenomena import Tolerance
 from render.phenomena.pose import shaken
-from render.renderer import Quality, image
+from render.quality import Quality
+from render.renderer import image
 from render.sensor import expose
 from scenes import Pose, Scene
 

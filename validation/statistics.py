@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -33,20 +34,17 @@ def ratio_interval(ratio: float, n: int, level: float = 0.95) -> tuple[float, fl
     >>> [round(x, 3) for x in ratio_interval(1.0, 1000)]
     [0.918, 1.094]
     """
-    low, high = ratio_intervals(np.array([ratio], float), np.array([n]), level)
-    return float(low[0]), float(high[0])
+    if n < 2 or not math.isfinite(ratio):
+        return 0.0, math.inf
+    below, above = _quantiles(n - 1, level)
+    return ratio * (n - 1) / above, ratio * (n - 1) / below
 
 
-def ratio_intervals(ratios: np.ndarray, counts: np.ndarray, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of the same intervals of many ratios, arrays of one shape."""
+@functools.lru_cache(maxsize=1024)
+def _quantiles(freedom: int, level: float) -> tuple[float, float]:
+    """Ends of the central interval of a chi-square variable with some probability (``level``)."""
     tail = (1 - level) / 2
-    some = (counts >= 2) & np.isfinite(ratios)
-    freedoms, which = np.unique(counts[some] - 1, return_inverse=True)
-    low, high = np.zeros(ratios.shape), np.full(ratios.shape, np.inf)
-    low[some], high[some] = (
-        ratios[some] * freedoms[which] / special.chdtri(freedoms, p)[which] for p in (tail, 1 - tail)
-    )
-    return low, high
+    return float(special.chdtri(freedom, 1 - tail)), float(special.chdtri(freedom, tail))
 
 
 def p_value(ratio: float, n: int) -> float:

@@ -1,7 +1,6 @@
 """Differences of two images of few rays: `render.Quality.alike`."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import pytest
 
@@ -10,10 +9,10 @@ import render
 import scenes
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
-from render import large
+from render import fine, large
+from render.renderer import window
 from scenes import Picture
 
-renderer = import_module("render.renderer")
 SCALAR = "scalar_rgb"
 FEW = render.Quality(supersample=2, samples=1, edge_samples=16, random_samples=16, everywhere=False, alike=True)
 
@@ -58,9 +57,9 @@ def test_what_surfaces_send_to_each_other_has_no_noise_of_the_direct_light(monke
         told.append((near, renders.bounced(near, 64)))
         return large.fine_pixels(shown, crop, renders, *rest)
 
-    monkeypatch.setattr(renderer, "fine_pixels", caught)
+    monkeypatch.setattr(fine, "fine_pixels", caught)
     render.image(here, quality=FEW, variant=SCALAR)
-    (near, light), rows_columns = told[0], renderer.window(here)
+    (near, light), rows_columns = told[0], window(here)
     assert light.min() >= 0
     assert light.max() > 10, "levels"  # margin: seen, not black: 34 levels
     monkeypatch.undo()

@@ -12,7 +12,7 @@ from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import frame
 from imaging.light.appearance import seen_by_rays
 from imaging.pictures import Pictures
-from render import Quality, renderer
+from render import Quality, fine
 from render.parts import parts
 from scenes import Backlight, Picture, Ring
 from tests.proofs.lights import LIGHTS, compare, crowded
@@ -37,7 +37,7 @@ def test_a_table_under_a_point_shows_what_area_emitters_show(task1, monkeypatch)
     poses = (30, 135), (20, 315)
     table = render.image(scene, *poses, QUICK, effects=SHARP)
     point = render.image(scene, *poses, QUICK, effects=SHARP[:2])
-    monkeypatch.setattr(renderer, "_even", lambda part: False)
+    monkeypatch.setattr(fine, "_even", lambda part: False)
     rays = render.image(scene, *poses, QUICK, effects=SHARP)
     dark, inside = scene.noise.dark_level, table > 0.9 * table.max()
     off = (table - rays)[inside] / (table.max() - dark)

@@ -9,7 +9,8 @@ from render import variant
 from render.build import description
 from render.optics import blur_and_bin
 from render.parts import Part
-from render.renderer import Quality, window
+from render.quality import Quality
+from render.renderer import window
 from render.testing import assert_images_agree
 from scenes import Floor, Lens, Picture
 

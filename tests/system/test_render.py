@@ -7,7 +7,8 @@ import measure
 import render
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
-from render.renderer import Quality, window
+from render.quality import Quality
+from render.renderer import window
 from scenes import Floor, InvalidInput, Lens, Picture
 from tests.oracle import axes, block_image, pinhole, polygon_image
 

@@ -17,7 +17,7 @@ from measure.features.shape import prepared
 from render import build, mosaic, variant
 from render.adaptive import crossed
 from render.parts import Part
-from render.renderer import Quality
+from render.quality import Quality
 from scenes import Picture
 from tests.oracle import block_image
 
@@ -134,7 +134,7 @@ def test_textures_give_the_image_of_the_interpreted_reflectance(monkeypatch, nam
     other = scene.model_copy(update={part: getattr(scene, part).model_copy(update=values)})
     active = PLAIN | {"specular_lobe", "polarisation", "analyser"}
     textured, control = (scalar(one, scene.settings[0], quality, effects=active) for one in (scene, other))
-    monkeypatch.setattr(sys.modules["render.renderer"], "textured", lambda *arguments: None)
+    monkeypatch.setattr(sys.modules["render.fine"], "textured", lambda *arguments: None)
     interpreted = scalar(scene, scene.settings[0], quality, effects=active)
     level = interpreted - scene.noise.dark_level
     inside = (minimum_filter(level, 5) > 1) & (maximum_filter(level, 5) - minimum_filter(level, 5) < 0.2 * level.max())

@@ -17,7 +17,7 @@ from imaging.geometry.projection import edge_points, project
 from imaging.light.appearance import edge_contrast, side_signals
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
-from render.renderer import _defocus
+from render.fine import defocus
 from tests.oracle import axes, torrance_sparrow
 
 FULL = 1023  # of ten bits
@@ -237,7 +237,7 @@ def test_a_render_reaches_as_far_as_the_corner_that_is_least_in_focus(scene, pic
     out, _, _ = axes(SENSOR)
     depths = scene.camera.distance - (scene.solid.vertices - np.array(scene.camera.look_at)) @ out
     radii = lens.aperture_radius * np.abs(depths - lens.focus) / depths * scene.camera.focal_px / lens.focus
-    assert _defocus(picture) == pytest.approx(radii.max(), rel=1e-9)
+    assert defocus(picture) == pytest.approx(radii.max(), rel=1e-9)
     assert radii.max() > 1.2 * radii.min()
 
 

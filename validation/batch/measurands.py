@@ -113,8 +113,6 @@ _NUMBERS = (
     "ratio",
     "bias",
     "independent",
-    "low",
-    "high",
     "correction",
     "u_bias",
     "render_noise",
@@ -167,10 +165,9 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
             self._records = np.concatenate([self._records, np.zeros(len(self._records) + more, _RECORD)])
 
     def finish(self) -> None:
-        """Once all are there: all ratios and intervals at a time."""
+        """Once all are there: all ratios at a time."""
         found = self._records = self._records[: self._size]
         found["ratio"] = ratios(found["empirical"], found["predicted"])
-        found["low"], found["high"] = statistics.ratio_intervals(found["ratio"], found["n"] - found["failed"])
 
     def __len__(self) -> int:
         return len(self._first) - 1
@@ -196,11 +193,12 @@ def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasura
         key: None if np.isnan(record[key]) else float(record[key])
         for key in ("empirical", "ratio", "bias", "texture", "u_bias")
     }
+    n, failed, ratio = int(record["n"]), int(record["failed"]), known["ratio"]
     known["u"] = None if known["u_bias"] is None else float(np.hypot(np.sqrt(record["predicted"]), known["u_bias"]))
     return JudgedMeasurand(
-        name=name, kind=kind, unit=unit, n=int(record["n"]), failed=int(record["failed"]),
+        name=name, kind=kind, unit=unit, n=n, failed=failed,
         status=STATUSES[record["status"]],
-        ratio_interval=None if known["ratio"] is None else (float(record["low"]), float(record["high"])),
+        ratio_interval=None if ratio is None else statistics.ratio_interval(ratio, n - failed),
         **{key: float(record[key]) for key in _PLAIN},
         **known,
     )  # fmt: skip

@@ -145,7 +145,8 @@ def _judge(found: dict[str, np.ndarray], refused: int = 0, truth: bool = True) -
     """
 
     def column(name: str, nothing: float) -> np.ndarray:
-        return np.concatenate([found[name].astype(float), np.full(refused, nothing)])
+        known = found[name].astype(float, copy=False)
+        return np.concatenate([known, np.full(refused, nothing)]) if refused else known
 
     return statistics.verdict(
         column("ratio", np.nan),

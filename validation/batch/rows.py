@@ -1,4 +1,4 @@
-"""The settings of a run, kept as columns: a million of them take some 300 MB, as objects they would take gigabytes."""
+"""The settings of a run, kept as columns: a million of them take some 450 MB, as objects they would take gigabytes."""
 
 from __future__ import annotations
 
@@ -82,9 +82,9 @@ MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture"
 
 def _record(methods: int) -> np.dtype:
     judged = [
-        ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("low", "f8"), ("high", "f8"), ("n", "i4"),
+        ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("n", "i4"),
         ("correction", "f8"), ("u_bias", "f8"), ("render_noise", "f8"), ("predicted_bias", "f8"),
-        ("failed", "i4"), ("stray", "i4"), ("failures", "i4"), ("clean", "u1"),
+        ("failed", "i4"), ("failures", "i4"), ("clean", "u1"),
     ]  # fmt: skip
     return np.dtype([
         ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", judged, (methods,)),
@@ -133,7 +133,7 @@ class Rows(Sequence[Row]):
             place["predicted_bias"] = record["predicted_bias"] if math.isnan(one.u_bias) else 0.0
             for name, number in one.scatter(model["value_px"]).items():
                 place[name] = number
-            place["stray"], place["failures"] = sum(one.failures.values()), self._failure(one.failures)
+            place["failures"] = self._failure(one.failures)
         self.measured.add(model["measurands"], each)
         self._size += 1
 
@@ -161,12 +161,9 @@ class Rows(Sequence[Row]):
         return self._numbered[key]
 
     def finish(self, scale: float | None) -> None:
-        """Once all are there: the paper model's free scale, and all intervals at a time."""
+        """Once all are there: the paper model's free scale."""
         self._records = self._records[: self._size]
         self._records["paper"] *= scale or 1.0
-        judged = self._records["judged"]
-        ratio = ratios(judged["empirical"], judged["propagated"])
-        judged["low"], judged["high"] = statistics.ratio_intervals(ratio, judged["n"] - judged["failed"])
         self.measured.finish()
 
     def __len__(self) -> int:
@@ -208,7 +205,8 @@ class Rows(Sequence[Row]):
     def _statuses(self, numbers: Callable[[str], np.ndarray]) -> np.ndarray:
         """Of one method's rows: `row_status`, asked only where images are lost from a picture that is ``ok``."""
         found = np.array(STATUSES, object)[numbers("clean")]
-        lost = is_trusted(found) & (numbers("stray") > statistics.STRAY * numbers("n"))
+        stray = np.array([sum(failures.values()) for failures in self._failures])[numbers("failures")]
+        lost = is_trusted(found) & (stray > statistics.STRAY * numbers("n"))
         for row in np.flatnonzero(lost):
             found[row] = row_status(found[row], self._failures[numbers("failures")[row]], int(numbers("n")[row]))
         return found
@@ -237,18 +235,19 @@ class Rows(Sequence[Row]):
 
 
 def _judged(method: str, place: np.void, failures: dict[str, int]) -> Judged:
-    n, propagated = int(place["n"]), float(place["propagated"])
+    n, failed, propagated = int(place["n"]), int(place["failed"]), float(place["propagated"])
     empirical, bias = _known(place["empirical"]), _known(place["bias"])
     judged = empirical is not None and math.isfinite(propagated) and propagated > 0
+    ratio = empirical / propagated if judged else None
     return Judged(
         method=method,
         propagated=propagated,
         empirical=empirical,
         n=n,
-        failed=int(place["failed"]),
+        failed=failed,
         failures=failures,
-        ratio=empirical / propagated if judged else None,
-        ratio_interval=(float(place["low"]), float(place["high"])) if judged else None,
+        ratio=ratio,
+        ratio_interval=None if ratio is None else statistics.ratio_interval(ratio, n - failed),
         bias=bias,
         predicted_bias=float(place["predicted_bias"]),
         rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),

@@ -9,7 +9,7 @@ import numpy as np
 import measure
 import render
 from imaging.geometry.projection import project
-from render.renderer import Quality
+from render.quality import Quality
 from scenes import InvalidInput, Scene
 from validation.hard.case import Answer, Case, Reference
 from validation.hard.scenes_for import scaled, task1

@@ -1,0 +1,264 @@
+"""The image of one part's light in fine pixels, before lens and pixel aperture: which rays go where.
+
+One ray a fine pixel shows where brightness steps; the fine pixels that an edge crosses get many. Where single rays are
+random (interreflection, an aperture, a light of some size), all that something is measured from get many.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from imaging.geometry.lens import confusion
+from imaging.geometry.projection import depth
+from imaging.light.appearance import is_plain
+from render import variant as variants
+from render.adaptive import bent, crossed, near_edges, refine
+from render.between import lent_to
+from render.build import CUSTOM, MANY_WAYS, description, textured, view
+from render.large import Renders, fine_pixels, is_large, whole_pixels
+from render.mosaic import mosaic, refine_tiles
+from render.parts import Part
+from render.quality import Quality
+from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
+from render.texture import Face
+from scenes import Picture
+
+_NEAR = 16  # rays of a fine pixel beside an edge, where what is random is faint
+
+
+def fine_image(part: Part, crop: tuple[slice, slice], quality: Quality, variant: str) -> np.ndarray:
+    """Image of a part's fine pixels.
+
+    Parameters
+    ----------
+    part : Part
+    crop : tuple of slice
+        Rows and columns of fine pixels.
+    quality : Quality
+    variant : str
+        Mitsuba variant.
+
+    Returns
+    -------
+    ndarray of float, shape of the crop
+        Grey levels above the black level.
+    """
+    tracer = _Tracer(part, crop, quality, variants.use(variant), variant.startswith("scalar"))
+    return tracer.large() if tracer.is_large else tracer.small()
+
+
+def defocus(picture: Picture) -> float:
+    """Radius of the largest circle of confusion, px."""
+    camera = picture.scene.camera
+    away = depth(picture.scene.bodies.vertices, np.array(list(picture.sensor)), camera)
+    return float(confusion(camera, np.maximum(away, 1e-3 * camera.distance)).max())
+
+
+def _even(part: Part) -> bool:
+    """Whether no place sees less of a light of some size than its horizon leaves: one convex body before darkness."""
+    return part.active & MANY_WAYS == {"light_size"} and is_plain(part.picture.scene) and not part.silhouette
+
+
+def _quiet(part: Part, sharp: frozenset[str]) -> bool:
+    """Whether what is random about the rays is but a small part of the light: on curved parts, what faces send to each
+    other, and what a backlight sends round them."""
+    picture = part.picture
+    round_the_part = picture.scene.lights[0].faces_sensor
+    return (
+        bool(picture.scene.solid.curved)
+        and not part.silhouette
+        and (round_the_part or part.active - sharp == {"interreflection"})
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Tracer:
+    """Rays of one part's fine pixels.
+
+    Attributes
+    ----------
+    part : Part
+    crop : tuple of slice
+        Rows and columns of fine pixels.
+    quality : Quality
+    mitsuba : module
+        With the variant set.
+    scalar : bool
+        Whether that traces rays one by one.
+    """
+
+    part: Part
+    crop: tuple[slice, slice]
+    quality: Quality
+    mitsuba: Any
+    scalar: bool
+
+    @property
+    def picture(self) -> Picture:
+        return self.part.picture
+
+    @property
+    def sharp(self) -> frozenset[str]:
+        """Effects whose single rays are not random."""
+        return self.part.active - MANY_WAYS
+
+    @cached_property
+    def textures(self) -> tuple[tuple[Face, ...], ...] | None:
+        custom = self.scalar and self.part.active & CUSTOM and not self.part.silhouette
+        return textured(self.picture, self.sharp) if custom or _even(self.part) else None
+
+    @cached_property
+    def active(self) -> frozenset[str]:
+        """Effects that are traced: a light of some size that all see alike is in the textures."""
+        return self.sharp if self.textures is not None and _even(self.part) else self.part.active
+
+    @property
+    def random(self) -> bool:
+        """Whether single rays are random."""
+        return self.sharp != self.active
+
+    @cached_property
+    def quiet(self) -> bool:
+        return self.scalar and _quiet(self.part, self.sharp)
+
+    @property
+    def many(self) -> int:
+        """Rays of a fine pixel that an edge crosses."""
+        interpreted = self.scalar and self.active & CUSTOM and (self.textures is None or self.random)
+        plain = self.scalar and (self.textures is None or not self.active & CUSTOM)
+        return self.quality.edge_samples or (16 if interpreted else 64 if plain else 256)
+
+    @property
+    def ordinary(self) -> int:
+        """Rays of a fine pixel where they are not random."""
+        scene = self.picture.scene
+        even_faces = not scene.textures and not (scene.solid.curved and not self.random)
+        return self.quality.samples or (1 if self.scalar and even_faces else 4)
+
+    @property
+    def few(self) -> int:
+        """Rays of a fine pixel where they are random and no edge crosses it."""
+        return self.quality.random_samples or (4 if self.quiet else 16)
+
+    @property
+    def is_large(self) -> bool:
+        some = self.random and not self.quality.everywhere
+        return some or is_large(self.crop, self.quality.supersample, self.random)
+
+    @cached_property
+    def rays(self) -> Rays:
+        """Of a compiled variant."""
+        bounces = SURFACES - 1 if "interreflection" in self.active else 0
+        at_once = LARGE_AT_ONCE if self.is_large else AT_ONCE
+        most, quality = max(self.few, self.many), self.quality
+        return Rays(self.mitsuba, quality.supersample, most, bounces, quality.seed, at_once, self.part.silhouette)
+
+    def film(self, divided: int = 1) -> tuple[tuple[int, int], tuple[slice, slice]]:
+        """Width and height of the whole frame, and the crop, in pixels of so many fine ones each way."""
+        camera, k = self.picture.scene.camera, self.quality.supersample // divided
+        return (camera.width * k, camera.height * k), whole_pixels(self.crop, divided)
+
+    def load(self, active, samples: int, textures=None, divided: int = 1, shown: Picture | None = None) -> Any:
+        """Scene of Mitsuba with some effects."""
+        part = Part(shown or self.picture, self.part.active, self.part.silhouette).reduced(active)
+        made = description(self.mitsuba, part, *self.film(divided), samples, textures)
+        return self.mitsuba.load_dict(made, parallel=False)
+
+    def rendered(self, loaded: Any) -> np.ndarray:
+        """Image of all its pixels."""
+        return np.array(self.mitsuba.render(loaded, seed=self.quality.seed), dtype=float)[:, :, 0]
+
+    def again(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
+        """The image with marked fine pixels rendered again; in scalar variants also what turns out to be crossed."""
+        return self._again(loaded, active, fine, marked, rays, refine_tiles, self.quality.seed)
+
+    def again_alone(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
+        """The image with marked fine pixels rendered again, and no others."""
+        return self._again(loaded, active, fine, marked, rays, mosaic, (self.quality.seed, 0))
+
+    def _again(self, loaded, active, fine, marked, rays: int, tiles: Callable[..., np.ndarray], seed) -> np.ndarray:
+        if not self.scalar:
+            return refine(loaded, self.rays, fine, marked, rays)
+        seen = view(self.mitsuba, self.picture, active, *self.film(), rays)
+        seen["sampler"] = {"type": "stratified", "jitter": False} if self.quality.alike else {"type": "multijitter"}
+        start = self.crop[0].start, self.crop[1].start
+        return tiles(self.mitsuba, loaded, seen, start, fine, marked, rays, seed)
+
+    def whole(self, random: bool, count: int) -> np.ndarray:
+        """Image of whole pixels, with or without random rays."""
+        active, textures = (self.active, None) if random else (self.sharp, self.textures)
+        loaded = self.load(active, count, textures, self.quality.supersample)
+        if self.scalar:
+            return self.rendered(loaded)
+        pixels = np.zeros(tuple(part.stop - part.start for part in self.film(self.quality.supersample)[1]))
+        return refine(loaded, self.rays, pixels, np.ones(pixels.shape, bool), count)
+
+    def bounced(self, near: np.ndarray, count: int) -> np.ndarray:
+        """What surfaces send to each other: with it less without it, of the same rays; whole pixels."""
+        pixels, count = np.zeros(near.shape), 1 << math.ceil(math.log2(count))
+        film = self.film(self.quality.supersample)
+
+        def with_effects(active) -> np.ndarray:
+            loaded = self.load(active, count, None, self.quality.supersample)
+            seen = view(self.mitsuba, self.picture, active, *film, count) | {"sampler": {"type": "ldsampler"}}
+            start = tuple(part.start for part in film[1])
+            return mosaic(self.mitsuba, loaded, seen, start, pixels, near, count, (self.quality.seed, 2))
+
+        return with_effects(self.active) - with_effects(self.sharp)
+
+    def large(self) -> np.ndarray:
+        """Image of which fine pixels are rendered only near edges."""
+        picture, k = self.picture, self.quality.supersample
+        between = self.active - self.sharp == {"interreflection"}
+        apart, plane = self.scalar and self.quality.alike, not (picture.scene.solid.curved or self.part.silhouette)
+        start = self.crop[0].start, self.crop[1].start
+        loaded = {
+            False: (self.load(self.sharp, self.ordinary, self.textures), self.sharp),
+            True: (self.load(self.active, self.few), self.active),
+        }
+        renders = Renders(
+            self.whole,
+            lambda random, *what: self.again_alone(*loaded[random], *what),
+            k,
+            self.random,
+            self.quality.everywhere,
+            self.bounced if apart and between else None,
+            (lambda marked: lent_to(picture, marked, start, k)) if between and plane else None,
+        )
+        rays = self.ordinary, self.few, self.many
+        return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), rays)
+
+    def small(self) -> np.ndarray:
+        """Image of which all fine pixels are rendered, and those near edges again."""
+        loaded = self.load(self.sharp, self.ordinary, self.textures)
+        fine = self.rendered(loaded)
+        marked = self._crossed(fine)
+        if not self.random:
+            return self.again(loaded, self.active, fine, marked, self.many)
+        loaded, near = self.load(self.active, self.few), near_edges(self.picture, self.crop, self.quality.supersample)
+        everywhere = np.ones_like(marked)
+        fine = self.rendered(loaded) if self.scalar else refine(loaded, self.rays, fine, everywhere, self.few)
+        if self.quiet:
+            fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR, self.many))
+        else:
+            marked |= near
+        return self.again(loaded, self.active, fine, marked, self.many)
+
+    def _crossed(self, fine: np.ndarray) -> np.ndarray:
+        """Fine pixels that an edge crosses, as a mask; textures, bilinear, need no more rays and do not count."""
+        scene, away = self.picture.scene, math.ceil(self.quality.supersample * defocus(self.picture))
+        even = fine
+        if scene.textures:
+            bare = self.picture.with_scene(scene.model_copy(update={"textures": ()}))
+            plain = textured(bare, self.sharp) if self.textures is not None else None
+            even = self.rendered(self.load(self.sharp, 1, plain, shown=bare))
+        marked = crossed(even, away)
+        if scene.solid.curved and not away:
+            marked &= bent(even)  # their shading slopes more than a plane face's
+        return marked
