@@ -22,7 +22,7 @@ from measure.measurement import Measurement, distance, distances
 from measure.photo.lens import Lens, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
-from measure.photo.photograph import Found, Shapes, photograph
+from measure.photo.photograph import MeasuredShape, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
@@ -37,9 +37,9 @@ __all__ = [
     "Ellipse",
     "EstimatorKind",
     "Fit",
-    "Found",
     "Images",
     "Lens",
+    "MeasuredShape",
     "MeasuredValue",
     "Measurement",
     "Measurements",

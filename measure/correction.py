@@ -18,7 +18,7 @@ from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
-from measure.quantities import Found, find
+from measure.quantities import MeasuredFeatures, find
 from measure.render_noise import by_features, by_pixels
 from scenes import InvalidInput, Picture, Quantity
 from scenes.status import MEASURED
@@ -193,7 +193,7 @@ def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
 
 def _measured(
     levels: np.ndarray, picture: Picture, estimator: str, threshold: float | None
-) -> tuple[np.ndarray, np.ndarray, Found]:
+) -> tuple[np.ndarray, np.ndarray, MeasuredFeatures]:
     """Values (n, M) in n noise-free images, in the object and in the image, NaN where there is none, and features."""
     found = find(levels, picture, estimator, threshold)
     measured = np.isin(found.status, MEASURED)
@@ -201,7 +201,7 @@ def _measured(
 
 
 def _noise(
-    images: Images, picture: Picture, told: PropagatedValues, levels: np.ndarray, found: Found, values: Pair
+    images: Images, picture: Picture, told: PropagatedValues, levels: np.ndarray, found: MeasuredFeatures, values: Pair
 ) -> Pair:
     """Standard deviations (M,) by the noise of one render, in the object and in the image.
 

@@ -11,7 +11,7 @@ import numpy as np
 from measure.correction import Correction
 from measure.estimators.registry import best_estimator
 from measure.measurement import Measurement, check_method, checked_image, of_first
-from measure.quantities import Found, find
+from measure.quantities import MeasuredFeatures, find
 from scenes import InvalidInput, Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
@@ -210,7 +210,7 @@ def measure_by(
     return tuple(_gathered(find(stack, picture, *method), picture, lead) for method in methods)
 
 
-def _gathered(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurements:
+def _gathered(found: MeasuredFeatures, picture: Picture, lead: tuple[int, ...]) -> Measurements:
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)

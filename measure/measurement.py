@@ -12,7 +12,7 @@ from imaging.models.bias import bias
 from imaging.pictures import Pictures
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.registry import known_name
-from measure.quantities import Found, find
+from measure.quantities import MeasuredFeatures, find
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
 from scenes.results import Shown, finite, value
@@ -205,7 +205,7 @@ def _by_method(images: np.ndarray, picture: Picture, estimator: str, threshold: 
     return of_first(find(stack, picture, estimator, threshold), picture, lead)
 
 
-def of_first(found: Found, picture: Picture, lead: tuple[int, ...]) -> Measurement:
+def of_first(found: MeasuredFeatures, picture: Picture, lead: tuple[int, ...]) -> Measurement:
     """The first quantity, a distance, of what was found in images of leading shape ``lead``."""
     return Measurement(
         edge_names=found.names,
@@ -232,7 +232,7 @@ def checked_image(image: Any, size: tuple[int, int]) -> np.ndarray:
     return grey_levels(images)
 
 
-def _columns(found: Found) -> dict[str, np.ndarray]:
+def _columns(found: MeasuredFeatures) -> dict[str, np.ndarray]:
     """All columns of a Measurement, about the first quantity, for a stack (n, height, width)."""
     state, shape = found.status[:, 0], found.shape
     measured = np.isin(state, status.MEASURED)

@@ -19,7 +19,7 @@ from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
-from measure.quantities import Found, find
+from measure.quantities import MeasuredFeatures, find
 from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
 
@@ -139,7 +139,7 @@ def propagate(
 
 
 def _responses(
-    clean: np.ndarray, picture: Picture, found: Found, estimator: str, threshold: float | None
+    clean: np.ndarray, picture: Picture, found: MeasuredFeatures, estimator: str, threshold: float | None
 ) -> tuple[sparse.csr_array, np.ndarray]:
     """Derivative of lines and circles (`Seen`) by the pixels, (q, pixels), and which of them have none, bool (q,)."""
     layout, parts = layout_of(picture), [sparse.csr_array((0, clean.size))]
@@ -161,7 +161,12 @@ def _none(rows: int, pixels: int) -> sparse.csr_array:
 
 
 def _of_lines(
-    clean: np.ndarray, picture: Picture, layout: Layout, found: Found, estimator: str, threshold: float | None
+    clean: np.ndarray,
+    picture: Picture,
+    layout: Layout,
+    found: MeasuredFeatures,
+    estimator: str,
+    threshold: float | None,
 ) -> np.ndarray | sparse.csr_array:
     """Of the lines, (2 E, pixels); NaN where there is none."""
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
@@ -188,7 +193,12 @@ def _covariance(gradient: np.ndarray, errors: np.ndarray, state: list[str]) -> n
 
 
 def _values(
-    found: Found, image: np.ndarray, plane: np.ndarray, state: list[str], is_told: bool, textures: TextureErrors | None
+    found: MeasuredFeatures,
+    image: np.ndarray,
+    plane: np.ndarray,
+    state: list[str],
+    is_told: bool,
+    textures: TextureErrors | None,
 ) -> PropagatedValues:
     measured = np.isin(state, status.MEASURED)
     value, value_image = (np.where(measured, part.value[0], np.nan) for part in (found.plane, found.image))
@@ -202,7 +212,11 @@ def _values(
 
 
 def _of_first(
-    found: Found, rows: sparse.csr_array, errors: np.ndarray, values: PropagatedValues, shape: tuple[int, int]
+    found: MeasuredFeatures,
+    rows: sparse.csr_array,
+    errors: np.ndarray,
+    values: PropagatedValues,
+    shape: tuple[int, int],
 ) -> Propagated:
     measured, quantity = values.status[0] in status.MEASURED, found.known.quantities[0]
     covariance = np.full((4, 4), np.inf)

@@ -30,7 +30,7 @@ class Values:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class MeasuredFeatures:
     """What is found in n images.
 
     Attributes
@@ -69,7 +69,7 @@ class Found:
         """Of the straight edges."""
         return self.known.view.names
 
-    def with_errors(self, errors: np.ndarray) -> Found:
+    def with_errors(self, errors: np.ndarray) -> MeasuredFeatures:
         """The same of one image with another covariance (q, q) of its lines and circles."""
         return replace(self, errors=errors[None])
 
@@ -84,7 +84,7 @@ class Found:
         return corners, _spread(rows, self.errors)
 
 
-def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None = None) -> Found:
+def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None = None) -> MeasuredFeatures:
     """All quantities in images, shape (n, height, width).
 
     Straight edges by the estimator; circles by edge points around their rims, whatever the estimator.
@@ -95,7 +95,7 @@ def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float 
     circles = tuple(find_circle(images, picture, name) for name in known.circles)
     seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles))
     errors = _errors(shape, circles, known.seen)
-    return Found(
+    return MeasuredFeatures(
         known=known,
         shape=shape,
         circles=circles,

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from scipy import sparse
 
-from measure.quantities import Found
+from measure.quantities import MeasuredFeatures
 
 _LEAST, _APART = 4, 4.0  # side of a part, px, and in standard deviations of the lens's blur
 
@@ -62,7 +62,7 @@ def _with_neighbours(parts: np.ndarray) -> np.ndarray:
     return parts
 
 
-def by_features(found: Found, alike: int) -> float:
+def by_features(found: MeasuredFeatures, alike: int) -> float:
     """Scatter of lines and circles over the first images, which differ by rays alone, over that by the camera's noise.
 
     Root mean square of all their parameters, each feature's made independent by its own covariance; 0 of one image,

@@ -21,7 +21,7 @@ _SOLVED = 1000  # images solved together
 _ROUNDS = 4  # expansions before each image is measured alone
 
 
-class Found(NamedTuple):
+class Solutions(NamedTuple):
     """Most likely parameters in n images.
 
     Attributes
@@ -50,7 +50,7 @@ Locate = Callable[[np.ndarray, np.ndarray], Centre]
 """The maximum in one image, from its used pixels (P,) and the whole of it (height, width)."""
 
 
-def find(tool: ArrangementEstimator, images: np.ndarray, locate: Locate, first: Centre | None = None) -> Found:
+def find(tool: ArrangementEstimator, images: np.ndarray, locate: Locate, first: Centre | None = None) -> Solutions:
     """Most likely parameters in images (n, height, width).
 
     The first image is measured by itself, unless its centre is given; the others around it, as far as the
@@ -102,12 +102,12 @@ class _Collected:
     def add(self, which: np.ndarray, parameters: np.ndarray, squares: np.ndarray) -> None:
         self.parameters[which], self.squares[which] = parameters, squares
 
-    def found(self, centres: tuple[Centre, ...]) -> Found:
+    def found(self, centres: tuple[Centre, ...]) -> Solutions:
         arrangement, free = self.tool.arrangement, self.tool.model.free
         count, first = len(self.parameters), 2 * free.size
         vertices = np.broadcast_to(arrangement.vertices, (count, *arrangement.vertices.shape)).copy()
         vertices[:, free] = self.parameters[:, :first].reshape(count, -1, 2)
-        return Found(
+        return Solutions(
             vertices, self.parameters[:, first:-1], self.parameters[:, -1], self.squares, self.owner, self.settled,
             centres,
         )  # fmt: skip

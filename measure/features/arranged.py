@@ -10,7 +10,7 @@ from threadpoolctl import ThreadpoolController
 
 from imaging.sensor import full_scale
 from measure.estimators.arrangement import ArrangementEstimator, Centre
-from measure.estimators.stack import Found, find
+from measure.estimators.stack import Solutions, find
 from measure.features.contrasts import SEEN, asked, contrasts, seen_edges
 from measure.features.found import MIN_SINE, Shape, gather
 from measure.features.layout import Layout
@@ -142,7 +142,7 @@ def _shape(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Sh
     )
 
 
-def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Found, bool]:
+def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tuple[Solutions, bool]:
     """What is found in the images, and whether it can be relied on.
 
     Judged where the light says the picture is, so that all images have one answer; else where the first one is that
@@ -159,16 +159,16 @@ def _find(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> tup
     return found, bool(told or not good.size or _reliable(tool, found, good[0]))
 
 
-def _reliable(tool: ArrangementEstimator, found: Found, number: int) -> bool:
+def _reliable(tool: ArrangementEstimator, found: Solutions, number: int) -> bool:
     return _expected_reliable(tool) if tool.is_lit else is_reliable(tool, found.centres[found.centre[number]])
 
 
-def _shows(tool: ArrangementEstimator, layout: Layout, found: Found) -> np.ndarray:
+def _shows(tool: ArrangementEstimator, layout: Layout, found: Solutions) -> np.ndarray:
     """Whether each image shows all edges, and is what the model says, bool (n,)."""
     return _fits(found) & np.isin(seen_edges(tool, layout, found)[1], status.MEASURED).all(1)
 
 
-def _fits(found: Found) -> np.ndarray:
+def _fits(found: Solutions) -> np.ndarray:
     """Whether the model explains each image, bool (n,)."""
     return found.settled & (_probabilities(found) >= WORST)
 
@@ -177,7 +177,7 @@ def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
     return bool(layout.visible.all() and (tool.arrangement.required >= 0).all() and tool.pixels.size)
 
 
-def _probabilities(found: Found) -> np.ndarray:
+def _probabilities(found: Solutions) -> np.ndarray:
     freedom, scale = (np.array([getattr(c, key) for c in found.centres])[found.centre] for key in ("freedom", "scale"))
     return p_value(found.squares / scale, freedom)
 
@@ -211,7 +211,7 @@ def _states(layout: Layout, normals: np.ndarray, counted: np.ndarray, whole: np.
     return np.array([status.worst(*row) for row in each])
 
 
-def _whole(tool, found: Found, reliable: bool) -> np.ndarray:
+def _whole(tool, found: Solutions, reliable: bool) -> np.ndarray:
     """What is said of each image as a whole."""
     told = np.full(len(found.vertices), status.OK if reliable else status.ILL_CONDITIONED)
     rivalled = np.array([centre.rivalled for centre in found.centres])[found.centre]

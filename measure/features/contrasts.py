@@ -6,7 +6,7 @@ import numpy as np
 
 from imaging.features.locator import MIN_USABLE
 from measure.estimators.arrangement import ArrangementEstimator, Centre
-from measure.estimators.stack import Found
+from measure.estimators.stack import Solutions
 from measure.features.layout import Layout
 from measure.once import once
 from scenes import status
@@ -14,7 +14,7 @@ from scenes import status
 SEEN = 4.0  # standard deviations of an edge's contrast that there must be of it
 
 
-def seen_edges(tool: ArrangementEstimator, layout: Layout, found: Found) -> tuple[np.ndarray, np.ndarray]:
+def seen_edges(tool: ArrangementEstimator, layout: Layout, found: Solutions) -> tuple[np.ndarray, np.ndarray]:
     """Contrast in the middle of each required edge and its status, both (n, E)."""
     edges = tool.arrangement.edges[tool.model.moving]
     contrast, sigma = contrasts(tool, found)
@@ -57,7 +57,7 @@ def _shown(tool: ArrangementEstimator) -> np.ndarray:
     return inside.mean(0) * np.linalg.norm(stop - start, axis=-1) >= MIN_USABLE
 
 
-def contrasts(tool: ArrangementEstimator, found: Found) -> tuple[np.ndarray, np.ndarray]:
+def contrasts(tool: ArrangementEstimator, found: Solutions) -> tuple[np.ndarray, np.ndarray]:
     """Contrast at the start, the middle and the end of each moving piece, and its standard deviation, (n, N, 3)."""
     rows, sigma = map(np.stack, zip(*(_contrast(tool, centre) for centre in found.centres), strict=True))
     return np.einsum("intl,il->int", rows[found.centre], found.levels), sigma[found.centre]

@@ -32,7 +32,7 @@ _STRAIGHT = (QUADRILATERAL, TAG)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class MeasuredShape:
     """One shape, measured.
 
     Attributes
@@ -85,7 +85,7 @@ class Found:
 class Shapes:
     """What was measured, and all that was found, the most prominent first."""
 
-    found: tuple[Found, ...]
+    found: tuple[MeasuredShape, ...]
     candidates: tuple[Candidate, ...]
 
 
@@ -146,7 +146,7 @@ def photograph(
     return Shapes(found, candidates)
 
 
-def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | None) -> Found:
+def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | None) -> MeasuredShape:
     if one.kind in (CIRCLE, ELLIPSE):
         return _round(photo, one)
     if one.kind == CHESSBOARD:
@@ -154,14 +154,14 @@ def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | No
     return _straight(photo, one.outline, one, estimator, lens)
 
 
-def _straight(photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: Lens | None) -> Found:
+def _straight(photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: Lens | None) -> MeasuredShape:
     seen = photo
     if one is not None and one.kind == TAG:
         noise = noise_sigma(photo.levels)
         seen = replace(photo, levels=plain(photo.levels, one.outline, one.family, noise))
     told = measure_quadrilateral(seen, estimator, lens, near)
     good = told.status in status.MEASURED
-    return Found(
+    return MeasuredShape(
         QUADRILATERAL if one is None else one.kind, told.status, told.corners if good else None, None,
         told.covariance if good else None, told.measurands, _residuals(photo, told, lens) if good else (), told.noise,
         told.blur_px, told.p_value, one, told,
@@ -172,10 +172,10 @@ def _residuals(photo: Photograph, told: Quadrilateral, lens: Lens | None) -> tup
     return of_sides(photo.levels, told.corners) if lens is None else ()
 
 
-def _round(photo: Photograph, one: Candidate) -> Found:
+def _round(photo: Photograph, one: Candidate) -> MeasuredShape:
     told = measure_ellipse(photo, one.parameters)
     good = told.status in status.MEASURED
-    return Found(
+    return MeasuredShape(
         told.kind, told.status, None, told.parameters if good else None, told.covariance if good else None,
         _quantities(told) if good else (), (of_ellipse(photo.levels, told.parameters),) if good else (), told.noise,
         told.blur_px, float("nan"), one,
@@ -194,18 +194,20 @@ def _quantities(told) -> tuple[MeasuredValue, ...]:
     return tuple(MeasuredValue(name, float(value), float(s), unit) for name, value, s, unit in values)
 
 
-def _board(photo: Photograph, one: Candidate) -> Found:
+def _board(photo: Photograph, one: Candidate) -> MeasuredShape:
     """All inner corners (n, 2), those that are measured; the worst of their statuses."""
     seen = recording(photo)
     noise = float(np.sqrt(seen.curve.variance(photo.levels.mean())))
     told = measured(photo.levels, one.grid, noise)
     good = told.measured
     if not good.any():
-        return Found(CHESSBOARD, told.status[0], None, None, None, (), (), noise, told.blur_px, float("nan"), one)
+        return MeasuredShape(
+            CHESSBOARD, told.status[0], None, None, None, (), (), noise, told.blur_px, float("nan"), one
+        )
     covariance, alike = board_covariance(photo.levels, told, one.grid, seen)
     said = status.OK if alike else status.CORRELATED
     state = status.worst(*(each for each in told.status if each in status.MEASURED), seen.status, said)
-    return Found(
+    return MeasuredShape(
         CHESSBOARD, state, told.corners, None, covariance, (), (), noise, told.blur_px,
         float(np.nanmin(told.p_value)), one,
     )  # fmt: skip

@@ -27,7 +27,7 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Setting
 from scenes.status import MEANINGS, REMEDIES
-from validation.batch.work import Chunk, Clean, Found, Packed
+from validation.batch.work import Chunk, Clean, Packed, TaskResult
 from validation.explore import answers, best, budgets, effects, preview, prove, save, server, session, sphere, tools
 from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
@@ -286,7 +286,7 @@ def fake(task1, scale, rng, lost=0):
     propagated = {"gradient:0": (forecast.variance_object, forecast.value_object, "ok")}
     clean = Clean(Packed.of(np.zeros((2, 2))), propagated, {"measurands": [about]}, {})
     pieces = np.split(values, 20)
-    return clean, [Found(None, {k: Chunk({"gradient:0": piece}, {}, {})}) for k, piece in enumerate(pieces)]
+    return clean, [TaskResult(None, {k: Chunk({"gradient:0": piece}, {}, {})}) for k, piece in enumerate(pieces)]
 
 
 @pytest.mark.parametrize(("scale", "agrees"), [(1.0, True), (1.14, False), (0.88, False)])

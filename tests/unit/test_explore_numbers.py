@@ -12,7 +12,7 @@ from scipy import stats
 import planner
 import scenes
 from scenes import InvalidInput, Pose, Tolerance
-from validation.batch.work import Chunk, Clean, Found, Packed
+from validation.batch.work import Chunk, Clean, Packed, TaskResult
 from validation.explore import answers, best, preview, prove, sphere
 from validation.explore.messages import Message
 from validation.explore.state import SENSOR, State
@@ -112,7 +112,9 @@ def test_a_proof_is_in_standard_deviations(scene):
         about.append({"name": f"m{k}", "unit": "cm", "value": 7.0 + k, "calibrated": (1.1 * sigma) ** 2,
                       "predicted_bias": 1e-4 * (k + 1)})  # fmt: skip
     clean = Clean(Packed.of(np.zeros((2, 2))), propagated, {"measurands": about}, {})
-    pieces = [Found(None, {0: Chunk({n: v[s] for n, v in columns.items()}, {}, {})}) for s in (np.s_[:25], np.s_[25:])]
+    pieces = [
+        TaskResult(None, {0: Chunk({n: v[s] for n, v in columns.items()}, {}, {})}) for s in (np.s_[:25], np.s_[25:])
+    ]
     for k, (proof, sigma) in enumerate(zip(prove.proofs(scene, clean, pieces), (0.002, 0.005), strict=True)):
         good = [float(v) for v in columns[f"gradient:{k}"] if math.isfinite(v)]
         measured = statistics.stdev(good)

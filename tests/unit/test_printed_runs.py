@@ -83,7 +83,7 @@ def run(tmp_path_factory):
             failures = {name: {i - some.start: state for i, state in lost.items()} for name, lost in here.lost.items()}
             chunks[number] = work.Chunk({n: v[some] for n, v in here.values.items()}, failures, {"measure": 0.5})
         clean = work.Clean(work.Packed.of(np.zeros((4, 6))), here.propagated, here.predicted, {"render": 0.25})
-        return work.Found(clean, chunks)
+        return work.TaskResult(clean, chunks)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(job.work, "perform", perform)

@@ -8,7 +8,7 @@ import pytest
 from planner.uncertainty import Input, budget, monte_carlo, validate
 from planner.uncertainty.validation import _reasons
 from scenes import Pose
-from validation.batch.found import Found
+from validation.batch.repeated import RepeatedValues
 from validation.batch.rows import Rows
 
 MODEL = {"paper": 2.0, "calibrated": 3.0, "bound": 1.5, "value_px": 80.0, "predicted_bias": 0.25}
@@ -19,7 +19,7 @@ def method(index, place, count=40, lost=0, clean="ok"):
     rng = np.random.default_rng(100 * index + place)
     values = 80.0 + place + rng.normal(0, 0.5 + 0.1 * index, count)
     values[:lost] = np.nan
-    return Found(0.3 + 0.1 * index + 0.01 * place, values, {"short": lost} if lost else {}, clean)
+    return RepeatedValues(0.3 + 0.1 * index + 0.01 * place, values, {"short": lost} if lost else {}, clean)
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ def test_the_image_of_a_finished_setting_is_given_up(index, chunks, more, is_dro
     store, said = Store(chunks), []
     batch = SimpleNamespace(store=store, stages=Stages([[600] * 71]), more=more, done=10, total=900)
     batch.progress = lambda *told: said.append(told)
-    found = work.Found(None, dict.fromkeys((0, 2), None))
+    found = work.TaskResult(None, dict.fromkeys((0, 2), None))
     job._Batch._commit(batch, index, found)
     assert store.added == [(index, found)]
     assert store.dropped == [index] * is_dropped
@@ -60,7 +60,7 @@ def test_an_image_that_is_given_up_is_gone(tmp_path):
     store = RunFile(tmp_path / "run", {"campaign": {}, "seed": 1})
     for setting in (0, 1):
         clean = work.Clean(work.Packed.of(np.full((2, 3), 5.0 + setting)), {}, {}, {"render": 0.5})
-        store.add(setting, work.Found(clean, {}))
+        store.add(setting, work.TaskResult(clean, {}))
     store.drop_image(1)
     assert (store.has_image(0), store.has_image(1), store.image(1)) == (True, False, None)
     assert store.image(0).tolist() == [[5.0] * 3] * 2

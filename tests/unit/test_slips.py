@@ -589,7 +589,7 @@ def test_explore_renders_anew_when_a_light_or_the_sensor_moves():
 
         async def perform(self, task):
             asked.append(task.case.picture)
-            return work.Found(SimpleNamespace(number=len(asked)), {})
+            return work.TaskResult(SimpleNamespace(number=len(asked)), {})
 
     async def run():
         here = session.Session(session.Place(scene, "two_lights", None), Tools(), None)

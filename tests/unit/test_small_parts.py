@@ -15,7 +15,7 @@ from scenes import InvalidInput, Jitter, Picture, Pose
 from scenes.measurands import position
 from validation import plan_check
 from validation.batch import work
-from validation.batch.found import Found, row_status
+from validation.batch.repeated import RepeatedValues, row_status
 from validation.cli import budget as budget_command
 from validation.cli import plan as plan_command
 from validation.cli import recorded
@@ -228,5 +228,5 @@ def test_too_many_lost_images_of_a_setting_are_its_status(lost, expected):
 
 def test_what_was_measured_is_off_by_its_mean_less_what_is_taken_off_and_what_is_there():
     values = np.array([3.0, 5.0, np.nan, 7.0])
-    told = Found(4.0, values, {"short": 1}, "ok", correction=0.5, u_bias=0.1).scatter(2.0)
+    told = RepeatedValues(4.0, values, {"short": 1}, "ok", correction=0.5, u_bias=0.1).scatter(2.0)
     assert told == {"empirical": pytest.approx(4.0), "bias": pytest.approx(5 - 0.5 - 2), "n": 4, "failed": 1}

@@ -32,7 +32,7 @@ from validation.batch.result import Validation, collect
 from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
-from validation.batch.work import CHUNK, Found, Rendering, Task
+from validation.batch.work import CHUNK, Rendering, Task, TaskResult
 from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
@@ -280,14 +280,14 @@ class _Batch:
                     setting.task = replace(setting.task, image=found.clean.image)
                     opened.append(setting)
 
-    def _result(self, future: Future, crew: Crew) -> Found:
+    def _result(self, future: Future, crew: Crew) -> TaskResult:
         try:
             return future.result()
         except Exception as error:
             crew.check(error)  # says so if it is the crew that is gone, and not the work that is wrong
             raise
 
-    def _commit(self, index: int, found: Found) -> None:
+    def _commit(self, index: int, found: TaskResult) -> None:
         self.store.add(index, found)
         finished = len(self.store.chunks(index)) == len(self.stages.sizes(index))
         if index >= _IMAGES and finished and self.more is None:
@@ -303,7 +303,7 @@ class _Batch:
         """The settings that have work left, one at a time."""
         for index in range(len(self.campaign)):
             if self.photos and index in self.photos.troubles and not self.store.trouble(index):
-                self._commit(index, Found(None, {}, self.photos.troubles[index]))
+                self._commit(index, TaskResult(None, {}, self.photos.troubles[index]))
             done = self.store.chunks(index)
             left = deque((chunk, size) for chunk, size in self.stages.sizes(index).items() if chunk not in done)
             if not left or self.store.trouble(index):
@@ -311,7 +311,7 @@ class _Batch:
             try:
                 case = self.campaign.case(index)
             except InvalidInput as error:
-                self._commit(index, Found(None, {}, str(error)))
+                self._commit(index, TaskResult(None, {}, str(error)))
                 continue
             files = self.photos.files[index] if self.photos else ()
             how = self.options

@@ -12,7 +12,7 @@ import numpy as np
 import planner
 from measure.propagation import PropagatedValues
 from validation import statistics
-from validation.batch.found import STATUSES, Found, ratios, row_status
+from validation.batch.repeated import STATUSES, RepeatedValues, ratios, row_status
 
 FIELDS = ("paper", "calibrated", "bound")
 
@@ -138,7 +138,7 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
         self._records, self._size, self._first = np.zeros(settings, _RECORD), 0, array("q", [0])
         self._about: dict[tuple[str, str, str], int] = {}  # name, kind and unit, which few settings differ in
 
-    def add(self, told: list[dict[str, Any]], found: list[Found]) -> None:
+    def add(self, told: list[dict[str, Any]], found: list[RepeatedValues]) -> None:
         """Append a setting: what is predicted of each measurand (`predicted`), and what was measured."""
         self._grow(len(told))
         share = independent([each.distances for each in found])

@@ -16,8 +16,8 @@ from scenes.results import Shown, poses
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
-from validation.batch.found import Found
 from validation.batch.measurands import column
+from validation.batch.repeated import RepeatedValues
 from validation.batch.rows import MEAN_ERROR, Row, Rows
 from validation.batch.store import RunFile
 from validation.batch.work import methods
@@ -109,10 +109,12 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
     )
 
 
-def _found(setting: int, method: str, store: RunFile, off: dict[str, float] | None) -> Found:
+def _found(setting: int, method: str, store: RunFile, off: dict[str, float] | None) -> RepeatedValues:
     propagated, _, status = store.propagated(setting, method)
     correction = {} if off is None else {"correction": off["bias"], "u_bias": off["u"], "render_noise": off["noise"]}
-    return Found(propagated, store.distances(setting, method), store.failures(setting, method), status, **correction)
+    return RepeatedValues(
+        propagated, store.distances(setting, method), store.failures(setting, method), status, **correction
+    )
 
 
 def _printed(campaign: Campaign) -> bool:

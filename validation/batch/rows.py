@@ -13,8 +13,8 @@ from scenes import pairs
 from scenes.status import is_trusted
 from validation import statistics
 from validation.batch.campaign import Campaign
-from validation.batch.found import STATUSES, Found, ratios, row_status
 from validation.batch.measurands import JudgedMeasurand, Measured
+from validation.batch.repeated import STATUSES, RepeatedValues, ratios, row_status
 
 
 @dataclass(frozen=True)
@@ -109,16 +109,23 @@ class Rows(Sequence[Row]):
         self._numbered: dict[tuple[tuple[str, int], ...], int] = {}
         self.measured = Measured(len(campaign))
 
-    def add(self, index: int, scene: str, model: dict[str, Any], found: dict[str, Found], each: list[Found]) -> None:
+    def add(
+        self,
+        index: int,
+        scene: str,
+        model: dict[str, Any],
+        found: dict[str, RepeatedValues],
+        each: list[RepeatedValues],
+    ) -> None:
         """Append a setting.
 
         Parameters
         ----------
         model : dict
             Predictions without an image.
-        found : dict of Found
+        found : dict of RepeatedValues
             Of the first measurand by each method, the verdict's first.
-        each : list of Found
+        each : list of RepeatedValues
             Of each measurand, in the scene's unit, by the verdict's method.
         """
         kind = self._kind(scene, tuple(found))

@@ -20,7 +20,7 @@ from scenes.errors import describe, one_line
 from validation.batch import facts
 from validation.batch.campaign import Campaign
 from validation.batch.stopped import Stopped
-from validation.batch.work import CHUNK, Chunk, Clean, Found, Packed
+from validation.batch.work import CHUNK, Chunk, Clean, Packed, TaskResult
 
 _TABLES = {
     "run": "key TEXT PRIMARY KEY, value TEXT NOT NULL",
@@ -172,7 +172,7 @@ class RunFile:
         except ValidationError as error:
             raise self._damaged(f"its campaign: {describe(error)}") from None
 
-    def add(self, setting: int, found: Found) -> None:
+    def add(self, setting: int, found: TaskResult) -> None:
         """Commit all that a task found, or nothing."""
         with self._transaction():
             if found.clean:

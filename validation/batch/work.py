@@ -147,7 +147,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Found:
+class TaskResult:
     """What a task found; ``trouble`` says in one line why the setting cannot be worked on."""
 
     clean: Clean | None
@@ -155,7 +155,7 @@ class Found:
     trouble: str | None = None
 
 
-def perform(task: Task) -> Found:
+def perform(task: Task) -> TaskResult:
     """Render, unless the image came with the task, then measure.
 
     With one thread of linear algebra, whatever the worker's environment says: a sum split over threads has other bits.
@@ -169,7 +169,7 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _perform(task: Task) -> Found:
+def _perform(task: Task) -> TaskResult:
     if not task.photos:
         with _RENDERER:
             variants.use(task.variant)  # what the machine cannot do is not the setting's fault
@@ -180,11 +180,11 @@ def _perform(task: Task) -> Found:
             with _RENDERER:
                 clean = render_setting(task.case, task.variant, task.rendering, mean)
         image = (task.image or clean.image).array()
-        return Found(
+        return TaskResult(
             clean, {k: measure_chunk(task.case, image, task.seed, k, n, _shots(task, k)) for k, n in task.chunks}
         )
     except InvalidInput as error:
-        return Found(None, {}, str(error))
+        return TaskResult(None, {}, str(error))
 
 
 def _shots(task: Task, chunk: int) -> Shots | None:

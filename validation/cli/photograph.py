@@ -48,7 +48,7 @@ def facts(found: measure.Shapes) -> dict[str, Any]:
     })  # fmt: skip
 
 
-def _facts(one: measure.Found) -> dict[str, Any]:
+def _facts(one: measure.MeasuredShape) -> dict[str, Any]:
     told: dict[str, Any] = {"kind": one.kind, "status": one.status}
     if one.candidate is not None and one.candidate.identifier is not None:
         told |= {"id": one.candidate.identifier, "family": one.candidate.family}
@@ -72,7 +72,7 @@ def _facts(one: measure.Found) -> dict[str, Any]:
     }
 
 
-def _sides(one: measure.Found) -> list[dict[str, Any]]:
+def _sides(one: measure.MeasuredShape) -> list[dict[str, Any]]:
     sides = [quantity for quantity in one.quantities if quantity.name.startswith("side")]
     rms: list[float | None] = [side.rms for side in one.residuals] or [None] * len(sides)
     return [vars(side) | {"residual_px": each} for side, each in zip(sides, rms, strict=True)]
@@ -111,7 +111,7 @@ def _beside(sigma: float, places: int) -> str:
     return f"+- {sigma:.{places}f}" if math.isfinite(sigma) else "+- unknown"
 
 
-def _text(number: int, one: measure.Found) -> str:
+def _text(number: int, one: measure.MeasuredShape) -> str:
     name = one.kind if one.kind != "tag" else f"tag {one.candidate.family} {one.candidate.identifier}"
     seen = f"noise {one.noise:.2f} grey levels, blur {one.blur_px:.2f} px"
     if one.kind == "chessboard":
@@ -128,7 +128,7 @@ def _text(number: int, one: measure.Found) -> str:
     return "\n".join(lines)
 
 
-def _board(one: measure.Found) -> str:
+def _board(one: measure.MeasuredShape) -> str:
     rows, columns = one.candidate.grid.shape[:2]
     told = f"{one.status}, {columns} x {rows} inner corners"
     if one.corners is None:

@@ -12,7 +12,7 @@ from scenes import Scene
 from scenes.status import doubt
 from validation.batch.campaign import Case
 from validation.batch.measurands import column
-from validation.batch.work import Clean, Found, Task, methods
+from validation.batch.work import Clean, Task, TaskResult, methods
 from validation.defaults import DEFAULT_SEED
 from validation.explore.answers import finite
 from validation.explore.state import State
@@ -80,7 +80,7 @@ class Proof:
         return self.interval[0] <= 1 <= self.interval[1]
 
 
-def proofs(scene: Scene, clean: Clean, found: list[Found]) -> list[Proof]:
+def proofs(scene: Scene, clean: Clean, found: list[TaskResult]) -> list[Proof]:
     """One for each measurand, from the measured pieces."""
     chunks = [chunk for each in found for chunk in each.chunks.values()]
     main = methods(scene)[0].name

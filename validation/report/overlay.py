@@ -95,12 +95,12 @@ def _factors(found: measure.Shapes, scale: float) -> tuple[float, float]:
     )
 
 
-def _largest(one: measure.Found) -> float:
+def _largest(one: measure.MeasuredShape) -> float:
     known = [block for block in _blocks(one) if np.isfinite(block).all()]
     return max([0.0, *(float(np.linalg.eigvalsh(block)[-1]) for block in known)])
 
 
-def _blocks(one: measure.Found) -> list[np.ndarray]:
+def _blocks(one: measure.MeasuredShape) -> list[np.ndarray]:
     """Covariance of each corner, NaN where a board's is not measured, or of the centre."""
     count = 1 if one.corners is None else len(one.corners)
     return [one.covariance[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(count)]
@@ -121,7 +121,7 @@ def _outlined(axes: Axes, outline: np.ndarray, colour: str, width: float, style:
     axes.plot(closed[:, 0], closed[:, 1], style, color=colour, linewidth=width)
 
 
-def _drawn(axes: Axes, one: measure.Found, number: int, scale: float, residual: float, corner: float) -> None:
+def _drawn(axes: Axes, one: measure.MeasuredShape, number: int, scale: float, residual: float, corner: float) -> None:
     colour = _colour(number)
     outline = one.candidate.outline if one.candidate is not None else one.corners
     if one.kind == CHESSBOARD and one.corners is not None:
@@ -162,7 +162,7 @@ def _badge(axes: Axes, place: np.ndarray, text: str, colour: str) -> None:
     axes.text(*place, text, fontsize=0.8 * _TEXT, ha="center", va="center", bbox=box, clip_on=True)
 
 
-def _labelled(axes: Axes, one: measure.Found, scale: float, colour: str) -> None:
+def _labelled(axes: Axes, one: measure.MeasuredShape, scale: float, colour: str) -> None:
     """Each side's length beside it, outside, where it has room."""
     middle = one.corners.mean(0)
     box = {"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1.5}
@@ -193,7 +193,7 @@ def _lines(found: measure.Shapes, residual: float, corner: float) -> list[tuple[
     return lines
 
 
-def _told(one: measure.Found) -> str:
+def _told(one: measure.MeasuredShape) -> str:
     name = f"{one.candidate.family} {one.candidate.identifier}" if one.kind == "tag" else one.kind
     if one.kind == CHESSBOARD:
         return f"{name}: {len(one.corners)} corners, {one.status}"

@@ -15,7 +15,7 @@ import planner
 import render
 from scenes import InvalidInput, status
 from tests.proofs.agreement.settings import Place
-from validation.batch.found import row_status
+from validation.batch.repeated import row_status
 from validation.plan_check import without_formula
 from validation.statistics import ratio_interval
 

@@ -206,11 +206,12 @@ def _proved():
         columns[key] = 3.0 + k + rng.normal(0, 0.01, 25)
         columns[key][: 5 * k] = np.nan
         about.append({"name": name, "unit": "cm", "value": 3.01 + k, "calibrated": 2e-4, "predicted_bias": 0.01})
-    from validation.batch.work import Chunk, Clean, Found, Packed
+    from validation.batch.work import Chunk, Clean, Packed, TaskResult
 
     clean = Clean(Packed.of(np.zeros((2, 2))), propagated, {"measurands": about}, {})
     pieces = [
-        Found(None, {k: Chunk({name: v[5 * k : 5 * k + 5] for name, v in columns.items()}, {}, {})}) for k in range(5)
+        TaskResult(None, {k: Chunk({name: v[5 * k : 5 * k + 5] for name, v in columns.items()}, {}, {})})
+        for k in range(5)
     ]
     made = prove.proofs(scene, clean, pieces)
     sizes = [[task.chunks for task in prove.measuring(scene, state, "scalar_rgb", clean, n)] for n in (49, 50, 51, 120)]

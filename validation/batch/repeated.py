@@ -15,7 +15,7 @@ STATUSES = tuple(sorted(statuses.ALL))
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class RepeatedValues:
     """What one method measured in one setting.
 
     Attributes
