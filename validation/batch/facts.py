@@ -53,6 +53,7 @@ class _Identity(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
     campaign: dict[str, Any]
+    files: dict[str, str] = {}
     seed: Annotated[int, Field(ge=0)]
     renders: Annotated[int, Field(ge=2, le=10_000_000)]
     chunk: int

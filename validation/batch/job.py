@@ -26,6 +26,7 @@ from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign
 from validation.batch.options import RunOptions
+from validation.batch.part_files import contents
 from validation.batch.photographs import Photographs
 from validation.batch.pool import Crew
 from validation.batch.result import Validation, collect
@@ -159,8 +160,10 @@ def _identity(
     campaign: Campaign, renders: int, seed: int, variant: str, how: Rendering, photos: Photographs | None
 ) -> dict:
     """All that the numbers depend on; a directory that holds other ones is refused."""
+    document = campaign.model_dump(mode="json")
     return {
-        "campaign": campaign.model_dump(mode="json"),
+        "campaign": document,
+        "files": contents(document),
         "seed": seed,
         "renders": renders,
         "chunk": CHUNK,

@@ -19,6 +19,7 @@ from scenes import status as statuses
 from scenes.errors import describe, one_line
 from validation.batch import facts
 from validation.batch.campaign import Campaign
+from validation.batch.part_files import by_content, contents
 from validation.batch.stopped import Stopped
 from validation.batch.work import CHUNK, Chunk, Clean, Packed, TaskResult
 
@@ -165,10 +166,19 @@ class RunFile:
         return found
 
     def campaign(self) -> Campaign:
-        """The campaign that the run works through; its parts' files are found from where the run was started."""
-        context = {"directory": Path(self.fact("directory", ""))}
+        """The campaign that the run works through; its parts' files are found from where the run was started.
+
+        Raises
+        ------
+        InvalidInput
+            If one of them no longer holds what was measured.
+        """
+        directory, identity = Path(self.fact("directory", "")), self.identity()
+        for name, now in contents(identity["campaign"], directory).items():
+            if now and now != identity.get("files", {}).get(name, now):
+                raise InvalidInput(f"{directory / name} must hold what {self.path.parent} measured, got other content")
         try:
-            return Campaign.model_validate(self.identity()["campaign"], context=context)
+            return Campaign.model_validate(identity["campaign"], context={"directory": directory})
         except ValidationError as error:
             raise self._damaged(f"its campaign: {describe(error)}") from None
 
@@ -320,8 +330,7 @@ class RunFile:
         if there is None:
             self.note("identity", identity)
             self.note("directory", str(Path.cwd()))
-        elif there != identity:
-            texts = list(itertools.islice(_differences(there, identity), 3))
+        elif texts := list(itertools.islice(_differences(by_content(there), by_content(identity)), 3)):
             raise InvalidInput(
                 f"--out must be a new directory or hold this run, got {directory}, where {', '.join(texts)} "
                 "(--fresh starts anew)"
