@@ -1,9 +1,7 @@
 """Mutants that no test can kill, with the reason of each: they do what the code does."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
     "imaging/features/rim_sides.py: return circle.face, next(face for face in solid.edge(circle.edges[-1]).faces "
@@ -160,7 +158,6 @@ EQUIVALENT: dict[str, str] = {
         "of one image the first is the last",
     "validation/hard/measure_cases.py: image = picture(scene, contrast= 59.0, background=100.0)":
         "a case of a little less contrast",
-    "validation/report/station_sketch.py: for side in []:": "how dark a sketch's frame is drawn",
     "planner/views.py: if not math.isfinite(found[-1]):": "finite for every number of pictures, or for none",
     "validation/hard/precise.py: first, total = vertices[face[ -1]], (mpf(0),) * 3":
         "a polygon's triangles may share any of its corners",
@@ -201,9 +198,6 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("end", r'unpack\(">\w", [^()]*\)\[-1\]'): "of one number the first is the last",
 }
 
-_WITHIN = r"[^()]|\((?:[^()]|\([^()]*\))*\)"  # brackets in brackets
-_SIZE = re.compile(rf"\bfigsize=\((?:{_WITHIN})*\)")
-
 
 def is_equivalent(operator: str, line: str) -> bool:
     """Whether a mutant (file and text of its line) is one of them.
@@ -221,16 +215,5 @@ def is_equivalent(operator: str, line: str) -> bool:
     >>> is_equivalent("core/NumberReplacer", few), is_equivalent("core/NumberReplacer", other)
     (True, False)
     """
-    if operator == "core/NumberReplacer" and _is_size(line):
-        return True
     rules = (re.search(rule, line) for name, rule in EQUIVALENT_EVERYWHERE if name == operator)
     return line in EQUIVALENT or any(rules)
-
-
-def _is_size(line: str) -> bool:
-    """Whether how large a figure is drawn is all that differs from a line of the code."""
-    file, text = line.split(": ", 1)
-    if not _SIZE.search(text):
-        return False
-    known = (each.strip() for each in (ROOT / file).read_text(encoding="utf-8").splitlines())
-    return _SIZE.sub("", text) in (_SIZE.sub("", each) for each in known if _SIZE.search(each))

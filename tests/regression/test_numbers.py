@@ -12,6 +12,7 @@ import pytest
 from tests.regression.numbers import (
     beside,
     checking,
+    drawing,
     exploring,
     files,
     fitted,
@@ -34,7 +35,7 @@ pytestmark = pytest.mark.render
 STORED = Path(__file__).with_name("numbers.json")
 _ABOUT = (
     planning, parts, measuring, checking, working, inside, photographed, holes, rare, beside, files, reporting,
-    exploring, running, refusing, fitted,
+    exploring, running, refusing, fitted, drawing,
 )  # fmt: skip
 CASES = {name: case for about in _ABOUT for name, case in about.cases().items()}
 

@@ -9,6 +9,7 @@ import pytest
 from measure.features.optics import Optics
 from planner import plan
 from scenes import Locator, Noise
+from tests.constants import changes, constants, files
 from tests.regression.stored import read, write
 from validation import run
 from validation.batch.options import RunOptions
@@ -22,7 +23,8 @@ from validation.cost.trial import trial
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = "scenes", "imaging", "planner", "measure", "render", "validation"
-STORED = ROOT / "tests" / "regression" / "defaults.json"
+STORED, CONSTANTS = (ROOT / "tests" / "regression" / f"{name}.json" for name in ("defaults", "constants"))
+_TO_DO = "name the reason in CHANGELOG.md, then `python -m tests.unit.test_defaults`"
 
 
 @pytest.mark.parametrize("function", [run, RunOptions, sweep, validate_command, cost_command, calibrate_command])
@@ -94,6 +96,30 @@ def test_no_default_changes_unnoticed():
     assert every_default() == read(STORED)
 
 
+@pytest.mark.parametrize("file", sorted(read(CONSTANTS)))
+def test_no_number_changes_unnoticed(file):
+    """A threshold that changes is named in the CHANGELOG with its reason, and stored anew."""
+    found = constants(file) if (ROOT / file).exists() else {}
+    different = changes(read(CONSTANTS)[file], found)
+    assert not different, "\n".join([f"{file}:", *different, _TO_DO])
+
+
+def test_numbers_are_stored_of_every_module_that_holds_some():
+    missing = [file for file in files() if file not in read(CONSTANTS) and constants(file)]
+    assert not missing, f"not stored: {', '.join(missing)}; {_TO_DO}"
+
+
+def test_numbers_are_read_of_constants_classes_and_private_defaults():
+    """A number, a record, one of a class, one of a private function; no text, and nothing from another module."""
+    told = {file: constants(file) for file in ("render/phenomena/base.py", "validation/hard/table.py")}
+    assert told["render/phenomena/base.py"]["SAFETY"] == 2.0
+    assert told["render/phenomena/base.py"]["NOTHING"] == [0.0, 0.0]
+    assert told["validation/hard/table.py"]["_number(digits)"] == 4
+    classes = [name for name in constants("render/phenomena/sensor.py") if name.endswith("._MARGIN")]
+    assert len(classes) == 1
+    assert not {"ROOT", "PACKAGES", "STORED"} & constants("tests/constants.py").keys()
+
+
 def test_defaults_are_read_of_functions_methods_and_records():
     text = "def f(a, b: int=1, *, c, d=0): ...\nclass A:\n    n: int = 3\n    def g(self, e=None): ...\n"
     assert defaults(text + "def _h(i=0): ...") == {"f": "a, b=1, *, c, d=0", "A": {"n": "3"}, "A.g": "self, e=None"}
@@ -101,3 +127,4 @@ def test_defaults_are_read_of_functions_methods_and_records():
 
 if __name__ == "__main__":
     write(STORED, every_default())
+    write(CONSTANTS, {file: found for file in files() if (found := constants(file))})

@@ -10,11 +10,13 @@ from imaging import sensor
 from imaging.geometry import lens, projection, visibility
 from scenes.changes import changed
 from scenes.materials import torrance_sparrow
+from scenes.parts import facets
 from scenes.parts.block import Block
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Quadric, Sphere, Torus
 from scenes.parts.turned import Turned
 from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
 from tests.regression.stored import CLOSED, RENDERED
+from tests.unit.test_facet_parts import strip
 
 _AXIS = np.array([0.48, -0.6, 0.64])
 _CENTRE = np.array([0.7, -1.1, 2.3])
@@ -149,6 +151,29 @@ def _changed():
     return [made.camera, made.noise, made.material]
 
 
+def _strips():
+    """Faces side by side, of widths and bends near what is asked of them: which are curved surfaces, which edges."""
+    rng, told = np.random.default_rng(12), []
+    sizes, turns = np.array([0.4, 0.9, 1.0, 1.0, 1.1, 1.5, 4.0, 6.0]), np.array([0.5, 2.0, 2.2, 8.0, 11.5, 13, 20, 33])
+    for count in rng.integers(4, 22, 120):
+        some, few = rng.choice(sizes, rng.integers(1, 4)), rng.choice(turns, rng.integers(1, 4))
+        widths = np.concatenate([[9.0], rng.choice(some, count) * rng.uniform(0.95, 1.05, count), [7.0]])
+        bends = np.radians(rng.choice(few, count + 1) * rng.uniform(0.95, 1.05, count + 1))
+        convex = np.cumsum(rng.random(count + 1) < 0.06) % 2 == 0
+        bends[rng.random(count + 1) < 0.05] = np.radians(88.0)
+        made = facets.facets(*strip(widths, bends, convex, rng.uniform(0.5, 5.0)), ())
+        told.append(
+            f"{_letters(made.region)} {_letters(made.smooth.astype(int) - 1)} {_letters(made.rim.astype(int) - 1)}"
+        )
+    return told
+
+
+def _letters(numbers):
+    """A letter each, the same for the same number; "-" for -1."""
+    known = {-1: "-"}
+    return "".join(known.setdefault(int(number), chr(ord("A") + len(known))) for number in numbers)
+
+
 def cases():
     """By name: relative tolerance, and what makes the result."""
     found = {f"surface {name}": (CLOSED, partial(_surface, name)) for name in _surfaces()}
@@ -169,5 +194,6 @@ def cases():
     found["render grey_floor with all"] = RENDERED, partial(_rendered, "grey_floor", "all")
     return found | {
         "exposed": (CLOSED, _exposed), "turned": (CLOSED, _turned), "changed": (CLOSED, _changed),
+        "strips of facets": (CLOSED, _strips),
         "shots": (RENDERED, _shots), "block": (CLOSED, lambda: Block(kind="block", size=(3.0, 5.0, 7.5)).solid),
     }  # fmt: skip

@@ -17,9 +17,10 @@ import planner
 from render.phenomena import Influence
 from tests.boards import Rig
 from tests.regression.numbers.checking import run_folder, verdict
+from tests.regression.numbers.drawing import LAID_OUT, content, placed, shown
 from tests.regression.numbers.files import folder, refused
 from tests.regression.numbers.poses import load
-from tests.regression.numbers.working import axis, lamps, shown
+from tests.regression.numbers.working import lamps
 from tests.regression.stored import CLOSED, SEARCHED
 from validation import effects_check, hard, plan_check, vary_check
 from validation.batch.result import collect
@@ -63,7 +64,7 @@ def figures(draw):
         if inline:
             path.write("<svg></svg>")
         if not inline and not any(name in Path(path).stem for name in _RENDERED):
-            found.append([axis(each) for each in figure.axes] + [[text.get_text() for text in figure.texts]])
+            found.append(content(figure))
         if not inline:
             Path(path).write_bytes(b"drawn")
 
@@ -223,7 +224,9 @@ def _exported():
         return [path.read_text(encoding="utf-8").replace("gradient:0", "gradient").splitlines()[:90] for path in paths]
 
 
-def _distances():
+@cache
+def _proofs():
+    """A run, values of its distances, and what draws its proof."""
     found, rng = _uneven_run()[1], np.random.default_rng(4)
     size = np.sqrt(np.array([row.main.propagated for row in found.rows]))
     values = [np.append(3.0 + rng.normal(0, 1.3 * s, 60), [np.nan, 9.0]) for s in size]
@@ -231,17 +234,33 @@ def _distances():
     store = mock.Mock()
     store.distances = lambda index, method: values[[row.index for row in found.rows].index(index)]
     lines = proof_figures.lines_of(found, {found.rows[0].measurands[0].name: 0.03})
+    return (
+        found,
+        store,
+        [
+            lambda _: proof_figures.distributions(found, store),
+            lambda _: proof_figures.forest(lines),
+            lambda _: proof_figures.bias(lines),
+            lambda _: proof_figures.forest(lines * 30),
+            lambda _: proof_figures.bias(lines * 30),
+        ],
+    )
+
+
+def _distances():
+    found, store, draws = _proofs()
     return {
         "counts": proof_figures.standardised(found, store),
         "words": [page.words("`a-b` of v3-v6 & 5 %"), page.markdown("a\\|b\n<c>[x](y)`&")],
-        "drawn": [
-            shown(lambda _: proof_figures.distributions(found, store)),
-            shown(lambda _: proof_figures.forest(lines)),
-            shown(lambda _: proof_figures.bias(lines)),
-            shown(lambda _: proof_figures.forest(lines * 30)),
-            shown(lambda _: proof_figures.bias(lines * 30)),
-        ],
+        "drawn": [shown(draw) for draw in draws],
     }
+
+
+def _laid_out():
+    """Of a run's proof, and of a camera."""
+    found, seen = camera()
+    draws = [*_proofs()[2], lambda path: camera_figure.draw(found, seen.boards, path)]
+    return [placed(draw) for draw in draws]
 
 
 @cache
@@ -483,6 +502,7 @@ def cases():
         "tables": (SEARCHED, _tables),
         "exported": (SEARCHED, _exported),
         "distances": (SEARCHED, _distances),
+        "laid out": (LAID_OUT, _laid_out),
         "camera": (SEARCHED, _camera_told),
         "plans": (SEARCHED, _plans),
         "varied": (SEARCHED, _varied),

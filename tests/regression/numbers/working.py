@@ -1,6 +1,5 @@
-"""Checks that render, costs, the hard catalogue, and what figures show: small pictures, few of them."""
+"""Checks that render, costs and the hard catalogue: small pictures, few of them."""
 
-import io
 import tempfile
 from dataclasses import fields, is_dataclass, replace
 from functools import cache, partial
@@ -8,22 +7,16 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.quiver import Quiver
 from pydantic import BaseModel
 
 import measure
 import planner
 import render
 from measure.calibration import calibrate
-from measure.photo.photograph import photograph
 from render import Quality
 from scenes import Scene
 from scenes.load import BUNDLED
 from tests.commands import ice
-from tests.photographs import rectangle, turned
 from tests.regression.numbers.parts import small
 from tests.regression.numbers.poses import load, uneven, without_error
 from tests.regression.stored import CLOSED, RENDERED, SEARCHED
@@ -35,71 +28,20 @@ from validation.cost.trial import spread_cases
 from validation.cost.watch import Watch
 from validation.explore import preview, save, sphere
 from validation.explore.state import State
-from validation.report import (
-    budget_figure,
-    calibration_figure,
-    cost_figures,
-    overlay,
-    plan_figures,
-    residuals,
-    scene_figure,
-    sharpness,
-    views_figure,
-)  # fmt: skip
 
 _QUICK = Quality(supersample=2, edge_samples=4)
 _HARD = ("reflectance", "limb", "fit")
 
 
-def shown(draw):
-    """What figures hold that are drawn: numbers of lines, marks, pictures and areas, words, colours, ends of axes."""
-    found = []
-
-    def keep(figure, file, **_):
-        words = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
-        found.append([axis(each) for each in figure.axes] + [[text.get_text() for text in words]])
-        if isinstance(file, io.StringIO):
-            file.write("<svg></svg>")
-
-    with mock.patch.object(Figure, "savefig", keep), tempfile.TemporaryDirectory() as folder:
-        draw(Path(folder) / "figure.png")
-    return found
-
-
-def axis(axis):
-    """What one has."""
-    texts = (axis.title, axis.xaxis.label, axis.yaxis.label, *axis.texts)
-    return {
-        "lines": [line.get_xydata() for line in axis.lines],
-        "marks": [np.asarray(each.get_offsets(), float) for each in axis.collections],
-        "pictures": [np.asarray(each.get_array(), float) for each in axis.images],
-        "areas": [each.get_patch_transform().transform(each.get_path().vertices) for each in axis.patches],
-        "words": [text.get_text() for text in texts],
-        "at": [[*text.get_position(), text.get_ha(), text.get_va()] for text in axis.texts],
-        "scales": [axis.get_xscale(), axis.get_yscale()],
-        "ends": [*axis.get_xlim(), *axis.get_ylim()] if axis.name == "rectilinear" else [],
-        "ticks": [label.get_text() for label in (*axis.get_xticklabels(), *axis.get_yticklabels())],
-        "legend": [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else [],
-        "colours": [*map(_colours, (*axis.lines, *axis.collections, *axis.patches))],
-        "arrows": [[*each.U, *each.V] for each in axis.collections if isinstance(each, Quiver)],
-        **({"view": [axis.elev, axis.azim, axis.roll]} if hasattr(axis, "elev") else {}),
-    }  # fmt: skip
-
-
-def _colours(drawn):
-    """Of a line, of marks or of an area, as "#rrggbbaa"; how a line is dashed."""
-    if isinstance(drawn, Line2D):
-        return [to_hex(drawn.get_color(), keep_alpha=True), drawn.get_linestyle(), drawn.get_marker()]
-    return sorted({to_hex(each, keep_alpha=True) for each in np.atleast_2d(drawn.get_facecolor())})
-
-
 @cache
-def _plan(name, step=45.0, **how):
+def plan_of(name, step=45.0, **how):
+    """A plan of a small scene."""
     return planner.plan(small(name, 2.0), step_deg=step, refined=False, **how)
 
 
 @cache
-def _views():
+def views_of():
+    """A plan of two pictures."""
     return planner.plan_views(small("calibrated_rig", 2.0), 2, step_deg=45.0, refined=False)
 
 
@@ -236,21 +178,6 @@ def _fitted():
     return {"text": text, "errors": found.standard_errors}
 
 
-_FIGURES = {
-    "scene": lambda path: scene_figure.draw(load("plate"), uneven(load("plate"))[0], path),
-    "block": lambda path: scene_figure.draw(load("task1"), uneven(load("task1"))[0], path),
-    "plan": lambda path: plan_figures.draw(_plan("task1"), path.parent, path),
-    "views": lambda path: views_figure.draw(_views(), path.parent),
-    "residuals": lambda path: residuals.draw(fit()[0], [fit()[1]], path),
-    "budget": lambda path: budget_figure.draw(planner.budget(load("plate"), *uneven(load("plate"))), path),
-    "sharpness": lambda path: sharpness.write(path, [(0, measure.mtf(rectangle(120, 70, 13), turned(120, 70, 13), 0))]),
-    "overlay": lambda path: overlay.write(path, rectangle(120, 70, 13), photograph(rectangle(120, 70, 13), most=1)),
-    "calibration": lambda path: calibration_figure.draw(calibrated(), path),
-    "cost": lambda path: [cost_figures._draw(made, path) for made in (
-        scaling.scaling_parameter(cost_model()), pareto.pareto_parameter(cost_model()))],
-}  # fmt: skip
-
-
 @cache
 def calibrated():
     """Locators of a small scene, at three noise levels."""
@@ -263,14 +190,12 @@ def cases():
     found = {f"hard {area}": (CLOSED, partial(_hard, area)) for area in _HARD}
     for name in ("points", "grid", "rays", "images", "estimators", "scaling", "pareto"):
         found[f"cost {name}"] = RENDERED, partial(_cost, name)
-    for name, draw in _FIGURES.items():
-        found[f"figure {name}"] = SEARCHED, partial(shown, draw)
     for name in ("task1", "plate", "two_lights"):
         found[f"explorer {name}"] = CLOSED, partial(_explored, name)
     return found | {
         "hard pictures": (SEARCHED, _few_hard), "hard cases": (CLOSED, _asked),
         "calibrate": (SEARCHED, calibrated), "new": (SEARCHED, _new), "fitted": (SEARCHED, _fitted),
-        "check of a plan": (RENDERED, lambda: _without_seconds(plan_check.check_plan(_plan("task1"), 2, _QUICK))),
-        "check of views": (RENDERED, lambda: _without_seconds(views_check.check_views(_views(), 12, 3, _QUICK))),
+        "check of a plan": (RENDERED, lambda: _without_seconds(plan_check.check_plan(plan_of("task1"), 2, _QUICK))),
+        "check of views": (RENDERED, lambda: _without_seconds(views_check.check_views(views_of(), 12, 3, _QUICK))),
         "check of lamps": (RENDERED, lambda: vary_check.check_varied(lamps(), 20, _QUICK, 3)),
     }  # fmt: skip
