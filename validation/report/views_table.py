@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from scenes import Pose
 from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
@@ -105,6 +106,7 @@ def _searched(found: planner.Views, seconds: float) -> str:
         f"  {found.pairs} pairs glanced at, {found.looked} settings looked at closely, in {seconds:.1f} s",
         f"  Guarantee: {found.guarantee}.",
     ]
+    lines += [f"  {same}: no picture from elsewhere adds as much as the same one again." for same in _repeated(found)]
     if hard:
         lines.append(f"  Hard to set up: a little off the poses these cannot be measured any more: {'; '.join(hard)}.")
     if most is not None:
@@ -117,6 +119,14 @@ def _searched(found: planner.Views, seconds: float) -> str:
             "  What is clutter counts as 4 times its variance in what is minimised, and only where no picture is ok."
         )
     return "\n".join(lines)
+
+
+def _repeated(found: planner.Views) -> list[str]:
+    """Pictures of the largest set that are taken from one place, in words."""
+    places: dict[tuple[Pose, Pose], list[str]] = {}
+    for number, view in enumerate(found.sets[-1].views, 1):
+        places.setdefault((view.sensor, view.light), []).append(str(number))
+    return [f"No. {' and '.join(each)} are taken from one place" for each in places.values() if len(each) > 1]
 
 
 def _all_told(found: planner.Views):
