@@ -32,6 +32,25 @@ def drilled(size: tuple[float, float, float], holes: list[tuple[float, float, fl
     return plate
 
 
+def cut(size: tuple[float, float, float], tools: list[tuple[str, tuple, tuple]]) -> Any:
+    """A block with a corner at the origin less tools: ("box", corner, size) or ("bore", foot, (radius, height))."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+
+    body = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), *size).Shape()
+    for kind, place, dimensions in tools:
+        if kind == "box":
+            tool = BRepPrimAPI_MakeBox(gp_Pnt(*place), *dimensions).Shape()
+        else:
+            tool = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(*place), gp_Dir(0, 0, 1)), *dimensions).Shape()
+        body = BRepAlgoAPI_Cut(body, tool).Shape()
+    whole = ShapeUpgrade_UnifySameDomain(body, True, True, False)
+    whole.Build()
+    return whole.Shape()
+
+
 def flange(radius: float = 40.0, bore: float = 12.0, bolts: int = 6, circle: float = 28.0, bolt: float = 4.0) -> Any:
     """A disc of 10 mm with a bore, a bolt circle, and a cone, a sphere's cap and a torus on other bodies left out."""
     import math
@@ -55,8 +74,10 @@ def flange(radius: float = 40.0, bore: float = 12.0, bolts: int = 6, circle: flo
 def written(shape: Any, path: Path, names: dict[int, str] | None = None, unit: str = "MM") -> Path:
     """Write it; ``names`` for faces by their number in the file."""
     from OCP.Interface import Interface_Static
+    from OCP.Message import Message
     from OCP.STEPControl import STEPControl_StepModelType, STEPControl_Writer
 
+    Message.DefaultMessenger_s().ChangePrinters().Clear()  # it prints what it does
     writer = STEPControl_Writer()
     Interface_Static.SetCVal_s("write.step.unit", unit)
     writer.Transfer(shape, STEPControl_StepModelType.STEPControl_AsIs)
