@@ -15,7 +15,7 @@ from measure.estimators.canny import CannyLocator
 from measure.features import rims
 from measure.fitting import fit, sides
 from planner.search import lights
-from render import bsdf, testing, variant
+from render import Quality, bsdf, testing, variant
 from scenes import InvalidInput, Material, status
 from scenes.materials.brdf import Index
 from scenes.parts import mesh, step
@@ -24,7 +24,8 @@ from validation.batch import result
 from validation.batch.store import RunFile
 from validation.cli import budget, cost
 from validation.cli import report as report_command
-from validation.cost import sweep, table
+from validation.cost import effects, goal, rays, sweep, table
+from validation.cost.watch import Watch
 from validation.explore import gate
 from validation.explore.messages import Message
 from validation.explore.state import State
@@ -36,7 +37,9 @@ from validation.report import (
     gallery,
     page,
     plan_figures,
+    plan_table,
     station,
+    station_table,
     views_figure,
 )
 
@@ -289,3 +292,74 @@ def test_a_turn_tries_the_candidates_of_what_it_moves(role):
         2: ([stays] * 2, [[11.0, 12, 7, 8], [11, 12, 9, 10]]),
     }[role]
     assert asked == [((0.3, 0.7), *right)]
+
+
+def test_pieces_in_a_straight_line_between_the_same_faces_are_joined():
+    """Three of them, turned any way; not around a corner, where a third piece meets, nor between other faces."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 0, 0], [4, 2, 0], [4, 5, 0], [9, 5, 0], [3, 0, 7.0]])
+    one, other = ((0, 1), True), ((0, 2), False)
+    pieces = {(0, 1): one, (2, 1): one, (3, 2): one, (3, 4): one, (4, 5): other, (5, 6): other}
+    joined = mesh._straight_chains(vertices, pieces)
+    told = {(frozenset(ends), faces, convex) for ends, faces, convex in joined}
+    line = {(frozenset(ends), *one) for ends in ((0, 3), (3, 4))}
+    assert told == line | {(frozenset(ends), *other) for ends in ((4, 5), (5, 6))}
+    assert len(joined) == 4
+    met = mesh._straight_chains(vertices, {(0, 1): one, (1, 2): one, (2, 3): one, (2, 7): one})
+    assert {frozenset(ends) for ends, *_ in met} == {frozenset(ends) for ends in ((0, 2), (2, 3), (2, 7))}
+
+
+@pytest.mark.parametrize(
+    ("variances", "statuses", "rank", "words"),
+    [
+        ((2.0, 1.5), ("ok", "ok"), 1, "-25.0 % variance"),
+        ((2.0, 1.99), ("ok", "ok"), 1, "-0.5 % variance, less than effects that are left out may matter (2 %)"),
+        ((2.0, 3.0), ("clutter", "ok"), 2, "+50.0 % variance, but the plan's picture is clutter"),
+        ((2.0, 1.5), ("short", "ok"), None, "the plan's picture cannot be measured (short)"),
+    ],
+)
+def test_what_a_proposal_gains_over_its_plan_is_told_by_variances(variances, statuses, rank, words):
+    plan, best = (
+        SimpleNamespace(minimised=variance, status=state, rank_after=rank)
+        for variance, state in zip(variances, statuses, strict=True)
+    )
+    assert plan_table._gain(best, plan) == words
+
+
+@pytest.mark.parametrize(
+    ("bias", "u_bias", "words"),
+    [
+        (None, 0.1, "not known"), (0.0123, None, "+0.012 mm"), (-0.0004, None, "0 mm"), (0.0123, 0.0009, None),
+        (0.0123, 0.0004, "+0.012, ± less than 0.001 mm"), (0.0123, math.inf, "+0.012 mm ± not known"),
+    ],
+)  # fmt: skip
+def test_a_bias_is_told_to_the_places_of_its_value(bias, u_bias, words):
+    told = station_table._bias(SimpleNamespace(bias=bias, u_bias=u_bias), 3, "mm")
+    assert told == (words or "+0.012 ± 0.001 mm")
+
+
+def test_half_of_the_time_for_rays_is_that_of_single_renders(monkeypatch):
+    """What they leave is for averages."""
+    told = []
+    rows = [(kind, n, 0.1, 3.0 / n, 1.0, 1.0) for kind in ("stratified", "renders averaged") for n in (2.0, 4.0)]
+    monkeypatch.setattr(rays, "_stratified", lambda cases, variant, watch: told.append(watch.left) or rows[:2])
+    monkeypatch.setattr(rays, "_averages", lambda cases, variant, watch: told.append(watch.left) or rows[2:])
+    rays.rays_parameter((), "scalar_rgb", Watch(1000.0))
+    assert told == pytest.approx([500, 1000], rel=1e-3)
+
+
+def test_each_effect_is_switched_on_alone(monkeypatch):
+    asked = []
+    monkeypatch.setattr(effects, "check", lambda scene, settings, only: asked.append(tuple(only)) or [])
+    effects.effects_parameter(SimpleNamespace(scene=None, setting=None), "llvm_ad_rgb", Watch(1000.0))
+    assert asked == [(name,) for name in effects.RENDERED]
+
+
+@pytest.mark.parametrize(("fresh", "begun"), [(True, False), (False, False), (False, True)])
+def test_a_run_that_was_begun_goes_on_with_its_images_and_quality(fresh, begun, tmp_path, monkeypatch):
+    identity = {"renders": 71, "quality": {"supersample": 3, "edge_samples": 9}}
+    monkeypatch.setattr(goal.RunFile, "reopen", given(identity=lambda: identity, close=lambda: None))
+    if begun:
+        (tmp_path / "run.sqlite").touch()
+    found = goal._begun(SimpleNamespace(fresh=fresh, out=tmp_path))
+    assert found == ((71, Quality(supersample=3, edge_samples=9)) if begun and not fresh else None)
+    assert goal._begun(SimpleNamespace(fresh=False, out=None)) is None
