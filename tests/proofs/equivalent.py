@@ -169,6 +169,7 @@ EQUIVALENT: dict[str, str] = {
         "edges are told apart by their ends and faces",
     "scenes/parts/mesh.py: for ends, faces, convex, at in sorted(found[kind], key=lambda facts: facts[: 4]):":
         "edges are told apart by their ends and faces",
+    "scenes/parts/recognised.py: way = way / np.sign(way[np.abs(way).argmax()])": "a sign is 1 or -1",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds

@@ -8,9 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+import typer
 from scipy.special import ndtr
 
+from imaging.features.locator import CLEARANCE, edge_blur
 from measure.boards.parameters import read_model
+from measure.estimators import ellipse
 from measure.estimators.canny import CannyLocator
 from measure.features import rims
 from measure.fitting import fit, sides
@@ -22,7 +25,8 @@ from scenes.parts import mesh, step
 from validation import kept
 from validation.batch import result
 from validation.batch.store import RunFile
-from validation.cli import budget, cost
+from validation.cli import budget, compare, cost, predict
+from validation.cli import render as render_command
 from validation.cli import report as report_command
 from validation.cost import effects, goal, rays, sweep, table
 from validation.cost.watch import Watch
@@ -363,3 +367,93 @@ def test_a_run_that_was_begun_goes_on_with_its_images_and_quality(fresh, begun, 
     found = goal._begun(SimpleNamespace(fresh=fresh, out=tmp_path))
     assert found == ((71, Quality(supersample=3, edge_samples=9)) if begun and not fresh else None)
     assert goal._begun(SimpleNamespace(fresh=False, out=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("statuses", "variances", "says", "code"),
+    [
+        (["ok", "clutter"], [1.0, 2.0], True, 0), (["ok", "ok"], [1.0, 2.0], False, 0),
+        (["ok", "not_visible"], [1.0, None], False, 1), (["clutter", "clutter"], [None, None], True, 1),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("rendered", [False, True])
+def test_where_any_value_is_in_doubt_a_simulation_is_named(
+    statuses, variances, says, code, rendered, monkeypatch, capsys
+):
+    """Not where one was made; and the exit status is 1 where any value cannot be measured."""
+    facts = [
+        {"name": state, "status": state, "variance": variance, "reason": ""}
+        for state, variance in zip(statuses, variances, strict=True)
+    ]
+    rows = [{"measurands": facts[:1]}, {"measurands": facts[1:]}]
+    monkeypatch.setattr(predict.scenes, "load", given(name="a"))
+    monkeypatch.setattr("planner.predict", lambda picture, model: picture)
+    for name, told in (
+        ("_pictures", [0, 1]), ("_simulated", rows), ("_table", "the table"), ("doubtful_edges", ["doubtful"]),
+    ):  # fmt: skip
+        monkeypatch.setattr(predict, name, lambda *_, told=told: told)
+    monkeypatch.setattr(predict, "_facts", lambda picture, found: rows[found])
+    with pytest.raises(typer.Exit) as ended:
+        predict.predict_command("a", render=rendered)
+    said = capsys.readouterr().out
+    assert ended.value.exit_code == code
+    assert (predict._RENDER[:20] in said) is (says and not rendered)
+    assert ("doubtful" in said) is not rendered
+
+
+@pytest.mark.parametrize("changed", [(), (SimpleNamespace(
+    setting="3", method="canny", what="mean", before=1.23456, after=2.34567, p_value=0.0123),)])  # fmt: skip
+def test_what_changed_between_two_runs_is_told_and_is_the_exit_status(changed, monkeypatch, capsys):
+    found = SimpleNamespace(
+        text="compared", changed=changed, only_before=["one", "two", "three"], only_after=(), to_json=dict
+    )
+    monkeypatch.setattr("validation.comparison.compare", lambda *_: found)
+    monkeypatch.setattr("validation.comparison.read", lambda path: path)
+    with pytest.raises(typer.Exit) as ended:
+        compare.compare_command("a", "b", 0.01)
+    assert ended.value.exit_code == len(changed)
+    line = ["  3 canny: mean 1.235 -> 2.346, p = 0.012"] * len(changed)
+    assert capsys.readouterr().out.splitlines() == [
+        "compared", *line, "  only before, not compared: 3, as one"
+    ]  # fmt: skip
+    for level in (0.0, 1.0):
+        with pytest.raises(InvalidInput, match="--level must be between 0 and 1"):
+            compare.compare_command("a", "b", level)
+
+
+def test_a_rendered_image_is_told_by_its_width_and_height_and_its_levels(monkeypatch, tmp_path, capsys):
+    """With noise the first of as many pictures as were asked for: one."""
+    image, asked = np.arange(15.0).reshape(3, 5) + 2.25, []
+    monkeypatch.setattr("render.image", lambda *_, **__: image)
+    monkeypatch.setattr("render.expose", lambda image, noise, rng, count: asked.append(count) or image[None] + 1)
+    monkeypatch.setattr("validation.picture_file.write", lambda *_: None)
+    file = tmp_path / "a.png"
+    for seed, levels in ((None, "2.2 to 16.2"), (3, "3.2 to 17.2")):
+        render_command.render_command("task1", "15,135", file, noise_seed=seed)
+        assert capsys.readouterr().out.replace("\n", "").endswith(f"a.png: 5 x 3 px, grey levels {levels}")
+    assert asked == [1]
+
+
+@pytest.mark.parametrize("middle", [(31.3, 27.8), (4.2, 44.1), (58.3, 2.9)])
+def test_an_ellipse_is_fitted_in_the_smallest_window_that_holds_its_band(middle):
+    """Turned and of unequal axes, within the image: as far as its outline reaches, and the band beside that."""
+    matrix, (width, height) = np.array([[14.0, 3.0], [3.0, 8.0]]), (61, 47)
+    shape = np.array([*middle, 14.0, 8.0, 3.0])
+    optics = SimpleNamespace(shape=(height, width), blur_px=0.5)
+    seen = SimpleNamespace(near=lambda angle: np.ones(angle.shape, bool))
+    columns, rows, near = ellipse._near(shape, optics, seen)
+    turn = np.linspace(0, 2 * np.pi, 20001)
+    outline = middle + np.column_stack([np.cos(turn), np.sin(turn)]) @ matrix
+    band = ellipse._BAND * CLEARANCE * edge_blur(0.5)
+    for places, k, most in ((columns, 0, width), (rows, 1, height)):
+        assert places[0] == max(0, math.floor(outline[:, k].min() - band))
+        assert places[-1] == min(most - 1, math.ceil(outline[:, k].max() + band))
+    points = np.stack(np.meshgrid(columns, rows), -1).astype(float)
+    size, *beside = (
+        np.linalg.norm((points + step - middle) @ np.linalg.inv(matrix), axis=-1)
+        for step in np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]]) * 1e-6
+    )
+    slope = np.hypot(beside[0] - beside[1], beside[2] - beside[3]) / 2e-6
+    away = np.abs(size - 1) / slope  # to first order
+    assert (near == (away < band))[np.abs(away - band) > 1e-6].all()
+    assert 0.2 < near.mean() < 0.95
