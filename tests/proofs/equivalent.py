@@ -165,6 +165,11 @@ EQUIVALENT: dict[str, str] = {
         "the signs of two directions, whose product counts",
     "scenes/parts/curves.py: away = shape.along[pairs] * np.where(ends != 0, 1.0, -1.0)[..., None]":
         "the signs of two directions, whose product counts",
+    "scenes/parts/mesh.py: for ends, faces, convex, at in sorted(found[kind], key=lambda facts: facts[: 2]):":
+        "edges are told apart by their ends and faces",
+    "scenes/parts/mesh.py: for ends, faces, convex, at in sorted(found[kind], key=lambda facts: facts[: 4]):":
+        "edges are told apart by their ends and faces",
+    "scenes/parts/recognised.py: way = way / np.sign(way[np.abs(way).argmax()])": "a sign is 1 or -1",
 }  # fmt: skip
 
 # by operator and what the file with the mutated line holds
@@ -173,7 +178,7 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
     ("core/NumberReplacer", r"\b(?:ls|linestyle)=\( ?-?\d, \("): "where along a line its dashes begin",
     (
         "core/NumberReplacer",
-        r"\b(?:fontsize|labelpad|pad|zorder)(?:=|\":) ",
+        r"\b(?:fontsize|labelsize|labelpad|borderaxespad|pad|zorder)(?:=|\":) ",
     ): "how a figure's words are set, not what is shown",
     ("core/NumberReplacer", r"\btextwrap\.(?:wrap|fill)\("): "where a figure's lines are broken",
     ("core/NumberReplacer", r"\blegend_below\(\w+, "): "in how many columns a legend is set",
@@ -195,6 +200,10 @@ EQUIVALENT_EVERYWHERE: dict[tuple[str, str], str] = {
         r"^render/.*: .*normal @ triangles\[0, +-?\d\]",
     ): "all corners of a plane triangle are as high",
     ("core/NumberReplacer", r"^imaging/.*: _(?:AT_ONCE|CHUNK|BLOCK) = "): "how many at a time changes no result",
+    (
+        "core/NumberReplacer",
+        r"\bkey=lambda .*\bround\(.*, (?:5|7|8|10)\)",
+    ): "to how many digits what is sorted is rounded, so that equals are equals on any machine",
     ("end", r'unpack\(">\w", [^()]*\)\[-1\]'): "of one number the first is the last",
 }
 
@@ -208,6 +217,9 @@ def is_equivalent(operator: str, line: str) -> bool:
     True
     >>> is_equivalent("core/NumberReplacer", "a/b.py: for x, y in zip(a[1:], b, strict=False):")
     False
+    >>> order = "a/b.py: worst = min(edges, key=lambda e: round(float(view.usable[e]), 7))"
+    >>> is_equivalent("core/NumberReplacer", order), is_equivalent("core/NumberReplacer", order.replace("7", "0"))
+    (True, False)
     >>> open_ = "a/b.py: x = np.stack([y, z], -1).reshape(- 2, 3)"
     >>> is_equivalent("core/NumberReplacer", open_), is_equivalent("core/NumberReplacer", open_.replace("- 2", "- 0"))
     (True, False)

@@ -8,23 +8,28 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+import typer
 from scipy.special import ndtr
 
+from imaging.features.locator import CLEARANCE, edge_blur
 from measure.boards.parameters import read_model
+from measure.estimators import ellipse
 from measure.estimators.canny import CannyLocator
 from measure.features import rims
 from measure.fitting import fit, sides
 from planner.search import lights
-from render import bsdf, testing, variant
+from render import Quality, bsdf, testing, variant
 from scenes import InvalidInput, Material, status
 from scenes.materials.brdf import Index
 from scenes.parts import mesh, step
 from validation import kept
 from validation.batch import result
 from validation.batch.store import RunFile
-from validation.cli import budget, cost
+from validation.cli import budget, compare, cost, predict
+from validation.cli import render as render_command
 from validation.cli import report as report_command
-from validation.cost import sweep, table
+from validation.cost import effects, goal, rays, sweep, table
+from validation.cost.watch import Watch
 from validation.explore import gate
 from validation.explore.messages import Message
 from validation.explore.state import State
@@ -36,7 +41,9 @@ from validation.report import (
     gallery,
     page,
     plan_figures,
+    plan_table,
     station,
+    station_table,
     views_figure,
 )
 
@@ -289,3 +296,164 @@ def test_a_turn_tries_the_candidates_of_what_it_moves(role):
         2: ([stays] * 2, [[11.0, 12, 7, 8], [11, 12, 9, 10]]),
     }[role]
     assert asked == [((0.3, 0.7), *right)]
+
+
+def test_pieces_in_a_straight_line_between_the_same_faces_are_joined():
+    """Three of them, turned any way; not around a corner, where a third piece meets, nor between other faces."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 0, 0], [4, 2, 0], [4, 5, 0], [9, 5, 0], [3, 0, 7.0]])
+    one, other = ((0, 1), True), ((0, 2), False)
+    pieces = {(0, 1): one, (2, 1): one, (3, 2): one, (3, 4): one, (4, 5): other, (5, 6): other}
+    joined = mesh._straight_chains(vertices, pieces)
+    told = {(frozenset(ends), faces, convex) for ends, faces, convex in joined}
+    line = {(frozenset(ends), *one) for ends in ((0, 3), (3, 4))}
+    assert told == line | {(frozenset(ends), *other) for ends in ((4, 5), (5, 6))}
+    assert len(joined) == 4
+    met = mesh._straight_chains(vertices, {(0, 1): one, (1, 2): one, (2, 3): one, (2, 7): one})
+    assert {frozenset(ends) for ends, *_ in met} == {frozenset(ends) for ends in ((0, 2), (2, 3), (2, 7))}
+
+
+@pytest.mark.parametrize(
+    ("variances", "statuses", "rank", "words"),
+    [
+        ((2.0, 1.5), ("ok", "ok"), 1, "-25.0 % variance"),
+        ((2.0, 1.99), ("ok", "ok"), 1, "-0.5 % variance, less than effects that are left out may matter (2 %)"),
+        ((2.0, 3.0), ("clutter", "ok"), 2, "+50.0 % variance, but the plan's picture is clutter"),
+        ((2.0, 1.5), ("short", "ok"), None, "the plan's picture cannot be measured (short)"),
+    ],
+)
+def test_what_a_proposal_gains_over_its_plan_is_told_by_variances(variances, statuses, rank, words):
+    plan, best = (
+        SimpleNamespace(minimised=variance, status=state, rank_after=rank)
+        for variance, state in zip(variances, statuses, strict=True)
+    )
+    assert plan_table._gain(best, plan) == words
+
+
+@pytest.mark.parametrize(
+    ("bias", "u_bias", "words"),
+    [
+        (None, 0.1, "not known"), (0.0123, None, "+0.012 mm"), (-0.0004, None, "0 mm"), (0.0123, 0.0009, None),
+        (0.0123, 0.0004, "+0.012, ± less than 0.001 mm"), (0.0123, math.inf, "+0.012 mm ± not known"),
+    ],
+)  # fmt: skip
+def test_a_bias_is_told_to_the_places_of_its_value(bias, u_bias, words):
+    told = station_table._bias(SimpleNamespace(bias=bias, u_bias=u_bias), 3, "mm")
+    assert told == (words or "+0.012 ± 0.001 mm")
+
+
+def test_half_of_the_time_for_rays_is_that_of_single_renders(monkeypatch):
+    """What they leave is for averages."""
+    told = []
+    rows = [(kind, n, 0.1, 3.0 / n, 1.0, 1.0) for kind in ("stratified", "renders averaged") for n in (2.0, 4.0)]
+    monkeypatch.setattr(rays, "_stratified", lambda cases, variant, watch: told.append(watch.left) or rows[:2])
+    monkeypatch.setattr(rays, "_averages", lambda cases, variant, watch: told.append(watch.left) or rows[2:])
+    rays.rays_parameter((), "scalar_rgb", Watch(1000.0))
+    assert told == pytest.approx([500, 1000], rel=1e-3)
+
+
+def test_each_effect_is_switched_on_alone(monkeypatch):
+    asked = []
+    monkeypatch.setattr(effects, "check", lambda scene, settings, only: asked.append(tuple(only)) or [])
+    effects.effects_parameter(SimpleNamespace(scene=None, setting=None), "llvm_ad_rgb", Watch(1000.0))
+    assert asked == [(name,) for name in effects.RENDERED]
+
+
+@pytest.mark.parametrize(("fresh", "begun"), [(True, False), (False, False), (False, True)])
+def test_a_run_that_was_begun_goes_on_with_its_images_and_quality(fresh, begun, tmp_path, monkeypatch):
+    identity = {"renders": 71, "quality": {"supersample": 3, "edge_samples": 9}}
+    monkeypatch.setattr(goal.RunFile, "reopen", given(identity=lambda: identity, close=lambda: None))
+    if begun:
+        (tmp_path / "run.sqlite").touch()
+    found = goal._begun(SimpleNamespace(fresh=fresh, out=tmp_path))
+    assert found == ((71, Quality(supersample=3, edge_samples=9)) if begun and not fresh else None)
+    assert goal._begun(SimpleNamespace(fresh=False, out=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("statuses", "variances", "says", "code"),
+    [
+        (["ok", "clutter"], [1.0, 2.0], True, 0), (["ok", "ok"], [1.0, 2.0], False, 0),
+        (["ok", "not_visible"], [1.0, None], False, 1), (["clutter", "clutter"], [None, None], True, 1),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("rendered", [False, True])
+def test_where_any_value_is_in_doubt_a_simulation_is_named(
+    statuses, variances, says, code, rendered, monkeypatch, capsys
+):
+    """Not where one was made; and the exit status is 1 where any value cannot be measured."""
+    facts = [
+        {"name": state, "status": state, "variance": variance, "reason": ""}
+        for state, variance in zip(statuses, variances, strict=True)
+    ]
+    rows = [{"measurands": facts[:1]}, {"measurands": facts[1:]}]
+    monkeypatch.setattr(predict.scenes, "load", given(name="a"))
+    monkeypatch.setattr("planner.predict", lambda picture, model: picture)
+    for name, told in (
+        ("_pictures", [0, 1]), ("_simulated", rows), ("_table", "the table"), ("doubtful_edges", ["doubtful"]),
+    ):  # fmt: skip
+        monkeypatch.setattr(predict, name, lambda *_, told=told: told)
+    monkeypatch.setattr(predict, "_facts", lambda picture, found: rows[found])
+    with pytest.raises(typer.Exit) as ended:
+        predict.predict_command("a", render=rendered)
+    said = capsys.readouterr().out
+    assert ended.value.exit_code == code
+    assert (predict._RENDER[:20] in said) is (says and not rendered)
+    assert ("doubtful" in said) is not rendered
+
+
+@pytest.mark.parametrize("changed", [(), (SimpleNamespace(
+    setting="3", method="canny", what="mean", before=1.23456, after=2.34567, p_value=0.0123),)])  # fmt: skip
+def test_what_changed_between_two_runs_is_told_and_is_the_exit_status(changed, monkeypatch, capsys):
+    found = SimpleNamespace(
+        text="compared", changed=changed, only_before=["one", "two", "three"], only_after=(), to_json=dict
+    )
+    monkeypatch.setattr("validation.comparison.compare", lambda *_: found)
+    monkeypatch.setattr("validation.comparison.read", lambda path: path)
+    with pytest.raises(typer.Exit) as ended:
+        compare.compare_command("a", "b", 0.01)
+    assert ended.value.exit_code == len(changed)
+    line = ["  3 canny: mean 1.235 -> 2.346, p = 0.012"] * len(changed)
+    assert capsys.readouterr().out.splitlines() == [
+        "compared", *line, "  only before, not compared: 3, as one"
+    ]  # fmt: skip
+    for level in (0.0, 1.0):
+        with pytest.raises(InvalidInput, match="--level must be between 0 and 1"):
+            compare.compare_command("a", "b", level)
+
+
+def test_a_rendered_image_is_told_by_its_width_and_height_and_its_levels(monkeypatch, tmp_path, capsys):
+    """With noise the first of as many pictures as were asked for: one."""
+    image, asked = np.arange(15.0).reshape(3, 5) + 2.25, []
+    monkeypatch.setattr("render.image", lambda *_, **__: image)
+    monkeypatch.setattr("render.expose", lambda image, noise, rng, count: asked.append(count) or image[None] + 1)
+    monkeypatch.setattr("validation.picture_file.write", lambda *_: None)
+    file = tmp_path / "a.png"
+    for seed, levels in ((None, "2.2 to 16.2"), (3, "3.2 to 17.2")):
+        render_command.render_command("task1", "15,135", file, noise_seed=seed)
+        assert capsys.readouterr().out.replace("\n", "").endswith(f"a.png: 5 x 3 px, grey levels {levels}")
+    assert asked == [1]
+
+
+@pytest.mark.parametrize("middle", [(31.3, 27.8), (4.2, 44.1), (58.3, 2.9)])
+def test_an_ellipse_is_fitted_in_the_smallest_window_that_holds_its_band(middle):
+    """Turned and of unequal axes, within the image: as far as its outline reaches, and the band beside that."""
+    matrix, (width, height) = np.array([[14.0, 3.0], [3.0, 8.0]]), (61, 47)
+    shape = np.array([*middle, 14.0, 8.0, 3.0])
+    optics = SimpleNamespace(shape=(height, width), blur_px=0.5)
+    seen = SimpleNamespace(near=lambda angle: np.ones(angle.shape, bool))
+    columns, rows, near = ellipse._near(shape, optics, seen)
+    turn = np.linspace(0, 2 * np.pi, 20001)
+    outline = middle + np.column_stack([np.cos(turn), np.sin(turn)]) @ matrix
+    band = ellipse._BAND * CLEARANCE * edge_blur(0.5)
+    for places, k, most in ((columns, 0, width), (rows, 1, height)):
+        assert places[0] == max(0, math.floor(outline[:, k].min() - band))
+        assert places[-1] == min(most - 1, math.ceil(outline[:, k].max() + band))
+    points = np.stack(np.meshgrid(columns, rows), -1).astype(float)
+    size, *beside = (
+        np.linalg.norm((points + step - middle) @ np.linalg.inv(matrix), axis=-1)
+        for step in np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]]) * 1e-6
+    )
+    slope = np.hypot(beside[0] - beside[1], beside[2] - beside[3]) / 2e-6
+    away = np.abs(size - 1) / slope  # to first order
+    assert (near == (away < band))[np.abs(away - band) > 1e-6].all()
+    assert 0.2 < near.mean() < 0.95

@@ -60,8 +60,10 @@ def placed(draw):
 def _drawn(draw, told):
     found = []
 
-    def keep(figure, file, **_):
+    def keep(figure, file, **how):
         found.append(told(figure))
+        if told is content:
+            found[-1].append(how.get("dpi"))
         if isinstance(file, io.StringIO):
             file.write("<svg></svg>")
 
