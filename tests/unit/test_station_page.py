@@ -161,8 +161,8 @@ def test_what_is_said_agrees_with_its_colour():
     needs = [wording.need([well, each]) for each in (well, within, open_, over, doubtful)]
     assert needs == ["none", "may", "may", "act", "act"]
     assert wording.next_step([well, within]) == (
-        "Nothing has to be changed: set camera and lamp up at the places given here. For a smaller U of slot (no. 2): most of U "
-        "comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
+        "Nothing has to be changed: set camera and lamp up at the places given here. For a smaller U of slot (no. 2): "
+        "most of U comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
     )
     assert "smaller" not in wording.next_step([within, over])
     assert wording.next_step([open_]).startswith("Give each requirement its tolerance, the key `tolerance` of its `[[")

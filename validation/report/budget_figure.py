@@ -68,7 +68,8 @@ def improved(found: SceneBudget) -> list[str]:
             if one.gain >= _LEAST_GAIN:
                 gains.setdefault(one.source, {})[each.name] = one.gain
     order = sorted(gains, key=lambda source: -round(max(gains[source].values()), 6))[:_SOURCES]
-    return [f"With half the uncertainty by {keyed(source)} U is smaller: of {_gained(gains[source])}." for source in order]
+    half = "With half the uncertainty by"
+    return [f"{half} {keyed(source)} U is smaller: of {_gained(gains[source])}." for source in order]
 
 
 def _gained(gains: dict[str, float]) -> str:
