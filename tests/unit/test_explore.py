@@ -139,6 +139,9 @@ def test_a_budgets_bars_are_parts_of_u(plate):
             pytest.approx((largest.contribution / each.u) ** 2),
         ]
         assert sum(share for _, share in row["parts"]) == pytest.approx(1, abs=0.01)  # margin: the least is left out
+    task1 = scenes.load("task1")
+    (alone,), sigma = budgets.rows(task1, State.first(task1)), planner.predict(State.first(task1).picture(task1))
+    assert alone["U"] > 1.96 * sigma.measurands[0].variance_object ** 0.5  # of the same locator: U has noise and more
     (dark,) = budgets.rows(scenes.load("task1"), moved(State.first(scenes.load("task1")), (90, 90)))
     assert dark == {"name": "distance", "unit": "", "U": None, "ratio": None, "parts": []}
 

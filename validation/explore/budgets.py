@@ -21,7 +21,7 @@ def rows(scene: Scene, state: State) -> list[dict[str, Any]]:
     ``parts`` are pairs of a source, in words, and its share of the variance, which add up to 1; ``U`` and ``ratio`` are
     None, and there are no parts, where it cannot be measured, ``ratio`` without a tolerance.
     """
-    found = measurable_budget(state.picture(scene))
+    found = measurable_budget(state.picture(scene), biased=True)  # by the locator whose sigma the page shows
     known = {} if found is None else {each.name: each for each in found}
     return [_row(quantity, known.get(quantity.name)) for quantity in scene.quantities]
 

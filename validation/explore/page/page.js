@@ -118,7 +118,7 @@ const take = {
     Object.assign(view, { scene, state });
     if (state.sensor[0] > 90) view.tilt = -Math.abs(view.tilt); // seen from where the camera is
     $("title").textContent = `${scene.name}: ${scene.title}`;
-    $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${panel.title(each.name)} (${each.kind})`, i)));
+    $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${panel.named(each.name)} (${each.kind})`, i)));
     $("prove").firstChild.textContent = `Prove it by ${scene.renders} simulations `;
     inputs();
     measurand(state.measurand);
@@ -215,7 +215,7 @@ function poses() {
 
 function legend(map) {
   const limits = range(map.values), bar = $("legend-bar"), who = map.moving < 0 ? "camera" : state.lights.length > 1 ? `lamp ${map.moving + 1}` : "lamp";
-  const name = map.shown === "worst" ? "of the worst requirement" : `of ${panel.title(scene.measurands[state.measurand].name)}`;
+  const name = map.shown === "worst" ? "of the worst requirement" : `of ${panel.named(scene.measurands[state.measurand].name)}`;
   const unit = map.unit === "degrees" ? ", degrees" : map.unit && `, ${map.unit}`, share = map.shown !== "sigma";
   $("legend-title").textContent = `Colour of a place: ${map.what}, ${name}${unit}, with the ${who} there and all else as it is${map.about ? "; holes are looked at roughly, so rather too large" : ""}`;
   $("legend-numbers").replaceChildren();

@@ -15,7 +15,7 @@ export function percent(value) {
 }
 
 // A requirement's name as on the page of a station: a position's x and y without a point.
-export const title = (name) => name.replace(/\.([xy])$/, ", $1");
+export const named = (name) => name.replace(/\.([xy])$/, ", $1");
 
 const united = (text, unit) => (text === "-" ? text : unit === "degrees" ? `${text}°` : `${text} ${unit}`);
 
@@ -69,7 +69,7 @@ export function answer(message, state, choose) {
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
     const off = each.tolerance && each.bias !== null ? Math.abs(each.bias) / each.tolerance : null;
     const sigma = united(each.together ? `${number(each.sigma)} (${number(each.together.sigma)})` : number(each.sigma), each.unit);
-    const made = row([title(each.name), sigma, part(each.ratio), off === null ? (message.closely ? united(number(each.bias, 2), each.unit) : "...") : part(off),
+    const made = row([named(each.name), sigma, part(each.ratio), off === null ? (message.closely ? united(number(each.bias, 2), each.unit) : "...") : part(off),
       element("span", shown(each.status, each.doubt), `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
     made.title = `bias ${message.closely ? united(number(each.bias, 2), each.unit) : "being computed"}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
     made.onclick = () => choose(i);
@@ -106,7 +106,7 @@ export function budget(rows) {
     const made = element("div", "", "source"), head = element("p"), bar = element("span", "", "part wide");
     const told = each.U === null ? "cannot be measured" : each.ratio === null ? `U ${united(number(each.U, 2), each.unit)}, no tolerance given`
       : `U ${united(number(each.U, 2), each.unit)}, ${percent(each.ratio)} of the tolerance`;
-    head.append(element("span", title(each.name)), element("span", told));
+    head.append(element("span", named(each.name)), element("span", told));
     const long = each.ratio === null ? 1 : Math.min(each.ratio, 1);
     each.parts.forEach(([name, share]) => {
       const fill = element("b");
@@ -140,13 +140,13 @@ export function effects(rows) {
 export function proof(rows, state, where) {
   const each = rows[state.measurand];
   const table = element("table"), head = element("thead");
-  head.append(row(["", "sigma: predicted", "from the rendered picture", "measured", "variance, measured / predicted [95 %]", "no value"]));
+  head.append(row(["", "sigma: predicted", "from the rendered picture", "measured", "measured / predicted variance [95 %]", "no value"]));
   const body = element("tbody");
-  rows.forEach((r, i) => body.append(row([title(r.name), number(r.calibrated), number(r.propagated), number(r.measured),
-    `${number(r.ratio)} [${number(r.interval[0])}, ${number(r.interval[1])}]`, `${r.failed} of ${r.n}`], i === state.measurand ? "chosen" : "")));
+  rows.forEach((r, i) => body.append(row([named(r.name), number(r.calibrated), number(r.propagated), number(r.measured),
+    r.ratio === null ? "-" : `${r.ratio.toFixed(3)} [${r.interval.map((end) => end.toFixed(3)).join(", ")}]`, `${r.failed} of ${r.n}`], i === state.measurand ? "chosen" : "")));
   table.append(head, body);
   const said = each.ratio === null ? `It could not be measured (${each.status}).`
-    : `${title(each.name)}: ${each.doubt ? `not proven (${each.doubt}); ` : ""}1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${united(number(each.bias, 2), each.unit)}, predicted ${united(number(each.predicted_bias, 2), each.unit)}.`;
+    : `${named(each.name)}: ${each.doubt ? `not proven (${each.doubt}); ` : ""}1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance${each.agrees ? "" : ", as it does by chance one time in 20"}; bias ${united(number(each.bias, 2), each.unit)}, predicted ${united(number(each.predicted_bias, 2), each.unit)}.`;
   const canvas = element("canvas", "", "hist");
   const title = element("h2", "Simulated pictures, measured, beside the prediction ");
   title.append(element("small", `at ${where}`));
