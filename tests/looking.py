@@ -91,6 +91,19 @@ def looked_at(page: Path, width: int) -> tuple[dict, dict, list[str]]:
     return asyncio.run(look())
 
 
+def lowest(page: Path, selector: str, width: int) -> float:
+    """Where what a selector finds ends below, px from the page's top, in a window of that width."""
+
+    async def look():
+        async with chromium(width) as window:
+            await _open(window, page)
+            await window.resize(width, 900)
+            every = f"[...document.querySelectorAll('{selector}')].map(e => e.getBoundingClientRect().bottom)"
+            return await window.value(f"Math.max(...{every}) + window.scrollY")
+
+    return asyncio.run(look())
+
+
 def against_wcag(page: Path) -> list[str]:
     """What axe-core finds wrong: contrast by WCAG 2.1 AA, names, headings, landmarks."""
     pytest.importorskip("axe_core_python", reason="axe-core is not installed")

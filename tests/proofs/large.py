@@ -56,7 +56,8 @@ def grid(settings: int) -> Campaign:
 
 
 def fabricate(settings: int, directory: Path) -> int:
-    """A run file as of a finished run whose distances are as predicted, but for one image in a hundred settings."""
+    """A run file as of a finished run whose distances are as predicted, but for one image in a hundred settings, of
+    which there is no value in pixels nor in the scene's unit."""
     campaign, rng = grid(settings), np.random.default_rng(1)
     names = [method.name for method in methods(campaign.scenes[0])]
     store = RunFile(directory, _identity(campaign, _IMAGES, 1, "scalar_rgb", Rendering(), None), fresh=True)
@@ -73,7 +74,7 @@ def fabricate(settings: int, directory: Path) -> int:
         for index in every:
             drawn = 60 + _SIGMA_PX * rng.standard_normal((len(names), _IMAGES))
             if index % 100 == 0:
-                drawn[0, 0] = math.nan
+                drawn[[0, -1], 0] = math.nan
             yield from ((index, 0, name, row.astype("<f8").tobytes()) for name, row in zip(names, drawn, strict=True))
 
     with store._transaction():
@@ -83,7 +84,8 @@ def fabricate(settings: int, directory: Path) -> int:
         add("INSERT INTO propagated VALUES (?, ?, ?, ?, ?)", rows)
         add("INSERT INTO chunk VALUES (?, 0, ?, '{\"expose\": 0.1}')", ((index, _IMAGES) for index in every))
         add("INSERT INTO distance VALUES (?, ?, ?, ?)", distances())
-        failed = ((index, 0, names[0], 0, 1, "short") for index in every if index % 100 == 0)
+        lost = (names[0], names[-1])
+        failed = ((index, 0, name, 0, 1, "short") for index in every if index % 100 == 0 for name in lost)
         add("INSERT INTO failure VALUES (?, ?, ?, ?, ?, ?)", failed)
     store.close()
     return len(campaign)

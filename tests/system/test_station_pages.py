@@ -5,7 +5,7 @@ import pytest
 import scenes
 import validation
 from render import Quality
-from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at, needs_a_browser
+from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at, lowest, needs_a_browser
 from tests.parts import newcomers_plate
 from tests.proofs.large import fabricate
 from validation.cli.main import app
@@ -64,10 +64,12 @@ def page(request, tmp_path_factory):
 
 
 def test_nothing_is_cut_off_covered_faint_or_against_wcag(page):
-    """Labels, tables and text at the width of a telephone, a tablet and a window, folded and opened; axe-core."""
+    """Labels, tables and text at the width of a telephone, a tablet and a window, folded and opened; axe-core. All
+    requirements, ten at most, are seen without scrolling in a window of 1280 x 900 px."""
     for width in WIDTHS:
         first, opened, errors = looked_at(page, width)
         assert errors == []
         assert first == opened == NOTHING, width
     assert against_wcag(page) == []
     assert page.stat().st_size < _LARGEST
+    assert 0 < lowest(page, ".requirements tbody tr", 1280) <= 900

@@ -33,6 +33,7 @@ from validation.explore.gate import COOKIE, gate
 from validation.explore.messages import Message
 from validation.explore.server import serve
 from validation.explore.state import SENSOR, State
+from validation.report import source_words
 
 
 @pytest.fixture(scope="module")
@@ -132,10 +133,17 @@ def test_a_budgets_bars_are_parts_of_u(plate):
     for row, quantity, each in zip(rows, plate.quantities, planner.budget(state.picture(plate)), strict=True):
         largest = max(each.contributions, key=lambda c: c.contribution)
         assert row["ratio"] == pytest.approx(each.U / quantity.tolerance.half)
-        assert row["parts"][0] == [largest.source, pytest.approx((largest.contribution / each.u) ** 2)]
+        assert row["unit"] == each.unit
+        assert row["parts"][0] == [
+            source_words.words(largest.source),
+            pytest.approx((largest.contribution / each.u) ** 2),
+        ]
         assert sum(share for _, share in row["parts"]) == pytest.approx(1, abs=0.01)  # margin: the least is left out
+    task1 = scenes.load("task1")
+    (alone,), sigma = budgets.rows(task1, State.first(task1)), planner.predict(State.first(task1).picture(task1))
+    assert alone["U"] > 1.96 * sigma.measurands[0].variance_object ** 0.5  # of the same locator: U has noise and more
     (dark,) = budgets.rows(scenes.load("task1"), moved(State.first(scenes.load("task1")), (90, 90)))
-    assert dark == {"name": "distance", "U": None, "ratio": None, "parts": []}
+    assert dark == {"name": "distance", "unit": "", "U": None, "ratio": None, "parts": []}
 
 
 def test_shares_are_of_the_variance(plate):

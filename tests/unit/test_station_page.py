@@ -147,7 +147,7 @@ def test_the_sentence_counts_all_and_names_what_is_wrong():
 
 def test_the_first_words_of_u_say_what_it_is():
     """Once, wherever the sentence begins."""
-    for u, told in ((0.001, "enough"), (0.006, "usably, though"), (0.03, "too uncertainly:")):
+    for u, told in ((0.001, "enough"), (0.006, "usable, but less"), (0.03, "too uncertainly:")):
         text = wording.sentence([required(u=u), required(2, u=u, name="slot")])
         assert told in text
         assert text.count("the uncertainty U (95 %) of the measurement is ") == 1
@@ -161,8 +161,8 @@ def test_what_is_said_agrees_with_its_colour():
     needs = [wording.need([well, each]) for each in (well, within, open_, over, doubtful)]
     assert needs == ["none", "may", "may", "act", "act"]
     assert wording.next_step([well, within]) == (
-        "Nothing has to be changed: set camera and lamp up at these places. For a smaller U of slot (no. 2): most of U "
-        "comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
+        "Nothing has to be changed: set camera and lamp up at the places given here. For a smaller U of slot (no. 2): "
+        "most of U comes from pixel noise; expose longer, come nearer, or take the mean of several pictures."
     )
     assert "smaller" not in wording.next_step([within, over])
     assert wording.next_step([open_]).startswith("Give each requirement its tolerance, the key `tolerance` of its `[[")
@@ -455,7 +455,8 @@ def test_what_halving_a_source_gains_is_told(rig):
     best = max(each.contributions, key=lambda row: row.contribution)
     gain = 1 - math.sqrt(1 - 0.75 * best.contribution**2 / each.u**2)
     told = budget_figure.improved(found)[0]
-    assert told == f"Halve {source_words.keyed(best.source)}: U of {each.name} -{100 * gain:.0f} %."
+    source = source_words.keyed(best.source)
+    assert told == f"With half the uncertainty by {source} U is smaller: of {each.name} by {100 * gain:.0f} %."
 
 
 def test_names_are_text_within_a_picture():
@@ -534,6 +535,7 @@ def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
     rows = [row(0, ("ok", 1.0)), row(1, ("short", None)), row(2, ("ok", None)), row(3, ("ok", 1.1))]
     found = SimpleNamespace(verdict=verdict, rows=rows)
     first = {
+        "what": "1 width",
         "wrong": ["It is dark."],
         "next": "Bring light.",
         "need": "none",
@@ -544,11 +546,12 @@ def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
     after = "In 2 of the 3 other settings, not shown here, not everything is proven: "
     after += f"{MEANINGS['short']} (status short), once; not measured, once."
     assert told["wrong"][-2:] == ["It is dark.", after]
+    assert told["what"] == "1 width. 4 settings of camera and lamp were tried; shown is the best, setting 1"
     if agrees:
-        scatter = "of each setting, measured, is as predicted."
-        assert told["checked"] == f"Check: the scatter of 60 simulated pictures {scatter}"
+        scatter = "of each setting the measured values scatter as predicted."
+        assert told["checked"] == f"Check: in 60 simulated pictures {scatter}"
         photographed = page._of_run(first | {"simulated": ""}, found, SimpleNamespace(number=1))
-        assert photographed["checked"] == f"Check: the scatter of 60 photographs {scatter}"
+        assert photographed["checked"] == f"Check: in 60 photographs {scatter}"
         assert (len(told["wrong"]), told["need"], told["next"]) == (2, "none", "Bring light.")
     else:
         assert told["wrong"][0].startswith("The predicted uncertainties did not pass their check: ")
@@ -597,7 +600,7 @@ def test_many_lines_are_grouped_and_the_farthest_named():
 def test_the_page_of_a_picture_needs_no_render(plate, tmp_path):
     written = page.write_station(station.of_picture(plate), "A <b>plate</b>", tmp_path / "plan.html").read_text()
     assert "A &lt;b&gt;plate&lt;/b&gt;" in written
-    assert "Drawn from the model" in written
+    assert "in a drawing from the model: no shadows" in written
     assert written.index(page.SIMULATED) < written.index('id="sentence"')
     assert page.SIMULATED not in str(page.first_screen(station.of_picture(plate), is_simulated=False).values())
     assert written.count('<svg role="img"') == 4

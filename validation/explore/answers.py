@@ -15,7 +15,7 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import feature_covariances, glanced
 from scenes import InvalidInput, Picture, Scene
-from scenes.status import MEANINGS, REMEDIES
+from scenes.status import GLANCED, MEANINGS, MEASURED, REMEDIES, is_trusted
 from validation.explore.state import MOST_VIEWS, State
 
 
@@ -132,10 +132,22 @@ def _forecast(each: planner.Forecast, together: planner.Combination | None, m: i
         "tolerance": None if each.tolerance is None else each.tolerance.half,
         "bias": finite(each.bias_object),
         "status": each.status,
+        "doubt": _doubt(each.status),
         "why": MEANINGS[each.status],
         "reason": each.reason,
         "remedy": REMEDIES[each.status],
     }
+
+
+def _doubt(status: str) -> str:
+    """What the page of a station calls a requirement of which no value, or no sigma, can be relied on.
+
+    >>> _doubt("short"), _doubt("clutter"), _doubt("ok"), _doubt("glanced")
+    ('not measured', 'not proven', '', '')
+    """
+    if status not in MEASURED:
+        return "not measured"
+    return "" if is_trusted(status) or status == GLANCED else "not proven"
 
 
 def finite(value: float | None) -> float | None:

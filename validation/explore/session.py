@@ -190,7 +190,7 @@ class Session:
     async def _best(self, state: State) -> None:
         found = await self._tools.slowly(best.best_from, self._scene, state)
         self.state = replace(self.state, sensor=found.sensor, lights=found.lights)
-        await self._moved("Moved to the next place from which this measurand is known best.")
+        await self._moved("Moved to the nearest place from where this requirement is measured best.")
 
     async def _moved(self, text: str) -> None:
         await self._send({"type": "moved", "state": self.state.to_message(), "text": text})

@@ -68,13 +68,14 @@ def improved(found: SceneBudget) -> list[str]:
             if one.gain >= _LEAST_GAIN:
                 gains.setdefault(one.source, {})[each.name] = one.gain
     order = sorted(gains, key=lambda source: -round(max(gains[source].values()), 6))[:_SOURCES]
-    return [f"Halve {keyed(source)}: U of {_gained(gains[source])}." for source in order]
+    half = "With half the uncertainty by"
+    return [f"{half} {keyed(source)} U is smaller: of {_gained(gains[source])}." for source in order]
 
 
 def _gained(gains: dict[str, float]) -> str:
     """The requirements that gain most, with what U becomes less by."""
     best = sorted(gains, key=lambda name: -round(gains[name], 6))
-    shown = ", ".join(f"{shown_name(name)} -{100 * gains[name]:.0f} %" for name in best[:_SOURCES])
+    shown = ", ".join(f"{shown_name(name)} by {100 * gains[name]:.0f} %" for name in best[:_SOURCES])
     return f"{shown}, and {len(best) - _SOURCES} more" if len(best) > _SOURCES else shown
 
 

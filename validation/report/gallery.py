@@ -6,14 +6,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import render
 import scenes
 from render import Quality
 from scenes import Picture, Scene
-from validation.report import station_view
-from validation.report.requirements import predicted
+from validation.report import station, station_view
+from validation.report.requirements import Requirement
 from validation.report.wording import sentence
 
 _PAGE, _FOLDER = "gallery.md", "gallery"
@@ -24,7 +25,7 @@ TEACHES = {
     "anodised": "Each face may have a material of its own: milled faces beside anodised ones.",
     "backlight_plate": "Edges as silhouettes against a telecentric backlight: what a hole's far rim does to its width.",
     "ball": "What has no edge is measured by its limb: a ball's diameter and centre.",
-    "bracket": "A part that hides and shadows itself: a riser's light clutters the edge at its foot.",
+    "bracket": "A part that hides and shadows itself: a riser's light biases the edge at its foot.",
     "bracket_mm": "Seven numbers of a drawing, a part of 60 mm, 5 megapixels, camera and lens as on data sheets.",
     "bracket_station": "The same at a station of which all is stated that is not exactly known: what may be signed.",
     "calibrated_rig": "A camera from a calibration with its covariance: which input the uncertainty comes from.",
@@ -52,8 +53,9 @@ def image(scene: Scene, folder: Path) -> Path:
     small = coarser(scene)
     picture = Picture.of(small, scene.settings[0].sensor, scene.settings[0].lights)
     clean = render.image(picture, quality=_QUALITY)
-    found = predicted(Picture.of(scene, scene.settings[0].sensor, scene.settings[0].lights))
-    drawn = station_view.draw(picture, found, clean, f"{scene.title}, rendered, with what is measured", scene.name)
+    drawn = station_view.draw(
+        picture, requirements(scene), clean, f"{scene.title}, rendered, with what is measured", scene.name
+    )
     path = folder / f"{scene.name}.svg"
     path.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{drawn}', encoding="utf-8")
     return path
@@ -70,26 +72,36 @@ def coarser(scene: Scene) -> Scene:
     return scene.model_copy(update={"camera": camera.model_copy(update=smaller)})
 
 
-def page() -> str:
-    """The page, Markdown."""
+def requirements(scene: Scene) -> tuple[Requirement, ...]:
+    """A scene's requirements at its first setting, as its page tells them: simulated where formulas do not do."""
+    first = scene.settings[0]
+    return station.of_picture(Picture.of(scene, first.sensor, first.lights), simulated=True).requirements
+
+
+def told(scene: Scene) -> str:
+    """How well they are measured."""
+    return sentence(requirements(scene))
+
+
+def page(told: Callable[[Scene], str] = told) -> str:
+    """The page, Markdown; ``told`` says of a scene how well it is measured."""
     parts = [
         "# Gallery",
         "The bundled scenes, each rendered at its first setting, with what is measured in it (`ice scenes` lists them, "
-        "`ice validate NAME` proves one). Blue circles: measured precisely enough, U at most a quarter of the "
+        "`ice validate NAME` proves one). All is simulated; biases that a simulation tells are taken off, and what it "
+        "is not sure of is part of U. Blue circles: measured precisely enough, U at most a quarter of the "
         "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; "
         "octagons: white not proven, red not measured.",
     ]
-    return "\n\n".join(parts + [_entry(scenes.load(name)) for name in scenes.names()]) + "\n"
+    return "\n\n".join(parts + [_entry(scene, told(scene)) for scene in map(scenes.load, scenes.names())]) + "\n"
 
 
-def _entry(scene: Scene) -> str:
-    first = scene.settings[0]
-    told = sentence(predicted(Picture.of(scene, first.sensor, first.lights)))
+def _entry(scene: Scene, told: str) -> str:
     return "\n\n".join([
         f"## {scene.name}",
         f"{scene.title}.",
         f"![{scene.title}, rendered, with what is measured]({_FOLDER}/{scene.name}.svg)",
-        f"**{TEACHES[scene.name]}** As predicted: {told}",
+        f"**{TEACHES[scene.name]}** {told}",
     ])  # fmt: skip
 
 

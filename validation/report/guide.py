@@ -12,7 +12,7 @@ from scenes.status import MEANINGS, is_trusted, legend
 from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.report.cells import pose
-from validation.statistics import LEVEL
+from validation.statistics import LEVEL, Verdict
 
 if TYPE_CHECKING:
     from validation.report.station import Station
@@ -137,24 +137,48 @@ _WRONG = {
 }
 
 
-def plain_verdict(found: Validation) -> str:
-    """What the verdict says, in plain words."""
+def plain_verdict(found: Validation, pictures: str = "noisy pictures") -> str:
+    """What the verdict says, in plain words; ``pictures``: what they are called that were measured."""
     verdict = found.verdict
     if not verdict.agrees:
         reasons = ", and ".join(_WRONG.get(reason, reason) for reason in verdict.reasons) or "no test was passed"
         return f"No: {reasons} than was predicted." if "scatter" in reasons else f"No: {reasons}."
+    each = f"of each of {len(found.rows)} settings " if len(found.rows) > 1 else ""
     return (
-        f"Yes: {images(found)} noisy pictures of each setting were measured, and the values scatter as predicted; "
-        f"{verdict.inside} of {verdict.rows} lie in their 95 % interval, where chance alone leaves "
-        f"{_expected(verdict.rows)}."
+        f"Yes: {images(found)} {pictures} {each}were measured, and the values scatter as predicted: "
+        f"{verdict.inside} of {verdict.rows} ratios of measured to predicted variance have 1 in their 95 % interval, "
+        f"where chance alone leaves {_expected(verdict.rows)}.{_unjudged(verdict)}"
     )
+
+
+def _unjudged(verdict: Verdict) -> str:
+    """How many rows are not judged; empty where all are.
+
+    >>> from validation.statistics import verdict
+    >>> _unjudged(verdict([1.0, 1.0], [100, 90], lost=[0, 10], bias_px=None))
+    ' 1 more is not judged: too many of its pictures gave no value.'
+    """
+    parts = []
+    for count, why in (
+        (verdict.not_measured, "too many of {} pictures gave no value"),
+        (sum(verdict.not_proven.values()), "{} values are not proven"),
+    ):
+        if count:
+            verb, whose = ("is", "its") if count == 1 else ("are", "their")
+            parts.append(f" {count} more {verb} not judged: {why.format(whose)}.")
+    return "".join(parts)
 
 
 def checked(found: Validation, is_simulated: bool = True) -> str:
     """The same in short, of a run that agrees, of simulated pictures or of photographs."""
     what = "simulated pictures" if is_simulated else "photographs"
     each = " of each setting" if len(found.rows) > 1 else ""
-    return f"Check: the scatter of {images(found)} {what}{each}, measured, is as predicted."
+    return f"Check: in {images(found)} {what}{each} the measured values scatter as predicted."
+
+
+def tried(found: Validation, number: int | None) -> str:
+    """How many settings there are, and which of them is shown."""
+    return f"{len(found.rows)} settings of camera and lamp were tried; shown is the best, setting {number}"
 
 
 def images(found: Validation) -> int:

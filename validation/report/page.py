@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,9 @@ from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
 from validation.report.wording import Need, need, next_step, nothing_wrong, sentence, what, wrong
 
-SIMULATED = "Simulated: no camera was used; nothing is said of any real part."
+SIMULATED = (
+    "Simulated: how precisely this camera would measure the part. No camera was used; nothing is said of any real part."
+)
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ class Section:
 
 def write(campaign: Campaign, found: Validation, store: RunFile, station: Station, directory: Path) -> list[Path]:
     """Write report.html and report.md of a run to a directory; their paths."""
-    first = _of_run(first_screen(station, not store.identity().get("photos")), found, station)
+    shown = station if len(found.rows) > 1 else replace(station, number=None)
+    first = _of_run(first_screen(shown, not store.identity().get("photos")), found, station)
     sections = [_proof(campaign, found, store), *_budget(station.budget)]
     if len(found.rows) > 1:
         sections.insert(0, _settings(campaign, found, station, bool(first["simulated"])))
@@ -107,10 +110,8 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     """What the template of a page's first screen takes; of photographs nothing is simulated."""
     found, picture = station.requirements, station.picture
     told = station_sketch.told(picture)
-    number = f"Setting {station.number}. " if station.number else ""
-    made = ", rendered" if is_simulated else ", in a photograph"
-    how = f"{made}." if station.image is not None else ". Drawn from the model: no shadows, no light between surfaces."
-    how += station_view.enlarged(picture)
+    placed = f"Setting {station.number}: " if station.number else ""
+    how = f"{_shown(station, is_simulated)}{station_view.enlarged(picture)}"
     named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
     grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
@@ -126,14 +127,23 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
         "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"What is measured{how} {named}."),
-        "sketched": f"Camera and lamp to scale: {told}. {station_sketch.AZIMUTH}",
-        "caption": f"{number}What is measured{how}",
+        "sketched": f"{told[0].upper()}{told[1:]}. {station_sketch.AZIMUTH}",
+        "caption": f"What is measured{how}",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
         "lines": station_table.lines(found),
+        "above": station_table.ABOVE,
         "note": station_table.note(found),
-        "section": Section("Requirements", answer=f"{number}{told}.", tables=[table]),
+        "section": Section("Requirements", answer=f"{placed}{told}.", tables=[table]),
     }
+
+
+def _shown(station: Station, is_simulated: bool) -> str:
+    """In which picture what is measured is shown, the end of a sentence."""
+    where = f" of setting {station.number}" if station.number else ""
+    if station.image is not None:
+        return f", in the {'rendered picture' if is_simulated else 'photograph'}{where}."
+    return f", in a drawing from the model{where}: no shadows, no light between surfaces."
 
 
 def _title(found: Validation, station: Station) -> str:
@@ -148,6 +158,8 @@ def _title(found: Validation, station: Station) -> str:
 def _of_run(first: dict[str, Any], found: Validation, station: Station) -> dict[str, Any]:
     """The first screen with what a run says of it: whether it agrees, and what is not proven elsewhere."""
     wrong, after = first["wrong"], guide.elsewhere(found, station.number)
+    if len(found.rows) > 1:
+        first = first | {"what": f"{first['what']}. {guide.tried(found, station.number)}"}
     if found.verdict.agrees:
         return first | {"checked": guide.checked(found, bool(first["simulated"])), "wrong": wrong + after}
     steps = [guide.why_not(found), first["next"] if wrong else ""]
@@ -224,7 +236,7 @@ def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
     why = reasons(campaign, far(found)[0])
     folded = [page_tables.ratios(found, why), page_tables.units(found, why), page_tables.variances(found),
               page_tables.estimators(found)]  # fmt: skip
-    answer = guide.plain_verdict(found)
+    answer = guide.plain_verdict(found, "photographs" if store.identity().get("photos") else "simulated noisy pictures")
     return Section("Are these uncertainties true?", answer, found.verdict.text, plots, folded=folded)
 
 

@@ -185,10 +185,15 @@ def bias_told(lines: Sequence[Line]) -> str:
     """The largest bias in words."""
     some = [line for line in lines if line.bias is not None and line.half]
     if not some:
-        return "Mean errors; the band is 0.3 sigma of one picture, which the verdict allows."
+        return (
+            "Mean errors and their 95 % intervals. The band, 0.3 sigma of one picture, is what the check allows: only "
+            "an interval outside of it tells of a bias, and up to one of 20 lies there by chance."
+        )
     worst = max(some, key=lambda line: (round(abs(line.bias) / line.half, 9), -line.setting))
     part = 100 * abs(worst.bias) / worst.half
-    return f"Mean errors against the tolerance (band): the largest, of {cells.name(worst.name)}, is {part:.2g} % of it."
+    name = cells.name(worst.name)
+    what = "Mean errors and their 95 % intervals against the tolerance (band)"
+    return f"{what}: the largest, of {name}, is {part:.2g} % of it."
 
 
 def distributions(found: Validation, store: RunFile) -> Markup:

@@ -11,7 +11,7 @@ from validation.batch.rows import Row
 from validation.report.cells import PLACED, placed
 from validation.report.cells import name as shown_name
 from validation.report.page_tables import Table
-from validation.report.run_cells import names, small_sigma
+from validation.report.run_cells import names
 from validation.report.station import merit
 
 _ROWS = 32  # table.csv has all
@@ -40,7 +40,7 @@ def _largest(row: Row, halves: dict[str, float]) -> str:
         part, name = max(known, key=lambda pair: round(pair[0], 9))
         return f"{100 * part:.2g} % ({shown_name(name)})"
     first = row.measurands[0]
-    return f"{small_sigma(first.predicted)} {first.unit}" if math.isfinite(first.predicted) else "-"
+    return f"{math.sqrt(first.predicted):#.3g} {first.unit}" if math.isfinite(first.predicted) else "-"
 
 
 def _proof(rows: list[Row]) -> str:

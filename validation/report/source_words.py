@@ -71,8 +71,8 @@ def smaller(source: str) -> str:
         return "expose longer, come nearer, or take the mean of several pictures"
     if source.startswith(BIAS):
         return (
-            "state in the scene file more exactly how the part reflects (`uncertainty.reflectance`) and where the lamp "
-            "stands (`uncertainty.light_place`)"
+            "the bias is simulated, so state in the scene file more exactly how the part reflects "
+            "(`uncertainty.reflectance`) and where the lamp stands (`uncertainty.light_place`)"
         )
     if source == MODEL:
         return "move camera or lamp to where the bias is smaller (`ice plan`), or take it off (`ice budget --render`)"

@@ -18,7 +18,7 @@ from validation.report.canvas import TEXT, inline
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
-AZIMUTH = "Arrow: the part's x axis, azimuth 0°, counted counterclockwise."
+AZIMUTH = "The sketches are to scale; azimuth is counted counterclockwise from the part's x axis (arrow)."
 _CORNERS = np.array([[0.84, 0.16], [0.84, 0.84], [0.16, 0.84]])  # in parts of a view; in the fourth stands the scale
 _VIEWS = ("from the side", "from above")
 

@@ -16,14 +16,14 @@ COLUMNS = (
     "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / half zone", "measurement", "limited by",
 )  # fmt: skip
 PART = (
-    "U / half zone: U over half of the tolerance zone (of ±0.02 mm over 0.02 mm), in words: per cent of the tolerance; "
-    f"up to {100 * WELL:.0f} % the measurement is precise enough, up to 100 % usable."
+    "U / half zone: U over half of the tolerance zone (of ±0.02 mm: over 0.02 mm), in words per cent of the tolerance."
 )
+ABOVE = f"U: expanded uncertainty (95 %). {PART}"
+GRADED = f"Up to {100 * WELL:.0f} % of the tolerance a measurement is precise enough, up to 100 % usable."
 NOTE = (
     "sigma: standard deviation of one picture's value, by noise. bias: mean error once the simulated correction, where "
-    "one was made, is taken off, ± its standard uncertainty where that is known. "
-    f"U: expanded uncertainty (95 %), by all that is not exactly known. {PART} limited by: what adds most "
-    "to U, and its share of U²."
+    "one was made, is taken off, ± its standard uncertainty where that is known. U: by all that is not exactly known. "
+    f"limited by: what adds most to U, and its share of U². {GRADED}"
 )
 
 
@@ -64,7 +64,7 @@ def note(found: Sequence[Requirement], terms: str = NOTE) -> str:
 def table(found: Sequence[Requirement]) -> Table:
     """The same for Markdown."""
     rows = [[str(line.number), *line.cells] for line in lines(found)]
-    return Table("Requirements", ["no.", *COLUMNS[1:]], rows, note(found))
+    return Table("Requirements", ["no.", *COLUMNS[1:]], rows, f"{ABOVE} {note(found)}")
 
 
 def _cells(each: Requirement, unit: str) -> tuple[str, ...]:

@@ -25,9 +25,10 @@ from validation.report.wording import need, next_step, nothing_wrong, sentence, 
 
 _P = 0.95
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
+_ABOVE = f"U: expanded uncertainty (95 %), by noise alone. {station_table.PART}"
 _NOTE = (
-    "sigma: standard deviation of the combined value, by noise. bias: mean error of it. U: 95 %, of noise alone. "
-    f" {station_table.PART} taken from: by inverse variance from these pictures."
+    "sigma: standard deviation of the combined value, by noise. bias: mean error of it. taken from: by inverse "
+    f"variance from these pictures. {station_table.GRADED}"
 )
 
 
@@ -46,7 +47,7 @@ def write(found: planner.Views, path: Path) -> Path:
         "caption": "What is taken from each picture. Drawn from the model: no shadows.",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in dict.fromkeys(each.grade for each in asked)],
         "columns": (*station_table.COLUMNS[:-1], "taken from"), "lines": station_table.lines(asked),
-        "note": station_table.note(asked, _NOTE),
+        "above": _ABOVE, "note": station_table.note(asked, _NOTE),
     }  # fmt: skip
     sections = [
         page.Section("Where they stand", tables=[_poses(last)]),

@@ -55,7 +55,7 @@ def _how(grade: Grade, some: Sequence[Requirement]) -> str:
         return f"measured precisely enough: U is at most {100 * WELL:.0f} % of the tolerance"
     if grade == Grade.WITHIN:
         most = f"{'up to ' * (len(some) > 1)}{cells.percent(max(each.ratio for each in some))}"
-        return f"measured usably, though U is {most} of the tolerance, more than the {100 * WELL:.0f} % aimed at"
+        return f"usable, but less precise than the {100 * WELL:.0f} % aimed at: U is {most} of the tolerance"
     if grade == Grade.OVER:
         return "measured too uncertainly: U is larger than the tolerance"
     if grade == Grade.OPEN:
@@ -110,7 +110,7 @@ def next_step(found: Sequence[Requirement]) -> str:
     if any(each.grade == Grade.OPEN for each in found) and not steps:
         steps.append(f"{_NO_TOLERANCE}.")
     steps = [step[0].upper() + step[1:] for step in steps] or [
-        "Nothing has to be changed: set camera and lamp up at these places."
+        "Nothing has to be changed: set camera and lamp up at the places given here."
     ]
     within = _largest(found, Grade.WITHIN)
     if within and need(found) == Need.MAY:

@@ -118,8 +118,8 @@ const take = {
     Object.assign(view, { scene, state });
     if (state.sensor[0] > 90) view.tilt = -Math.abs(view.tilt); // seen from where the camera is
     $("title").textContent = `${scene.name}: ${scene.title}`;
-    $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${each.name} (${each.kind})`, i)));
-    $("prove").firstChild.textContent = `Prove it with ${scene.renders} images `;
+    $("measurand").replaceChildren(...scene.measurands.map((each, i) => new Option(`${panel.named(each.name)} (${each.kind})`, i)));
+    $("prove").firstChild.textContent = `Prove it by ${scene.renders} simulations `;
     inputs();
     measurand(state.measurand);
     if (wanted) {
@@ -156,7 +156,7 @@ const take = {
     $("said").textContent = message.text;
   },
   job(message) {
-    const busy = message.state === "begun", words = { best: "descending", prove: "rendering", render: "rendering" };
+    const busy = message.state === "begun", words = { best: "searching", prove: "rendering", render: "rendering" };
     $("work").hidden = !busy;
     $("working").textContent = words[message.kind];
     $("progress").removeAttribute("value");
@@ -167,7 +167,7 @@ const take = {
     if (!message.done) return;
     $("progress").max = message.total;
     $("progress").value = message.done;
-    $("working").textContent = `${message.done} of ${message.total} measured`;
+    $("working").textContent = `${message.done} of ${message.total} pictures measured`;
   },
   proof(message) {
     const lamps = message.state.lights.map((pose) => `(${pose})`).join(" ");
@@ -191,7 +191,7 @@ function inputs() {
     const boxes = [0, 1].map((k) => {
       const box = document.createElement("input");
       Object.assign(box, { type: "number", step: 1, min: k ? -360 : 0, max: k ? 720 : 180, id: `pose${which}-${k}` });
-      box.setAttribute("aria-label", `${name}, ${k ? "azimuth" : "polar angle"}, degrees`);
+      box.setAttribute("aria-label", `${name}, ${k ? "azimuth" : "angle from the vertical"}, degrees`);
       box.onchange = () => {
         if (box.value === "" || !box.checkValidity()) return;
         const to = [...(which < 0 ? state.sensor : state.lights[which])];
@@ -215,8 +215,9 @@ function poses() {
 
 function legend(map) {
   const limits = range(map.values), bar = $("legend-bar"), who = map.moving < 0 ? "camera" : state.lights.length > 1 ? `lamp ${map.moving + 1}` : "lamp";
-  const name = map.shown === "worst" ? "the worst of all requirements" : `"${scene.measurands[state.measurand].name}"`;
-  $("legend-title").textContent = `${map.what} of ${name}${map.unit ? `, ${map.unit},` : ""} with the ${who} there and all else as it is${map.about ? "; rims of holes at a glance, so rather too large" : ""}`;
+  const name = map.shown === "worst" ? "of the worst requirement" : `of ${panel.named(scene.measurands[state.measurand].name)}`;
+  const unit = map.unit === "degrees" ? ", degrees" : map.unit && `, ${map.unit}`, share = map.shown !== "sigma";
+  $("legend-title").textContent = `Colour of a place: ${map.what}, ${name}${unit}, with the ${who} there and all else as it is${map.about ? "; holes are looked at roughly, so rather too large" : ""}`;
   $("legend-numbers").replaceChildren();
   const pen = bar.getContext("2d");
   pen.clearRect(0, 0, bar.width, bar.height);
@@ -227,7 +228,7 @@ function legend(map) {
   for (let x = 0; x < bar.width; x += 1) { pen.fillStyle = colour(1 - x / bar.width); pen.fillRect(x, 0, 1, bar.height); }
   const beyond = map.values.some((value) => value !== null && value > limits.high);
   [0, 0.5, 1].forEach((part) => $("legend-numbers").append(panel.element("span",
-    `${panel.number(limits.low * (limits.high / limits.low) ** part)}${part === 1 && beyond ? " and more" : part ? "" : " (best)"}`)));
+    `${(share ? panel.percent : panel.number)(limits.low * (limits.high / limits.low) ** part)}${part === 1 && beyond ? " and more" : part ? "" : " (best)"}`)));
 }
 
 // the keys are the page's again once something is chosen

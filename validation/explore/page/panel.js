@@ -5,8 +5,19 @@ const $ = (id) => document.getElementById(id);
 export function number(value, digits = 3) {
   if (value === null || value === undefined) return "-";
   const size = Math.abs(value);
-  return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 1) : Number(value.toPrecision(digits)).toString();
+  return size !== 0 && (size < 1e-6 || size >= 1e6) ? value.toExponential(digits - 1) : Number(value.toPrecision(digits)).toString();
 }
+
+// A part of one in per cent, two digits; from ten on how many times, as on the page of a station.
+export function percent(value) {
+  if (value === null || value === undefined) return "-";
+  return Math.abs(value) < 10 ? `${Number((100 * value).toPrecision(2))} %` : `${Number(value.toPrecision(2))} x`;
+}
+
+// A requirement's name as on the page of a station: a position's x and y without a point.
+export const named = (name) => name.replace(/\.([xy])$/, ", $1");
+
+const united = (text, unit) => (text === "-" ? text : unit === "degrees" ? `${text}°` : `${text} ${unit}`);
 
 export function element(name, text = "", kind = "") {
   const made = document.createElement(name);
@@ -17,7 +28,7 @@ export function element(name, text = "", kind = "") {
 
 const mood = (status) => (["ok", "clutter", "glanced"].includes(status) ? status : "bad");
 const fine = (status) => status === "ok" || status === "glanced";
-const shown = (status) => (status === "glanced" ? "being computed" : status); // a close look follows and says
+const shown = (status, doubt = "") => (status === "glanced" ? "being computed" : doubt ? `${doubt}: ${status}` : status); // a close look follows and says
 
 function row(cells, kind = "") {
   const made = element("tr", "", kind);
@@ -42,25 +53,25 @@ export function answer(message, state, choose) {
     return;
   }
   const chosen = message.measurands[state.measurand], rough = message.closely ? "" : "about ";
-  $("sigma").textContent = chosen.sigma === null ? "cannot be measured" : `${rough}σ ${number(chosen.sigma)} ${chosen.unit}`;
+  $("sigma").textContent = chosen.sigma === null ? "cannot be measured" : `${rough}sigma ${united(number(chosen.sigma), chosen.unit)}`;
   $("sigma").dataset.sigma = chosen.sigma ?? "";
   $("sigma").dataset.closely = message.closely;
-  status.textContent = shown(chosen.status);
+  status.textContent = shown(chosen.status, chosen.doubt);
   status.className = mood(chosen.status);
   const blamed = message.edges.filter((edge) => edge.status === chosen.status).map((edge) => edge.name).join(", ");
   const glance = message.closely || chosen.status === "glanced" ? "" : " Bias and close look follow when nothing moves.";
-  const about = chosen.reason || (fine(chosen.status) ? "" : blamed);
-  $("why").textContent = `${chosen.why}${about ? ` (${about})` : ""}.${glance}${message.closely || !state.views.length ? together(chosen) : " What all views tell together follows, too."}`;
+  const about = chosen.reason || `${chosen.why}${!fine(chosen.status) && blamed ? ` (${blamed})` : ""}`;
+  $("why").textContent = `${about[0].toUpperCase()}${about.slice(1)}.${glance}${message.closely || !state.views.length ? together(chosen) : " What all views tell together follows, too."}`;
   $("remedy").hidden = !chosen.remedy;
   $("remedy").lastElementChild.textContent = chosen.remedy.replaceAll("`", "");
-  $("connection").textContent = `${$("sigma").textContent}, ${shown(chosen.status)}`;
+  $("connection").textContent = `${$("sigma").textContent}, ${status.textContent}`;
   shares(message);
   $("measurands").tBodies[0].replaceChildren(...message.measurands.map((each, i) => {
     const off = each.tolerance && each.bias !== null ? Math.abs(each.bias) / each.tolerance : null;
-    const sigma = each.together ? `${number(each.sigma)} (${number(each.together.sigma)}) ${each.unit}` : `${number(each.sigma)} ${each.unit}`;
-    const made = row([each.name, sigma, part(each.ratio), off === null ? (message.closely ? number(each.bias, 2) : "...") : part(off),
-      element("span", shown(each.status), `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
-    made.title = `bias ${message.closely ? `${number(each.bias, 2)} ${each.unit}` : "being computed"}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
+    const sigma = united(each.together ? `${number(each.sigma)} (${number(each.together.sigma)})` : number(each.sigma), each.unit);
+    const made = row([named(each.name), sigma, part(each.ratio), off === null ? (message.closely ? united(number(each.bias, 2), each.unit) : "...") : part(off),
+      element("span", shown(each.status, each.doubt), `status ${mood(each.status)}`)], i === state.measurand ? "chosen pick" : "pick");
+    made.title = `bias ${message.closely ? united(number(each.bias, 2), each.unit) : "being computed"}. ` + (each.remedy ? `${each.why}: ${each.remedy}` : each.why);
     made.onclick = () => choose(i);
     return made;
   }));
@@ -74,7 +85,7 @@ export function answer(message, state, choose) {
 function together(each) {
   if (!each.together) return "";
   const { sigma, status, views } = each.together;
-  return sigma === null ? " Not even all views together measure it." : ` With all views: σ ${number(sigma)} ${each.unit} from ${views}, ${status}.`;
+  return sigma === null ? " Not even all views together measure it." : ` With all views: sigma ${united(number(sigma), each.unit)} from ${views}, ${status}.`;
 }
 
 // A bar of what is 1 at the limit, and its number.
@@ -86,16 +97,16 @@ function part(value) {
     bar.append(fill);
     made.append(bar);
   }
-  made.append(number(value, 2));
+  made.append(percent(value));
   return made;
 }
 
 export function budget(rows) {
   $("budget").replaceChildren(...rows.map((each) => {
     const made = element("div", "", "source"), head = element("p"), bar = element("span", "", "part wide");
-    const told = each.U === null ? "cannot be measured" : each.ratio === null ? `U ${number(each.U, 2)}, no tolerance`
-      : `U ${number(each.U, 2)}, ${(100 * each.ratio).toPrecision(2)} % of half the tolerance zone`;
-    head.append(element("span", each.name), element("span", told));
+    const told = each.U === null ? "cannot be measured" : each.ratio === null ? `U ${united(number(each.U, 2), each.unit)}, no tolerance given`
+      : `U ${united(number(each.U, 2), each.unit)}, ${percent(each.ratio)} of the tolerance`;
+    head.append(element("span", named(each.name)), element("span", told));
     const long = each.ratio === null ? 1 : Math.min(each.ratio, 1);
     each.parts.forEach(([name, share]) => {
       const fill = element("b");
@@ -106,7 +117,7 @@ export function budget(rows) {
     made.append(head, bar, element("small", each.parts.map(([name, share]) => `${name} ${(100 * share).toFixed(0)} %`).join(", ")));
     return made;
   }));
-  $("budget-small").textContent = "U (95 %), and the parts of its square by source";
+  $("budget-small").textContent = "U (95 %), and the shares of its square by source";
 }
 
 function shares(message) {
@@ -129,15 +140,15 @@ export function effects(rows) {
 export function proof(rows, state, where) {
   const each = rows[state.measurand];
   const table = element("table"), head = element("thead");
-  head.append(row(["", "predicted σ", "with picture", "measured σ", "variance ratio [95 %]", "lost"]));
+  head.append(row(["", "sigma: predicted", "from the rendered picture", "measured", "measured / predicted variance [95 %]", "no value"]));
   const body = element("tbody");
-  rows.forEach((r, i) => body.append(row([r.name, number(r.calibrated), number(r.propagated), number(r.measured),
-    `${number(r.ratio)} [${number(r.interval[0])}, ${number(r.interval[1])}]`, `${r.failed}/${r.n}`], i === state.measurand ? "chosen" : "")));
+  rows.forEach((r, i) => body.append(row([named(r.name), number(r.calibrated), number(r.propagated), number(r.measured),
+    r.ratio === null ? "-" : `${r.ratio.toFixed(3)} [${r.interval.map((end) => end.toFixed(3)).join(", ")}]`, `${r.failed} of ${r.n}`], i === state.measurand ? "chosen" : "")));
   table.append(head, body);
   const said = each.ratio === null ? `It could not be measured (${each.status}).`
-    : `${each.name}: ${each.doubt ? `not proven (${each.doubt}); ` : ""}1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance; bias ${number(each.bias, 2)} ${each.unit}, predicted ${number(each.predicted_bias, 2)}.`;
+    : `${named(each.name)}: ${each.doubt ? `not proven (${each.doubt}); ` : ""}1 lies ${each.agrees ? "inside" : "outside"} the 95 % interval of measured over predicted variance${each.agrees ? "" : ", as it does by chance one time in 20"}; bias ${united(number(each.bias, 2), each.unit)}, predicted ${united(number(each.predicted_bias, 2), each.unit)}.`;
   const canvas = element("canvas", "", "hist");
-  const title = element("h2", "Measured beside predicted ");
+  const title = element("h2", "Simulated pictures, measured, beside the prediction ");
   title.append(element("small", `at ${where}`));
   $("proof").replaceChildren(title, element("p", said), canvas, table);
   $("proof").dataset.ratio = each.ratio ?? "";
@@ -166,5 +177,5 @@ function histogram(canvas, each) {
   pen.fillText(`${number(low, 6)}`, 0, high - 3);
   const text = `${number(low + span, 6)} ${each.unit}`;
   pen.fillText(text, wide - pen.measureText(text).width, high - 3);
-  pen.fillText("bars: measured; line: predicted with the picture", 4, 11);
+  pen.fillText("bars: measured; line: predicted from the rendered picture", 4, 11);
 }

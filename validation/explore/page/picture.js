@@ -66,10 +66,10 @@ export class Picture {
   }
 
   tell(factor) {
-    const kind = this.shown.kind === "preview" ? "Drawn from the model at once, without cast shadows" : "Rendered by Mitsuba";
-    const ellipses = factor ? ` Blue: 95 % ellipses of the measurand's points, enlarged ${factor} times.` : "";
-    const lines = this.overlay?.lines.some(({ status }) => status === "glanced") ? "White: edges not yet looked at closely" : "Green: edges that are ok";
-    this.caption.textContent = `${kind}. ${lines}; thick: the one that limits.${ellipses}`;
+    const kind = this.shown.kind === "preview" ? "Drawn from the model, without cast shadows" : "Rendered by Mitsuba";
+    const ellipses = factor ? ` Blue: scatter of the points by noise (95 %), enlarged ${factor} times.` : "";
+    const lines = this.overlay?.lines.some(({ status }) => status === "glanced") ? "White: edges not yet looked at closely" : "Edges: green ok, orange biased, red cannot be used";
+    this.caption.textContent = `${kind}. ${lines}; thick: adds most to sigma.${ellipses}`;
   }
 }
 
