@@ -20,6 +20,7 @@ from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
 from measure.quantities import MeasuredFeatures, find
 from measure.render_noise import by_features, by_pixels
+from measure.saturation import limits
 from scenes import InvalidInput, Picture, Quantity
 from scenes.status import MEASURED
 from scenes.status import corrected as status_corrected
@@ -50,6 +51,9 @@ class Correction:
         How many independent renders the biases are the mean of.
     beside_renders : int
         How many the image is the mean of that is corrected, where that is one of renders.
+    saturated : pair of ndarray, shape (M,), or None
+        Least and most pixels at the end of the sensor's scale that a picture may have for the bias to be its own
+        (`measure.saturation`); any number where nothing is told.
     """
 
     quantities: tuple[Quantity, ...]
@@ -64,6 +68,7 @@ class Correction:
     simulated: tuple[str, ...]
     renders: int = 1
     beside_renders: int = 1
+    saturated: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def u_bias(self) -> np.ndarray:
@@ -96,13 +101,21 @@ class Correction:
         """Of the values that the noise-free image has, once they are corrected (`scenes.status.corrected`)."""
         return tuple(self.status_of(self.simulated))
 
-    def status_of(self, found: Sequence[str]) -> list[str]:
-        """The same of values whose statuses as measured are ``found``, (M,).
+    def is_of(self, saturated: np.ndarray) -> np.ndarray:
+        """Whether the biases are those of pictures (n,) with so many pixels at the end of the scale, bool (n, M)."""
+        if self.saturated is None:
+            return np.ones((len(saturated), len(self.bias)), bool)
+        least, most = self.saturated
+        return (saturated[:, None] >= least) & (saturated[:, None] <= most)
+
+    def status_of(self, found: Sequence[str], of: np.ndarray | bool = True) -> list[str]:
+        """The same of values whose statuses as measured are ``found``, (M,), of a picture that the biases are ``of``.
 
         Textures scatter by what a closed form tells, and where it does, count in `u_bias` alone.
         """
         doubts = {name: np.where(np.isfinite(u) & (name == TEXTURE), 0.0, u) for name, u in self.sources.items()}
-        told = zip(found, self.simulated, _together(doubts, self.bias), self.sigma, self.quantities, strict=True)
+        left = np.where(of, _together(doubts, self.bias), np.inf)
+        told = zip(found, self.simulated, left, self.sigma, self.quantities, strict=True)
         return [
             status_corrected(str(state), simulated, float(u), float(sigma), _half(quantity))
             for state, simulated, u, sigma, quantity in told
@@ -181,6 +194,7 @@ def correction(
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
         told.covariance, told.covariance_image, told.status, renders, max(len(images.beside), 1),
+        limits(images.renders[0], picture, estimator, threshold, np.sqrt(np.diag(told.covariance))),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from measure.correction import Correction
 from measure.estimators.registry import best_estimator
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import MeasuredFeatures, find
+from measure.saturation import saturated
 from scenes import InvalidInput, Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
@@ -43,10 +44,13 @@ class Measurements(Shown):
         The first quantity as `measure.distance` gives it, with its edges, if it is a distance.
     picture : Picture
         What the images are taken to show: scene, sensor, and the lights where they are known.
-    bias, u_bias : ndarray, shape (M,)
+    saturated : ndarray of int, shape (...)
+        How many of the pixels looked at are at the end of the sensor's scale.
+    bias, u_bias : ndarray, shapes (M,) and (..., M)
         What a `Correction` has taken off the values, and its standard uncertainty (not variance), `units`; 0 and NaN
-        where none was made. Where one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in
-        the simulated picture, for the estimator's own are those of a lone edge.
+        where none was made; infinite where more pixels are saturated, or fewer, than those of which it tells. Where
+        one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in the simulated picture, for
+        the estimator's own are those of a lone edge.
     """
 
     quantities: tuple[Quantity, ...]
@@ -60,6 +64,7 @@ class Measurements(Shown):
     p_value: np.ndarray
     first: Measurement | None
     picture: Picture
+    saturated: np.ndarray
     bias: np.ndarray
     u_bias: np.ndarray
 
@@ -80,7 +85,7 @@ class Measurements(Shown):
     def as_rows(self) -> list[dict[str, Any]]:
         """One record an image and measurand: scene and poses, value, one sigma, u, status; None: there is none."""
         where, count = self.picture.row, len(self.quantities)
-        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.u, self.status))
+        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.u_bias, self.u, self.status))
         return [
             where
             | {
@@ -90,12 +95,12 @@ class Measurements(Shown):
                 "unit": self.units[m],
                 "value": finite(values[m]),
                 "sigma": finite(sigmas[m]),
-                "u_bias": finite(self.u_bias[m]),
+                "u_bias": finite(doubts[m]),
                 "u": finite(combined[m]),
                 "nominal": float(self.nominal[m]),
                 "status": str(states[m]),
             }
-            for i, (values, sigmas, combined, states) in enumerate(zip(*columns, strict=True))
+            for i, (values, sigmas, doubts, combined, states) in enumerate(zip(*columns, strict=True))
             for m, quantity in enumerate(self.quantities)
         ]
 
@@ -167,7 +172,8 @@ def _check_same(correction: Correction, picture: Picture, estimator: str | None,
 def corrected(found: Measurements, correction: Correction) -> Measurements:
     """With the biases of a picture taken off, and the statuses that this leaves."""
     shape = found.status.shape
-    rows = [correction.status_of(row) for row in found.status.reshape(-1, shape[-1])]
+    of = correction.is_of(found.saturated.ravel())
+    rows = [correction.status_of(*each) for each in zip(found.status.reshape(-1, shape[-1]), of, strict=True)]
     off, off_image = (np.nan_to_num(each) for each in (correction.bias, correction.bias_image))
     doubtful = np.isin(found.status, (status.CLUTTER, status.MISFIT))
     return replace(
@@ -179,7 +185,7 @@ def corrected(found: Measurements, correction: Correction) -> Measurements:
         status=np.array(rows).reshape(shape),
         first=found.first and _first_corrected(found.first, off_image[0], np.array(rows)[:, 0].reshape(shape[:-1])),
         bias=off,
-        u_bias=correction.u_bias,
+        u_bias=np.where(of, correction.u_bias, np.inf).reshape(shape),
     )
 
 
@@ -207,10 +213,15 @@ def measure_by(
     camera = picture.scene.camera
     images = checked_image(image, (camera.height, camera.width))
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
-    return tuple(_gathered(find(stack, picture, *method), picture, lead) for method in methods)
+    return tuple(
+        _gathered(find(stack, picture, *method), picture, saturated(stack, picture, method[0]), lead)
+        for method in methods
+    )
 
 
-def _gathered(found: MeasuredFeatures, picture: Picture, lead: tuple[int, ...]) -> Measurements:
+def _gathered(
+    found: MeasuredFeatures, picture: Picture, saturation: np.ndarray, lead: tuple[int, ...]
+) -> Measurements:
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)
@@ -229,8 +240,9 @@ def _gathered(found: MeasuredFeatures, picture: Picture, lead: tuple[int, ...]) 
         p_value=found.shape.p_value.reshape(lead),
         first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
         picture=picture,
+        saturated=saturation.reshape(lead),
         bias=np.zeros(count),
-        u_bias=np.full(count, np.nan),
+        u_bias=np.full((*lead, count), np.nan),
     )
 
 

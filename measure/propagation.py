@@ -144,11 +144,11 @@ def _responses(
     """Derivative of lines and circles (`Seen`) by the pixels, (q, pixels), and which of them have none, bool (q,)."""
     layout, parts = layout_of(picture), [sparse.csr_array((0, clean.size))]
     if layout.names:
-        parts.append(sparse.csr_array(_of_lines(clean, picture, layout, found, estimator, threshold)))
+        parts.append(_of_lines(clean, picture, layout, found, estimator, threshold))
     for name, circle in zip(found.known.circles, found.circles, strict=True):
         good = str(circle.state[0]) in status.MEASURED
         told = circle_response(clean, picture, name) if good else _none(circle.errors.shape[1], clean.size)
-        parts.append(sparse.csr_array(told))
+        parts.append(told)
     rows = sparse.vstack(parts, format="csr")  # few of the pixels of a large image
     lost = np.array([not np.isfinite(rows.data[start:stop]).all() for start, stop in pairwise(rows.indptr)], bool)
     rows.data[np.repeat(lost, np.diff(rows.indptr))] = 0.0
@@ -167,18 +167,21 @@ def _of_lines(
     found: MeasuredFeatures,
     estimator: str,
     threshold: float | None,
-) -> np.ndarray | sparse.csr_array:
+) -> sparse.csr_array:
     """Of the lines, (2 E, pixels); NaN where there is none."""
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     if isinstance(tool, ArrangementEstimator):
         if str(found.shape.status[0]) not in status.MEASURED:
             return _none(2 * len(layout.names), clean.size)
-        return arranged.line_response(tool, layout, clean)
+        return sparse.csr_array(arranged.line_response(tool, layout, clean))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
-        rows = tool.respond(clean)
+        near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
-    rows[np.repeat(~measured, 2)] = np.nan
-    return rows
+    near[np.repeat(~measured, 2)] = np.nan
+    if not tool.pixels.size:
+        return _none(len(near), clean.size)
+    rows = sparse.csr_array(near)
+    return sparse.csr_array((rows.data, tool.pixels[rows.indices], rows.indptr), (len(near), clean.size))
 
 
 def _of_measured(gradient: np.ndarray, state: list[str]) -> np.ndarray:

@@ -28,7 +28,7 @@ from measure import Correction
 from render import variant as variants
 from scenes import ImageTexture, Picture
 from scenes.status import ALL
-from validation import simulation
+from validation import dimmed, simulation
 from validation.remeasured import Method
 from validation.simulation import How
 
@@ -49,6 +49,8 @@ class _Kept(BaseModel):
     covariance_image: list[_Numbers]
     simulated: list[Annotated[str, Field(max_length=40)]]
     renders: Annotated[int, Field(ge=1, le=1000)]
+    saturated: tuple[_Numbers, _Numbers] | None
+    """Least and most; null where there is no most."""
 
 
 def correction(picture: Picture, method: Method, how: How = How()) -> Correction:
@@ -91,7 +93,9 @@ def _digest(picture: Picture, method: Method, how: How) -> str:
 def _code() -> bytes:
     """Digest of the code that makes the numbers."""
     folders = [Path(package.__file__).parent for package in (scenes, imaging, render, measure)]
-    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [Path(simulation.__file__)]
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
+        Path(module.__file__) for module in (dimmed, simulation)
+    ]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()
 
 
@@ -109,8 +113,11 @@ def _read(file: Path, picture: Picture, method: Method) -> Correction | None:
         {name: _array(some, np.inf) for name, some in kept.sources.items()},
         {name: _array(some, np.inf) for name, some in kept.sources_image.items()},
         *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated), kept.renders,
+        saturated=kept.saturated and tuple(_array(limit, np.inf) for limit in kept.saturated),
     )  # fmt: skip
-    vectors = (found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values())
+    vectors = (
+        found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values(), *(found.saturated or ()),
+    )  # fmt: skip
     whole = all(each.shape == (count,) for each in vectors)
     whole &= all(each.shape == (count, count) for each in (found.covariance, found.covariance_image))
     return found if whole and len(found.simulated) == count and set(found.simulated) <= ALL else None
@@ -134,6 +141,7 @@ def _write(file: Path, found: Correction) -> None:
         "bias": found.bias, "bias_image": found.bias_image, "sources": found.sources,
         "sources_image": found.sources_image, "covariance": found.covariance,
         "covariance_image": found.covariance_image, "simulated": list(found.simulated), "renders": found.renders,
+        "saturated": found.saturated and list(found.saturated),
     }  # fmt: skip
     part = file.with_suffix(f".{os.getpid()}")
     with suppress(OSError):
@@ -146,6 +154,8 @@ def _plain(value):
     """Lists of numbers; null for what is not finite."""
     if isinstance(value, dict):
         return {name: _plain(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
     if isinstance(value, np.ndarray):
         return [_plain(inner) if inner.ndim else (float(inner) if np.isfinite(inner) else None) for inner in value]
     return value

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy import sparse
 
 from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
@@ -63,7 +64,7 @@ def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
     return _find(images, picture, name, unmoved(picture, name), _PASSES)
 
 
-def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarray:
+def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.csr_array:
     """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width)."""
     moved = unmoved(picture, name)
     for _ in range(_PASSES):
@@ -75,7 +76,7 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> np.ndarra
             break
         moved = _rounded(tool, np.array(moved) + change)
     taken = points.valid[0] & (tool.weights > 0)
-    return fit[0][:, taken] @ response[np.flatnonzero(taken)]
+    return sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
 
 
 def unmoved(picture: Picture, name: str) -> tuple[float, ...]:

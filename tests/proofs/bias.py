@@ -4,9 +4,10 @@ The part that is measured reflects otherwise than its scene says, each surface b
 to 1 % of its distance elsewhere; it is rendered with rays of its own. Who measures it knows nothing of that: the bias
 of the scene as it stands is simulated and taken off. Over u(bias), what is left of noise-free pictures scatters by 1
 where that tells it (the true picture's own render has noise, too, which a camera's has not: it is allowed for), and
-over the combined uncertainty single noisy values have to scatter by 1 within 10 %, beyond chance. Where trials are
-many and `--images 1`, each is another station: of the intervals value +- U, 95 %, 93 to 97 % have to hold the true
-value, beyond chance (`--stations`). Statistical textures are another part's in each.
+over the combined uncertainty single noisy values have to scatter by 1 within 10 %, beyond chance. Counted are values
+that are `ok`, both in the simulation and in their own pictures: one that is cut off at the end of the scale is not.
+Where trials are many and `--images 1`, each is another station: of the intervals value +- U, 95 %, 93 to 97 % have to
+hold the true value, beyond chance (`--stations`). Statistical textures are another part's in each.
 """
 
 from __future__ import annotations
@@ -39,7 +40,10 @@ _SEEDS = 1000  # renders of true pictures begin here, corrections at 0
 
 @dataclass(frozen=True)
 class Pulls:
-    """What is left in true pictures, (trials, M): noise-free over u(bias), and noisy over the combined uncertainty."""
+    """What is left in true pictures, (trials, M): noise-free over u(bias), and noisy over the combined uncertainty.
+
+    NaN where a picture's own value is not `ok`.
+    """
 
     scene: str
     names: tuple[str, ...]
@@ -95,10 +99,16 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
         clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=everywhere))
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
-        left.append((found.value[0] - true) / np.sqrt(off.u_bias**2 - off.sources[RENDERING] ** 2 + off.beside**2))
-        noisy += list((found.value[1:] - true) / np.hypot(off.sigma, off.u_bias))
+        away = np.where(is_trusted(found.status), found.value - true, np.nan)
+        left.append(away[0] / np.hypot(_by_inputs(off), off.beside))
+        noisy += list(away[1:] / np.sqrt(off.sigma**2 + _by_inputs(off) ** 2 + off.beside**2))
     names = tuple(quantity.name for quantity in scene.quantities)
     return Pulls(scene.name, names, off.status, off.bias / off.sigma, np.array(left), np.array(noisy))
+
+
+def _by_inputs(off: measure.Correction) -> np.ndarray:
+    """Standard uncertainties (M,) of the biases by all but the renderer's noise: `beside` has that."""
+    return np.sqrt(np.maximum(off.u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
 
 
 def _true(picture: Picture, off: measure.Correction) -> np.ndarray:
@@ -131,17 +141,18 @@ def bias(
             print(
                 f"{found.scene} {picture.sensor} {name}: {found.status[m]}, bias {found.off[m]:+.2f} sigma taken off, "
                 f"left over u(bias) {rms(found.quiet[:, m]):.2f} rms, pull of values {rms(found.noisy[:, m]):.2f}, "
-                f"held by 95 % intervals {held(found.noisy[:, m]):.3f}",
+                f"held by 95 % intervals {held(found.noisy[:, m]):.3f}, "
+                f"not ok {np.mean(np.isnan(found.noisy[:, m])):.3f}",
                 flush=True,
             )
         quiet.append(found.quiet[:, found.trusted].ravel())
         noisy.append(found.noisy[:, found.trusted].ravel())
-    spread, count = rms(np.concatenate(noisy)), sum(each.size for each in noisy)
+    values = np.concatenate(noisy)
+    spread, count = rms(values), int(np.isfinite(values).sum())
     low, high = np.sqrt(stats.chi2.ppf((0.005, 0.995), count) / count)
     print(f"All: left over u(bias) {rms(np.concatenate(quiet)):.3f}, pulls {spread:.3f}; 1 within 10 % is asked.")
     if stations:
-        values = np.concatenate(noisy)
-        inside, count = int(np.sum(np.abs(values) <= _K)), int(np.isfinite(values).sum())
+        inside = int(np.sum(np.abs(values) <= _K))
         low, high = stats.binomtest(inside, count).proportion_ci(0.99)
         print(f"{inside} of {count} intervals hold the true value: {inside / count:.3f} [{low:.3f}, {high:.3f}]")
         raise typer.Exit(0 if low <= MOST and high >= LEAST else 1)

@@ -9,13 +9,12 @@ import numpy as np
 from rich.table import Table
 
 from planner.uncertainty.conformity import COVERAGE
-from scenes.status import is_trusted
+from scenes.status import CLUTTER, is_trusted
 from validation.report import cells
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
-    from scenes import Picture
 
 
 def facts(found: measure.Measurements) -> list[dict[str, Any]]:
@@ -46,15 +45,24 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     return plain(rows)
 
 
-def reasons(rows: list[dict[str, Any]], picture: Picture) -> list[str]:
+def reasons(rows: list[dict[str, Any]], found: measure.Measurements) -> list[str]:
     """What decided each record's status, with its number; empty where it is ``ok``, or nothing more is known."""
+    picture = found.picture
     if not picture.lights or all(is_trusted(row["status"]) for row in rows):
         return [""] * len(rows)
     import planner
 
     told = planner.predict(picture).measurands
-    why = (each.why(row["status"], row["u_bias"], row["sigma"]) for each, row in zip(told, rows, strict=True))
+    why = [each.why(row["status"], row["u_bias"], row["sigma"]) for each, row in zip(told, rows, strict=True)]
+    if found.saturated > 0:
+        cut = np.isinf(found.u_bias) & (found.status == CLUTTER)
+        why = [_saturated(int(found.saturated)) if at else text for at, text in zip(cut, why, strict=True)]
     return [f"{row['name']}: {text}" if text else "" for row, text in zip(rows, why, strict=True)]
+
+
+def _saturated(count: int) -> str:
+    pixels = "1 pixel near the edges is" if count == 1 else f"{count} pixels near the edges are"
+    return f"{pixels} at the end of the sensor's scale, not as in the simulation, whose bias is another one"
 
 
 def covariance(found: measure.Measurements) -> list[list[float | None]]:

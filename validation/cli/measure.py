@@ -106,7 +106,7 @@ def measure_command(
         found = measure.measure(picture, shown, estimator=estimator, threshold=threshold)
     else:
         found = _corrected(picture, shown, estimator, threshold)
-    _say_measurands(file, found, found.first if known.task is not None else None, as_json, shown)
+    _say_measurands(file, found, found.first if known.task is not None else None, as_json)
 
 
 def _corrected(
@@ -148,7 +148,6 @@ def _say_measurands(
     found: measure.Measurements,
     distance: measure.Measurement | None,
     as_json: bool,
-    picture: scenes.Picture,
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)
@@ -160,7 +159,7 @@ def _say_measurands(
     else:
         shown = console()
         shown.print(measurands.table(rows))
-        for line in legend([row["status"] for row in rows], measurands.reasons(rows, picture)):
+        for line in legend([row["status"] for row in rows], measurands.reasons(rows, found)):
             shown.print(f" {line}", highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)

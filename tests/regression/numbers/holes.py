@@ -67,8 +67,8 @@ def _rims(name, which, lit=True):
         "found": rims.find_circle(images, picture, which), "away": rims.find_circle(away, picture, which),
         "once": rims._find(away, picture, which, rims.unmoved(picture, which), 0),
         "far": rims._is_far(tool, off), "rounded": [rims._rounded(tool, row) for row in off],
-        "response": rims.circle_response(images[0], picture, which), "measured": rims._measured(images, near),
-        "away again": rims.circle_response(away[0], picture, which),
+        "response": rims.circle_response(images[0], picture, which).toarray(), "measured": rims._measured(images, near),
+        "away again": rims.circle_response(away[0], picture, which).toarray(),
     }  # fmt: skip
 
 
