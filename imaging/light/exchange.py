@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _PATCHES = 400  # of the whole body
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
+_REFLECTED = 128  # rays of a place that is asked what lit faces it sees
 _CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
 _LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell,
 _ACROSS = 3  # and a cell across facets of a curved surface, from one to the next of which light changes little
@@ -422,6 +423,23 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     lends = np.eye(exchange.tree.n) - exchange.means(white)[:, None] * exchange.between
     sent = np.linalg.solve(lends, exchange.means(white * direct))
     return Exchanged(scene, emitters, exchange, exchange.between @ sent)
+
+
+def once_reflected(
+    scene: Scene, emitters: tuple[Emitter, ...], points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]
+) -> np.ndarray:
+    """Irradiance of points (n, 3) of unit normals by light that met one other face of the bodies, (n,).
+
+    Each sees others by other rays; facets ``own`` of the surface that the points lie on are none.
+    """
+    bodies, shifts = scene.bodies, _square(len(points))
+    ways = _ways(normals, (_square(_REFLECTED) + shifts[:, None]) % 1.0)
+    starts = np.broadcast_to((points + _LIFT * bodies.extent * normals)[:, None], ways.shape)
+    face, t = first_face(bodies, starts, ways, own)
+    point, ray = np.nonzero(face >= 0)
+    met, faces = starts[point, ray] + t[point, ray, None] * ways[point, ray], face[point, ray]
+    lit = sum(_arriving(scene, each, met, bodies.normals[faces]) for each in emitters)
+    return np.bincount(point, _white(scene, faces) * lit, len(points)) / _REFLECTED
 
 
 def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:

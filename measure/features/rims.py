@@ -15,8 +15,7 @@ from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
 from imaging.features.rim_look import RimLook, look, places_around
 from imaging.features.rim_outline import facets, smooth_outline
-from imaging.features.rim_sides import angles_of, clearance, outward_normals, radials, seen_along, within_ends
-from imaging.features.seen import plane_axes
+from imaging.features.rim_sides import clearance, outward_normals, seen_along, within_ends
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
@@ -44,7 +43,7 @@ class Circles:
     Attributes
     ----------
     errors : ndarray, shape (n, p)
-        Shifts of the centre along the plane's two axes (`imaging.features.seen.plane_axes`) and change of the radius;
+        Shifts of the centre along the plane's two axes (`Circle.axes`) and change of the radius;
         of a curved surface those of `Curved.parameters`, of a cone four.
     covariance : ndarray, shape (n, p, p)
     state : ndarray of str, shape (n,)
@@ -156,10 +155,10 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         return limb_tool(picture, solid.round(name), moved)
     optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
-    angle = angles_of(nominal, _places(pictures, nominal, optics))
+    angle = nominal.angles(_places(pictures, nominal, optics))
     circle = _with_errors(nominal, moved)
-    one, two = plane_axes(circle.axis)
-    radial = radials(circle, angle)
+    one, two = circle.axes
+    radial = circle.spokes(angle)
     spokes = radial * (circle.radius * facets(solid, nominal, angle))[:, None]
     ideal = project_ideal(circle.centre + spokes, pictures.sensors, scene.camera)
     normal, slope, speed = outward_normals(pictures, circle, angle)
@@ -199,7 +198,7 @@ def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     return replace(circle, centre=circle.centre + errors[0] * one + errors[1] * two, radius=circle.radius + errors[2])
 
 

@@ -12,7 +12,7 @@ import scenes
 from imaging.features.circles import LEAST_SEEN, rim
 from imaging.features.locator import reach
 from imaging.features.rim_look import look
-from imaging.features.rim_sides import angles_of, equal_angles, radials, within_ends
+from imaging.features.rim_sides import within_ends
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
 from measure.features.rims import find_circle
@@ -157,15 +157,15 @@ def corner(tmp_path_factory):
 def test_places_lie_between_the_ends(corner):
     """In equal steps; of a whole circle all around as ever."""
     _, arc, _ = corner
-    places = arc.centre + arc.radius * radials(arc, angles_of(arc, 8))
+    places = arc.at(arc.angles(8))
     np.testing.assert_allclose(places, arc.around(17)[1::2], atol=1e-9)
-    np.testing.assert_array_equal(angles_of(replace(arc, ends=None), 8), equal_angles(8))
+    np.testing.assert_allclose(replace(arc, ends=None).angles(8), 2 * np.pi * (np.arange(8) + 0.5) / 8)
 
 
 def test_places_near_the_ends_are_none(corner):
     """By the reach of the locator, in the image."""
     scene, arc, pictures = corner
-    angle = angles_of(arc, 400)
+    angle = arc.angles(400)
     scale = scene.camera.focal_px / scene.camera.distance
     away = scale * arc.radius * np.minimum(angle - angle[0], angle[-1] - angle)
     kept = within_ends(pictures, arc, angle)
@@ -174,7 +174,7 @@ def test_places_near_the_ends_are_none(corner):
     assert not kept[away < 0.9 * far].any()
     assert within_ends(pictures, replace(arc, ends=None), angle).all()
     seen = rim(pictures, arc)
-    assert (seen.squared[~within_ends(pictures, arc, angles_of(arc, seen.squared.size))] == 0).all()
+    assert (seen.squared[~within_ends(pictures, arc, arc.angles(seen.squared.size))] == 0).all()
     assert seen.left == pytest.approx(0.25 * kept.mean(), abs=0.01)
 
 
@@ -190,10 +190,10 @@ def test_a_look_is_told_between_its_places_and_not_beyond(corner):
     """At the places themselves as it is; beyond the last one as there."""
     _, arc, pictures = corner
     seen = look(pictures, arc)
-    again = seen.at(angles_of(arc, seen.shift.size))
+    again = seen.at(arc.angles(seen.shift.size))
     np.testing.assert_allclose(again.squared, seen.squared)
     np.testing.assert_array_equal(again.good, seen.good)
-    ends = seen.at(np.array([seen.begin, seen.begin + seen.turn]))
+    ends = seen.at(np.array([arc.begin, arc.begin + arc.turn]))
     np.testing.assert_allclose(ends.squared, seen.squared[[0, -1]])
 
 
@@ -217,7 +217,7 @@ def _off(scene, phase=0.0, move=0.0):
     image = polygon_image(outline, (camera.height, camera.width), camera.blur_px)
     found = find_circle(image[None], Picture.of(scene, (0, 0)), arc.name)
     assert found.state == ["ok"]
-    return found.errors[0] * camera.focal_px / camera.distance - [move, -move, 0.0]
+    return found.errors[0] * camera.focal_px / camera.distance - [move, move, 0.0]
 
 
 PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
