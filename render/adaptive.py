@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from imaging.features.limb_outline import limb_outline
 from imaging.features.projected_edges import circles, projected_edges
-from imaging.features.rim_sides import angles_of, radials
+from imaging.features.rim_sides import RIM_POINTS
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project
 from imaging.pictures import Pictures
@@ -90,7 +90,7 @@ def _around(picture: Picture) -> list[np.ndarray]:
         if isinstance(circle, Curved):
             pieces += limb_pieces(picture, circle)
             continue
-        places = circle.centre + circle.radius * radials(circle, angles_of(circle))
+        places = circle.at(circle.angles(RIM_POINTS))
         rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
         whole = np.stack([rim, np.roll(rim, -1, 0)], 1)
         pieces += list(whole if circle.ends is None else whole[:-1])

@@ -14,17 +14,14 @@ from imaging.features.locator import reach
 from imaging.features.rim_look import look
 from imaging.features.rim_sides import (
     RIM_POINTS,
-    angles_of,
     clearance,
     contrast_along,
     outward_normals,
-    radials,
     seen_along,
     shading_shift,
     steady,
     within_ends,
 )
-from imaging.features.seen import plane_axes
 from imaging.pictures import Pictures
 from scenes import Circle
 
@@ -94,9 +91,9 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     """
     scene = pictures.scene
     seen = look(pictures, circle) if fall_off and pictures.closely else None
-    angle = angles_of(circle, RIM_POINTS if seen is None else seen.shift.size)
-    one, two = plane_axes(circle.axis)
-    radial = radials(circle, angle)
+    angle = circle.angles(RIM_POINTS if seen is None else seen.shift.size)
+    one, two = circle.axes
+    radial = circle.spokes(angle)
     normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("...ni,...nij->...nj", normal, slope)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)

@@ -1,12 +1,14 @@
-"""Light that other things send to a limb and no formula knows: from a floor, from obstacles."""
+"""Light that other things send to a limb and no formula knows: from a floor, obstacles, other faces of the part."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from imaging.features.limb_outline import LimbOutline
+from imaging.light.between import reflected_share
+from imaging.light.revolved import rings_of
 from imaging.pictures import Pictures
-from scenes import Scene
+from scenes import Curved, Scene
 
 _MOST = 5e-3  # of the light that arrives: a fifth of it moves a ball's limb by some 5 sigma of its diameter
 
@@ -28,6 +30,21 @@ def unlent(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
             highest = np.maximum(highest, sine)
         lent = lent + _white(scene) * highest**2
     return lent <= _MOST
+
+
+def unlent_by_faces(pictures: Pictures, curved: Curved, outline: LimbOutline) -> np.ndarray:
+    """Which places have next to no light from the part's other faces, bool, shape (..., n).
+
+    Of a part that is turned as a whole that light is known (`imaging.light.revolved`); it is looked for in pictures
+    that are looked at closely.
+    """
+    scene, found = pictures.scene, np.ones(outline.arc.shape, bool)
+    if not pictures.closely or scene.bodies.is_convex or rings_of(scene.solid) is not None:
+        return found
+    there = outline.seen
+    share = reflected_share(pictures, outline.points[there], outline.normals[there], curved.faces)
+    found[there] = share <= _MOST
+    return found
 
 
 def _white(scene: Scene) -> float:

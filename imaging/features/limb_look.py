@@ -10,11 +10,11 @@ from numpy.polynomial import chebyshev
 
 from imaging import sensor
 from imaging.contours.shading import Profile, fitted
-from imaging.features.limb_lent import unlent
+from imaging.features.limb_lent import unlent, unlent_by_faces
 from imaging.features.limb_locator import box_cumulant, limb_crossing
 from imaging.features.limb_outline import LimbOutline, clear_of_ends, framed
 from imaging.features.locator import edge_blur, reach
-from imaging.features.rim_sides import equal_angles, radials, steady, to_curve
+from imaging.features.rim_sides import RIM_POINTS, steady, to_curve
 from imaging.features.sampling import sampled_places
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis, rays
@@ -107,9 +107,10 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
 def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
     """Places that neither the end of their line, nor a rim or edge of the part, nor a shadow's end disturbs, (..., n).
 
-    Nor light that a floor or an obstacle sends there.
+    Nor light that a floor, an obstacle or another face of the part sends there.
     """
     scene, found = pictures.scene, clear_of_ends(outline, pictures.scene) & unlent(pictures, outline)
+    found = found & unlent_by_faces(pictures, curved, outline)
     if scene.bodies.is_convex:
         return found
     far = reach(scene.locator.scale_px, scene.camera.blur_px)
@@ -119,7 +120,7 @@ def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, se
 
 
 def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarray:
-    """Places nearer than ``far`` px to a rim or a sharp edge that the sensor sees, bool, shape (..., n)."""
+    """Places nearer than ``far`` px to an edge of the part that the sensor sees, bool, shape (..., n)."""
     solid, sensors, eyes = pictures.scene.solid, pictures.sensors, pictures.sensor_at
     at, found = np.nan_to_num(outline.at, nan=1e9), np.zeros(outline.at.shape[:-1], bool)
     low = np.nan_to_num(outline.at, nan=np.inf).min(-2) - far
@@ -136,12 +137,12 @@ def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarr
         eye, to = np.broadcast_arrays(eyes[rows][:, None], places)
         return first_face(pictures.scene.bodies, eye, to - eye, ())[1] > 1 - _BEFORE
 
-    for circle in solid.circles:
-        places = circle.centre + circle.radius * radials(circle, equal_angles())
+    for rim in solid.rims:
+        places = rim.at(rim.angles(RIM_POINTS))
         rows = is_near(image(places)[..., None, :, :])[..., 0]
         if rows.any():
-            found[rows] |= to_curve(at[rows], image(places, rows), shown(places, rows)) < far
-    ends = solid.vertices[np.array([edge.ends for edge in solid.sharp], int)].reshape(-1, 2, 3)
+            found[rows] |= to_curve(at[rows], image(places, rows), rim.joined(shown(places, rows))) < far
+    ends = solid.vertices[np.array([edge.ends for edge in solid.lines], int)].reshape(-1, 2, 3)
     near = is_near(image(ends.reshape(-1, 3)).reshape(*at.shape[:-2], -1, 2, 2))
     for number in np.flatnonzero(near.any(tuple(range(near.ndim - 1)))):
         rows, (start, stop) = near[..., number], ends[number]

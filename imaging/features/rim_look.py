@@ -14,7 +14,7 @@ import numpy as np
 from imaging import sensor
 from imaging.features.locator import edge_blur
 from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
-from imaging.features.rim_sides import RIM_POINTS, angles_of, begin_of, outward_normals, radials
+from imaging.features.rim_sides import RIM_POINTS, outward_normals
 from imaging.geometry.lens import image_centre, lens_jacobian
 from imaging.geometry.projection import from_axis, rays
 from imaging.light.appearance import seen_by_rays
@@ -51,32 +51,30 @@ class RimLook:
         Mean of both sides, grey levels^2.
     good : ndarray of bool, shape (n,)
         Where the shift can be trusted: the crossing is near, about as steep as a lone step's, and as its neighbours.
-    begin, turn : float
-        Of an arc the angle at which it begins, and how much of a turn it takes, rad.
+    circle : Circle
+        Whose angles they are.
     """
 
     shift: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray
     good: np.ndarray
-    begin: float = 0.0
-    turn: float = 2 * np.pi
+    circle: Circle
 
     def at(self, angle: np.ndarray) -> RimLook:
         """The same at other angles (m,), between the places; good where both neighbours are."""
-        count, whole = self.shift.size, self.turn == 2 * np.pi
-        place = (angle - self.begin) / self.turn * count - 0.5
-        place = place % count if whole else np.clip(place, 0, count - 1)
+        count = self.shift.size
+        place = self.circle.steps(angle, count)
         first, share = place.astype(int) % count, place - place.astype(int)
         then = (first + 1) % count
         told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
         good = (self.good[first] | (share > 1 - _AT)) & (self.good[then] | (share < _AT))
-        return RimLook(*told, good)
+        return RimLook(*told, good, self.circle)
 
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
     """Number of places on a rim, about ``spacing`` px apart in one picture: `RIM_POINTS`, or 2 to ``most`` times it."""
-    places = circle.centre + circle.radius * radials(circle, angles_of(circle))
+    places = circle.at(circle.angles(RIM_POINTS))
     rim = from_axis(places, pictures.sensors, pictures.scene.camera)
     steps = np.linalg.norm(rim - np.roll(rim, 1, 0), axis=-1)
     length = np.nan_to_num(steps if circle.ends is None else steps[1:]).sum()
@@ -90,7 +88,7 @@ def look(pictures: Pictures, circle: Circle) -> RimLook:
 
 def _look(pictures: Pictures, circle: Circle) -> RimLook:
     scene = pictures.scene
-    angle = angles_of(circle, places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
+    angle = circle.angles(places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
     normals, width, where = _outline(pictures, circle, angle)
     levels = _levels(pictures, circle, angle, normals, width, where)
     alone = zero_of_steps(where, _SHARES)
@@ -105,7 +103,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
     squared = np.nan_to_num(slope) ** 2
-    return RimLook(shift, squared, noise, good & _steady(moved, slope), begin_of(circle), circle.turn)
+    return RimLook(shift, squared, noise, good & _steady(moved, slope), circle)
 
 
 def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:
@@ -130,7 +128,7 @@ def _outline(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.
 
 def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Image points (n, 2) of the mesh's rim from the image's middle, ideal px."""
-    spokes = radials(circle, angle) * (circle.radius * facets(pictures.scene.solid, circle, angle))[:, None]
+    spokes = circle.spokes(angle) * (circle.radius * facets(pictures.scene.solid, circle, angle))[:, None]
     return from_axis(circle.centre + spokes, pictures.sensors, pictures.scene.camera)
 
 

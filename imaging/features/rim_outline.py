@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from imaging.features.seen import plane_axes
 from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
 from scenes import Circle, Solid
@@ -20,7 +19,7 @@ def facets(solid: Solid, circle: Circle, angle: np.ndarray) -> np.ndarray:
 
     The picture is one of the mesh: between its vertices, which lie on the circle, the rim runs inside it.
     """
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     first, last = np.moveaxis((_pieces(solid, circle) - circle.centre) @ np.stack([one, two], -1), 1, 0)
     toward = np.stack([np.cos(angle), np.sin(angle)], -1)
     along = last - first

@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 
 from imaging.features.locator import edge_blur, reach
-from imaging.features.seen import plane_axes
 from imaging.geometry.projection import from_axis, jacobian_ideal
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, face_signal, of_sides
@@ -22,27 +21,6 @@ _AT_ONCE = 1 << 17  # numbers
 _STEP = 0.25  # px that a slope is taken over
 
 
-def equal_angles(count: int = RIM_POINTS) -> np.ndarray:
-    """Angles all around a rim."""
-    return 2 * np.pi * (np.arange(count) + 0.5) / count
-
-
-def angles_of(circle: Circle, count: int = RIM_POINTS) -> np.ndarray:
-    """The same of a circle; of an arc from its beginning to its end, so that nothing is sought where it is not."""
-    if circle.ends is None:
-        return equal_angles(count)
-    return begin_of(circle) + circle.turn * (np.arange(count) + 0.5) / count
-
-
-def begin_of(circle: Circle) -> float:
-    """Angle at which an arc begins, rad; 0 of a whole circle."""
-    if circle.ends is None:
-        return 0.0
-    one, two = plane_axes(circle.axis)
-    first = circle.ends[0] - circle.centre
-    return float(np.arctan2(first @ two, first @ one))
-
-
 def within_ends(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Whether places at angles of an arc are farther from its ends than disturbs a locator, bool, shape (..., n).
 
@@ -51,23 +29,17 @@ def within_ends(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.nda
     if circle.ends is None:
         return np.ones((*pictures.sensors.shape[:-1], angle.size), bool)
     scene = pictures.scene
-    there = _image(pictures, circle.centre + circle.radius * radials(circle, angle))
+    there = _image(pictures, circle.at(angle))
     ends = _image(pictures, circle.ends)
     nearest = np.linalg.norm(there[..., None, :] - ends[..., None, :, :], axis=-1).min(-1)
     return nearest >= reach(scene.locator.scale_px, scene.camera.blur_px)
 
 
-def radials(circle: Circle, angle: np.ndarray) -> np.ndarray:
-    """Unit vectors from a circle's centre, shape (n, 3)."""
-    one, two = plane_axes(circle.axis)
-    return np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
-
-
 def outward_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the rim's image: unit normals away from its middle (..., n, 2), the projection's derivative (..., n, 2, 3),
     and image lengths for a radian (..., n), ideal px."""
-    one, two = plane_axes(circle.axis)
-    radial = radials(circle, angle)
+    one, two = circle.axes
+    radial = circle.spokes(angle)
     slope = jacobian_ideal(circle.centre + circle.radius * radial, pictures.sensors, pictures.scene.camera)
     step = circle.radius * (np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one)
     tangent = np.einsum("...nij,nj->...ni", slope, step)
@@ -84,9 +56,9 @@ def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.n
     smoothed edge. Along a wall that is seen at a slant the brightness changes across the rim as it does around it.
     """
     scene = pictures.scene
-    radial = radials(circle, angle)
+    radial = circle.spokes(angle)
     points = circle.centre + circle.radius * radial
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     along = np.cos(angle)[:, None] * two - np.sin(angle)[:, None] * one
     normal, slope, _ = outward_normals(pictures, circle, angle)
     sense = 1.0 if circle.hole else -1.0  # the face lies outside a hole, inside the end of a cylinder
@@ -153,7 +125,7 @@ def contrast_along(
 
 def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     """Whether the sensor sees a rim at angles, whatever the light, bool, shape (..., n)."""
-    radial = radials(circle, angle)
+    radial = circle.spokes(angle)
     points = circle.centre + circle.radius * radial
     sensor_at = pictures.sensor_at[..., None, :]
     turned = [
@@ -169,18 +141,17 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
     Boundaries are the straight edges of the face, and the wall's other rim where the wall at it is turned to the
     sensor, beside the place or seen through the hole; of an arc also the edges of its wall at its ends.
     """
-    solid, radial = pictures.scene.solid, radials(circle, angle)
+    solid, radial = pictures.scene.solid, circle.spokes(angle)
     points = circle.centre + circle.radius * radial
     there = _image(pictures, points)
     nearest = np.full(there.shape[:-1], np.inf)
-    for other in solid.circles if circle.ends is None else solid.rims:
+    for other in solid.rims:
         if _coaxial(circle, other):
-            spokes = radials(other, angles_of(other))
+            spokes = other.spokes(other.angles(RIM_POINTS))
             far = other.centre + other.radius * spokes
             wall = -spokes if other.hole else spokes
             turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
-            turned[..., -1] &= other.ends is None
-            nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), turned))
+            nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), other.joined(turned)))
     ends = _image(pictures, _straight_around(solid, circle))
     return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
 
@@ -261,7 +232,7 @@ def _narrowest(solid: Solid, circle: Circle) -> float:
 
 def _sides_at(pictures: Pictures, circle: Circle, angle: np.ndarray, fall_off: bool) -> np.ndarray:
     """Signals of both sides at angles of a rim, as `_sides` gives them; made once."""
-    radial = radials(circle, angle)
+    radial = circle.spokes(angle)
     points = circle.centre + circle.radius * radial
     key = "sides", circle.name, angle.tobytes(), fall_off
     return pictures.once(key, lambda: _sides(pictures, circle, points, radial, fall_off))

@@ -136,7 +136,7 @@ class Seen:
 
     def sideways(self, each: Circle | Curved) -> tuple[np.ndarray, np.ndarray]:
         """The two directions (..., 3) in which the centre of a circle or a curved surface is found."""
-        return each.sideways(self.eye) if isinstance(each, Curved) else plane_axes(each.axis)
+        return each.sideways(self.eye) if isinstance(each, Curved) else each.axes
 
     def depth(self, places: np.ndarray) -> np.ndarray:
         """Distance of places (..., 3) from the sensor along its axis, shape (...)."""
@@ -201,14 +201,6 @@ def corner_response(pair: np.ndarray) -> np.ndarray:
     (a1, b1), (a2, b2) = (np.moveaxis(pair[..., k, :], -1, 0) for k in (0, 1))
     rows = np.stack([np.stack([b2, -b1], -1), np.stack([-a2, a1], -1)], -2)
     return rows / (a1 * b2 - a2 * b1)[..., None, None]
-
-
-def plane_axes(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two perpendicular unit vectors in the plane of a unit normal (3,)."""
-    helper = np.eye(3)[np.argmin(np.abs(axis))]
-    one = np.cross(axis, helper)
-    one /= np.linalg.norm(one)
-    return one, np.cross(axis, one)
 
 
 def half_angle_of(each: Circle | Curved) -> float:

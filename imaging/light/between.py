@@ -9,7 +9,8 @@ import numpy as np
 
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters
-from imaging.light.exchange import Exchanged, exchanged
+from imaging.light.exchange import Exchanged, exchanged, once_reflected
+from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
 from scenes import Scene
 from scenes.lights import GLANCE
@@ -55,6 +56,14 @@ def left_of_dimmed(pictures: Pictures, part: float, points: np.ndarray, faces: n
     after = light_between(pictures.with_scene(scene.tried(material=dimmed)), points, faces)
     least = np.finfo(float).tiny
     return np.where(before > least, after / np.maximum(before, least), np.nan)
+
+
+def reflected_share(pictures: Pictures, points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]) -> np.ndarray:
+    """Light that met one other face of the bodies over what comes from the lights themselves where nothing is in their
+    way, at points (n, 3) of unit normals, (n,); ``own`` are the facets of the surface that they lie on."""
+    shining = tuple(_plain(emitter) for emitter in emitters(pictures.scene, pictures.lights, GLANCE))
+    direct = sum(beam(emitter, points).strength for emitter in shining)
+    return once_reflected(pictures.scene, shining, points, normals, own) / direct
 
 
 def is_exchanged(scene: Scene) -> bool:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from imaging.features.seen import plane_axes
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.exchange import Exchange, Exchanged, Hits
@@ -90,7 +89,7 @@ def light_in_bore(
 
 def place_in(bore: Bore, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angle and depth below the rim of points (..., 3) on the wall."""
-    one, two = plane_axes(bore.rim.axis)
+    one, two = bore.rim.axes
     away = points - bore.rim.centre
     return np.arctan2(away @ two, away @ one) % (2 * np.pi), np.clip(-away @ bore.rim.axis, 0, bore.length)
 
@@ -98,7 +97,7 @@ def place_in(bore: Bore, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _on_wall(bore: Bore, depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places before the facets at the patches' angles and some depths, and the wall's normals, (around, depths, 3)."""
     angle = (np.arange(_AROUND) + 0.5) * 2 * np.pi / _AROUND
-    one, two = plane_axes(bore.rim.axis)
+    one, two = bore.rim.axes
     radial = np.cos(angle)[:, None, None] * one + np.sin(angle)[:, None, None] * two
     points = bore.rim.centre + _WITHIN * bore.free_radius * radial - depth[:, None] * bore.rim.axis
     return points, np.broadcast_to(-radial, points.shape)

@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 
 _PATCHES = 400  # of the whole body
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
-_FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a face that is narrower than a cell
+_FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
+_REFLECTED = 128  # rays of a place that is asked what lit faces it sees
 _CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
-_LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell
+_LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell,
+_ACROSS = 3  # and a cell across facets of a curved surface, from one to the next of which light changes little
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
@@ -109,7 +111,7 @@ class Exchange:
     @cached_property
     def between(self) -> np.ndarray:
         """Form factors between patches, (p, p)."""
-        met = self.met(self.places.points, self.places.normals, _RAYS, turned=True)
+        met = self.met(self.places.points, self.places.normals, _RAYS, _square(len(self.places.points)))
         count = self.tree.n
         pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
         return pairs.reshape(count, count) / (_RAYS * np.bincount(self.patches)[:, None])
@@ -118,10 +120,12 @@ class Exchange:
         """Of values (m,) at places those of patches, (p,)."""
         return np.bincount(self.patches, values) / np.bincount(self.patches)
 
-    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, *, turned: bool = False) -> Hits:
-        """What so many rays from each of points (n, 3) of unit normals meet; ``turned``: others from each."""
-        size = max(1, _AT_ONCE // rays)
-        shifts = _square(len(points)) if turned else np.zeros((len(points), 2))
+    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifts: np.ndarray = np.zeros(2)) -> Hits:
+        """What so many rays from each of points (n, 3) of unit normals meet.
+
+        Others with other ``shifts`` of the unit square that they stand for, (2,) or (n, 2).
+        """
+        size, shifts = max(1, _AT_ONCE // rays), np.broadcast_to(shifts, (len(points), 2))
         parts = []
         for at in range(0, len(points), size):
             part = slice(at, at + size)
@@ -234,8 +238,12 @@ def _told(light: Exchanged, face: int) -> Told:
     sheet = _sheet(light.exchange, face)
     shape = sheet.u.size, sheet.v.size
     values = light.gathered(sheet.met, shape[0] * shape[1], sheet.rays).reshape(shape)
-    along, across = (min(3, n - 1) for n in shape)
-    return Told(sheet.frame, RectBivariateSpline(sheet.u, sheet.v, values, kx=along, ky=across))
+    places = [sheet.u, sheet.v]
+    for axis, (size, count) in enumerate(zip(sheet.frame.size, shape, strict=True)):
+        if count == 1:
+            places[axis], values = np.array([0.0, size]), np.repeat(values, 2, axis)
+    along, across = (min(3, n - 1) for n in values.shape)
+    return Told(sheet.frame, RectBivariateSpline(*places, values, kx=along, ky=across))
 
 
 @lru_cache(maxsize=4)
@@ -313,15 +321,44 @@ def _sheet(exchange: Exchange, face: int) -> Sheet:
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
     solid, cell = exchange.solid, exchange.cell * np.sqrt(_PATCHES / _CELLS)
-    frame = _frame(solid, face)
-    small = frame.size < cell
-    counts = np.ceil(frame.size / cell * np.where(small, _LEAST, 1)).astype(int).clip(np.where(small, 1, _LEAST))
-    u, v = (s * (1 - np.cos(np.pi * np.arange(n + 2) / (n + 1))) / 2 for n, s in zip(counts, frame.size, strict=True))
-    a, b = (np.clip(n, _WITHIN * n[1], n[-1] - _WITHIN * n[1]) for n in (u, v))
+    frame, facet = _frame(solid, face), not solid.plane[face]
+    u, v = (_along(*each, cell) for each in zip(frame.size, _goes_on(solid, face, frame), strict=True))
+    within = [_WITHIN * n[n > 0][0] for n in (u, v)]
+    a, b = (np.clip(n, w, size - w) for n, w, size in zip((u, v), within, frame.size, strict=True))
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
-    nodes = _onto(solid, face, nodes, _WITHIN * min(u[1], v[1]))
-    rays = _FROM_SMALL if small.any() else _FROM_NODE
-    return Sheet(frame, u, v, exchange.met(nodes, np.broadcast_to(solid.normals[face], nodes.shape), rays), rays)
+    nodes = _onto(solid, face, nodes, min(within))
+    rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
+    shift = _square(face + 1)[-1] if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    normals = np.broadcast_to(solid.normals[face], nodes.shape)
+    return Sheet(frame, u, v, exchange.met(nodes, normals, rays, shift), rays)
+
+
+def _along(size: float, goes_on: bool, cell: float) -> np.ndarray:
+    """Places of nodes along a side of a face's rectangle, denser at its ends; where the surface goes on beyond a side
+    that is shorter than a cell, the middles of equal pieces."""
+    if size < cell and goes_on:
+        count = int(np.ceil(_ACROSS * size / cell))
+        return (np.arange(count) + 0.5) * size / count
+    count = max(int(np.ceil(size / cell)), _LEAST) if size >= cell else int(np.ceil(_LEAST * size / cell))
+    return size * (1 - np.cos(np.pi * np.arange(count + 2) / (count + 1))) / 2
+
+
+def _goes_on(solid: Solid, face: int, frame: Frame) -> tuple[bool, bool]:
+    """Along which sides of a facet's rectangle its surface goes on: smooth edges run across them."""
+    ends = _smooth(solid).get(face, ())
+    across = np.abs((solid.vertices[[b for _, b in ends]] - solid.vertices[[a for a, _ in ends]]) @ frame.sides.T)
+    return bool((across[:, 1] > across[:, 0]).any()), bool((across[:, 0] > across[:, 1]).any())
+
+
+@lru_cache(maxsize=4)
+def _smooth(solid: Solid) -> dict[int, list[tuple[int, int]]]:
+    """Ends of the smooth edges of each facet of a curved surface."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for edge in solid.edges:
+        for face in edge.faces if edge.kind == "smooth" else ():
+            if not solid.plane[face]:
+                found.setdefault(face, []).append(edge.ends)
+    return found
 
 
 def _frame(solid: Solid, face: int) -> Frame:
@@ -386,6 +423,23 @@ def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, .
     lends = np.eye(exchange.tree.n) - exchange.means(white)[:, None] * exchange.between
     sent = np.linalg.solve(lends, exchange.means(white * direct))
     return Exchanged(scene, emitters, exchange, exchange.between @ sent)
+
+
+def once_reflected(
+    scene: Scene, emitters: tuple[Emitter, ...], points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]
+) -> np.ndarray:
+    """Irradiance of points (n, 3) of unit normals by light that met one other face of the bodies, (n,).
+
+    Each sees others by other rays; facets ``own`` of the surface that the points lie on are none.
+    """
+    bodies, shifts = scene.bodies, _square(len(points))
+    ways = _ways(normals, (_square(_REFLECTED) + shifts[:, None]) % 1.0)
+    starts = np.broadcast_to((points + _LIFT * bodies.extent * normals)[:, None], ways.shape)
+    face, t = first_face(bodies, starts, ways, own)
+    point, ray = np.nonzero(face >= 0)
+    met, faces = starts[point, ray] + t[point, ray, None] * ways[point, ray], face[point, ray]
+    lit = sum(_arriving(scene, each, met, bodies.normals[faces]) for each in emitters)
+    return np.bincount(point, _white(scene, faces) * lit, len(points)) / _REFLECTED
 
 
 def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:

@@ -16,15 +16,14 @@ from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
 from imaging.features.rim_look import RimLook, look, places_around
 from imaging.features.rim_outline import facets, smooth_outline
-from imaging.features.rim_sides import angles_of, clearance, outward_normals, radials, seen_along, within_ends
-from imaging.features.seen import plane_axes
+from imaging.features.rim_sides import clearance, outward_normals, seen_along, within_ends
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
-from measure.features.tools import RimTool, held
+from measure.features.tools import Curve, RimTool, held
 from scenes import Circle, Curved, Picture, status
 
 SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
@@ -45,7 +44,7 @@ class Circles:
     Attributes
     ----------
     errors : ndarray, shape (n, p)
-        Shifts of the centre along the plane's two axes (`imaging.features.seen.plane_axes`) and change of the radius;
+        Shifts of the centre along the plane's two axes (`Circle.axes`) and change of the radius;
         of a curved surface those of `Curved.parameters`, of a cone four.
     covariance : ndarray, shape (n, p, p)
     state : ndarray of str, shape (n,)
@@ -71,7 +70,7 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
         fit = tool.fit(points.valid)
-        change = (fit @ (points.offset + tool.inward)[..., None])[0, :, 0]
+        change = tool.solve(fit, points.offset)[0]
         if not _is_far(tool, change[None])[0]:
             break
         moved = _rounded(tool, np.array(moved) + change)
@@ -115,7 +114,7 @@ def _measured(images: np.ndarray, tool: RimTool) -> Circles:
     points = tool.locator.locate_each(images)
     taken = tool.weights > 0
     fit = tool.fit(points.valid)
-    errors = np.einsum("nim,nm->ni", fit, points.offset + tool.inward)
+    errors = tool.solve(fit, points.offset)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
     part = (points.valid & clear)[:, taken].mean(1)
     determined = np.isfinite(errors).all(1)
@@ -157,14 +156,14 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         return limb_tool(picture, solid.round(name), moved)
     optics, pictures = Optics.of(scene), Pictures.of(picture)
     nominal = solid.circle(name)
-    angle = angles_of(nominal, _places(pictures, nominal, optics))
+    angle = nominal.angles(_places(pictures, nominal, optics))
     circle = _with_errors(nominal, moved)
-    one, two = plane_axes(circle.axis)
-    radial = radials(circle, angle)
+    one, two = circle.axes
+    radial = circle.spokes(angle)
     spokes = radial * (circle.radius * facets(solid, nominal, angle))[:, None]
     ideal = project_ideal(circle.centre + spokes, pictures.sensors, scene.camera)
     normal, slope, speed = outward_normals(pictures, circle, angle)
-    across = np.einsum("ni,nij->nj", normal, slope)
+    across, along = (np.einsum("ni,nij->nj", each, slope) for each in (normal, normal[:, ::-1] * [-1, 1]))
     design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
     places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
     size = np.linalg.norm(gradient, axis=-1)
@@ -178,9 +177,12 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     taken = (weight > 0) & np.isfinite(inward)
     keep = np.flatnonzero(taken) if taken.any() else np.arange(1)
     weight, inward = np.where(taken, weight, 0.0), np.nan_to_num(inward)
-    recorded_normals = gradient / size[:, None]
-    locator = gradient_along(optics, angle[keep], held(places[keep], optics), recorded_normals[keep], size[keep])
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics)
+    curve = Curve(
+        held(places[keep], optics), (gradient / size[:, None])[keep], size[keep],
+        np.stack([along @ one, along @ two], -1)[keep], (design[:, 2] * circle.radius / (2 * speed**2))[keep],
+    )  # fmt: skip
+    locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve)
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
@@ -197,7 +199,7 @@ def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     return replace(circle, centre=circle.centre + errors[0] * one + errors[1] * two, radius=circle.radius + errors[2])
 
 

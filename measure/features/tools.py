@@ -7,8 +7,49 @@ from functools import cached_property
 
 import numpy as np
 
+from imaging.features.sampling import sampled_places
 from measure.estimators.crossing import CrossingLocator
 from measure.features.optics import Optics
+
+_PASSES = 3  # what is beside the first order is hundredths of a px, and changes by a part of that
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The image of a circle's rim at m places, where it is recorded.
+
+    Attributes
+    ----------
+    places, normals : ndarray, shape (m, 2)
+        In the recorded image, px, and unit normals there.
+    gain : ndarray, shape (m,)
+        Ideal px for a recorded one, across the curve.
+    along : ndarray, shape (m, 2)
+        Derivative of each place along its tangent by the two shifts of the centre, ideal px for the scene's unit.
+    bend : ndarray, shape (m,)
+        Half the curvature of the rim's image, 1 / ideal px.
+    """
+
+    places: np.ndarray
+    normals: np.ndarray
+    gain: np.ndarray
+    along: np.ndarray
+    bend: np.ndarray
+
+    def second_order(self, found: np.ndarray) -> np.ndarray:
+        """How far outwards the rim is beside the first order of the circle's errors (n, 3), ideal px, shape (n, m).
+
+        A circle that is shifted along its tangent turns away from it.
+        """
+        return -self.bend * (found[:, :2] @ self.along.T) ** 2
+
+    def sampled(self, moved: np.ndarray, optics: Optics) -> np.ndarray:
+        """How far outwards pixels move the crossings of a rim that lies ``moved`` outwards, both (n, m), ideal px.
+
+        It is a sine of the place where the rim runs along their rows or columns.
+        """
+        there = self.places + (moved / self.gain)[..., None] * self.normals
+        return self.gain * sampled_places(there, self.normals, optics.blur_px, optics.scale_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +69,8 @@ class RimTool:
     state : str
         ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
     optics : Optics
+    curve : Curve, optional
+        Of a circle, whose ``inward`` leaves out what depends on where it is found.
     """
 
     locator: CrossingLocator
@@ -36,6 +79,20 @@ class RimTool:
     inward: np.ndarray
     state: str
     optics: Optics
+    curve: Curve | None = None
+
+    def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        """The parameters (n, p) by a least-squares map (n, p, m) from offsets (n, m) of the crossings, ideal px.
+
+        What moves the crossings of a circle beside the first order is told where it is found.
+        """
+        found = np.einsum("nim,nm->ni", fit, offset + self.inward)
+        for _ in range(_PASSES if self.curve else 0):
+            near = np.nan_to_num(found)
+            second = self.curve.second_order(near)
+            more = second + self.curve.sampled(near @ self.design.T + second, self.optics)
+            found = np.einsum("nim,nm->ni", fit, offset + self.inward - more)
+        return found
 
     @cached_property
     def response(self):

@@ -17,7 +17,7 @@ from imaging.features.limb_outline import limb_outline
 from imaging.features.limbs import limb_rim
 from imaging.features.locator import MIN_CONTRAST
 from imaging.features.measurand import Measurands, measurands, normals
-from imaging.features.rim_sides import angles_of, outward_normals, radials
+from imaging.features.rim_sides import outward_normals
 from imaging.geometry.lens import undistorted
 from imaging.geometry.projection import edge_points, project_ideal
 from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
@@ -86,9 +86,9 @@ class Features:
                 found.append(self._limb(circle))
                 continue
             seen = rim(self.pictures, circle)
-            angle = angles_of(circle, seen.design.shape[-2])
+            angle = circle.angles(seen.design.shape[-2])
             normal, _, _ = outward_normals(self.pictures, circle, angle)
-            points = circle.centre + circle.radius * radials(circle, angle)
+            points = circle.at(angle)
             found.append((points, normal, _fit(seen)))
         return found
 

@@ -75,12 +75,47 @@ class Circle:
         first, last = self.ends - self.centre
         return math.atan2(np.cross(first, last) @ self.axis, first @ last) % (2 * math.pi)
 
+    @cached_property
+    def axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Two perpendicular unit vectors (3,) in its plane; angles go around it from the first to the second."""
+        return axes_beside(self.axis)
+
+    @cached_property
+    def begin(self) -> float:
+        """Angle at which it begins, rad: 0 for a whole circle."""
+        if self.ends is None:
+            return 0.0
+        one, two = self.axes
+        first = self.ends[0] - self.centre
+        return math.atan2(first @ two, first @ one)
+
+    def angles(self, count: int) -> np.ndarray:
+        """The middles of so many equal steps all around it, or from one end to the other, rad, shape (count,)."""
+        return self.begin + self.turn * (np.arange(count) + 0.5) / count
+
+    def steps(self, angle: np.ndarray, count: int) -> np.ndarray:
+        """Which of those middles angles are, numbers between too: beside a whole circle's last is its first, beyond an
+        arc's last it is still that."""
+        step = (angle - self.begin) / self.turn * count - 0.5
+        return step % count if self.ends is None else np.clip(step, 0, count - 1)
+
+    def spokes(self, angle: np.ndarray) -> np.ndarray:
+        """Unit vectors from its centre at angles (n,), shape (n, 3)."""
+        one, two = self.axes
+        return np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
+
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        """Places of it at angles (n,), shape (n, 3)."""
+        return self.centre + self.radius * self.spokes(angle)
+
+    def joined(self, shown: np.ndarray) -> np.ndarray:
+        """Which pieces from each of such places to the next count, bool (..., n), of places that do: an arc's last goes
+        back to its first place and is none."""
+        return shown if self.ends is None else np.append(shown[..., :-1], np.zeros_like(shown[..., -1:]), -1)
+
     def around(self, count: int) -> np.ndarray:
         """So many places around it, or from one end to the other, in equal steps, shape (count, 3)."""
-        first = axes_beside(self.axis)[0] if self.ends is None else self.ends[0] - self.centre
-        first = first - (first @ self.axis) * self.axis
-        first, angle = first / np.linalg.norm(first), np.linspace(0, self.turn, count)[:, None]
-        return self.centre + self.radius * (np.cos(angle) * first + np.sin(angle) * np.cross(self.axis, first))
+        return self.at(self.begin + np.linspace(0, self.turn, count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,6 +251,12 @@ class Solid:
     def sharp(self) -> tuple[Edge, ...]:
         """The sharp edges: those of the part itself, by which it can be measured."""
         return tuple(edge for edge in self.edges if edge.kind == "sharp")
+
+    @cached_property
+    def lines(self) -> tuple[Edge, ...]:
+        """The sharp edges, and pieces of curved ones that are no circular edges: with `rims` all edges of the part."""
+        of_rims = {name for rim in self.rims for name in rim.edges}
+        return tuple(e for e in self.edges if e.kind == "sharp" or (e.kind == "rim" and e.name not in of_rims))
 
     @cached_property
     def slight(self) -> frozenset[str]:

@@ -23,8 +23,7 @@ import render
 import scenes
 from imaging.features.circles import calibrated_circle, rim
 from imaging.features.locator import MIN_CONTRAST, kappa2
-from imaging.features.rim_sides import equal_angles, outward_normals, radials
-from imaging.features.seen import plane_axes
+from imaging.features.rim_sides import outward_normals
 from imaging.pictures import Pictures
 from scenes import Circle, Picture, Scene
 from tests import parts
@@ -96,10 +95,11 @@ def scene_of(mesh: trimesh.Trimesh, folder: Path, sigma: float = 2.4, size: tupl
 def as_if_whole(picture: Picture, arc: Circle) -> np.ndarray:
     """Covariance (3, 3) were the circle seen all around with the arc's mean contrast, the scene's unit squared."""
     pictures, scene = Pictures.of(picture), picture.scene
-    own, angle = rim(pictures, arc), equal_angles(_POINTS)
-    normal, slope, speed = outward_normals(pictures, replace(arc, ends=None), angle)
+    own, around = rim(pictures, arc), replace(arc, ends=None)
+    angle = around.angles(_POINTS)
+    normal, slope, speed = outward_normals(pictures, around, angle)
     across = np.einsum("ni,nij->nj", normal, slope)
-    columns = [*(across @ axis for axis in plane_axes(arc.axis)), (across * radials(arc, angle)).sum(-1)]
+    columns = [*(across @ axis for axis in arc.axes), (across * arc.spokes(angle)).sum(-1)]
     whole = replace(
         own, design=np.stack(columns, -1), arc=speed * 2 * np.pi / _POINTS, clear=np.ones(_POINTS, bool),
         squared=np.full(_POINTS, own.squared[own.squared > 0].mean()), noise_variance=scene.noise.variance,

@@ -12,13 +12,17 @@ import scenes
 from imaging.features.circles import LEAST_SEEN, rim
 from imaging.features.locator import reach
 from imaging.features.rim_look import look
-from imaging.features.rim_sides import angles_of, equal_angles, radials, within_ends
+from imaging.features.rim_sides import within_ends
+from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
+from measure.features.rims import find_circle
+from measure.features.tools import Curve
 from scenes import Picture
 from scenes.measurands.proposed import proposed
 from scenes.parts import mesh
 from scenes.parts.arcs import LEAST_TURN, arcs
 from tests import parts
+from tests.oracle import polygon_image
 from tests.proofs.arcs import as_if_whole, scene_of
 
 kernel = pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
@@ -153,15 +157,15 @@ def corner(tmp_path_factory):
 def test_places_lie_between_the_ends(corner):
     """In equal steps; of a whole circle all around as ever."""
     _, arc, _ = corner
-    places = arc.centre + arc.radius * radials(arc, angles_of(arc, 8))
+    places = arc.at(arc.angles(8))
     np.testing.assert_allclose(places, arc.around(17)[1::2], atol=1e-9)
-    np.testing.assert_array_equal(angles_of(replace(arc, ends=None), 8), equal_angles(8))
+    np.testing.assert_allclose(replace(arc, ends=None).angles(8), 2 * np.pi * (np.arange(8) + 0.5) / 8)
 
 
 def test_places_near_the_ends_are_none(corner):
     """By the reach of the locator, in the image."""
     scene, arc, pictures = corner
-    angle = angles_of(arc, 400)
+    angle = arc.angles(400)
     scale = scene.camera.focal_px / scene.camera.distance
     away = scale * arc.radius * np.minimum(angle - angle[0], angle[-1] - angle)
     kept = within_ends(pictures, arc, angle)
@@ -170,7 +174,7 @@ def test_places_near_the_ends_are_none(corner):
     assert not kept[away < 0.9 * far].any()
     assert within_ends(pictures, replace(arc, ends=None), angle).all()
     seen = rim(pictures, arc)
-    assert (seen.squared[~within_ends(pictures, arc, angles_of(arc, seen.squared.size))] == 0).all()
+    assert (seen.squared[~within_ends(pictures, arc, arc.angles(seen.squared.size))] == 0).all()
     assert seen.left == pytest.approx(0.25 * kept.mean(), abs=0.01)
 
 
@@ -186,11 +190,54 @@ def test_a_look_is_told_between_its_places_and_not_beyond(corner):
     """At the places themselves as it is; beyond the last one as there."""
     _, arc, pictures = corner
     seen = look(pictures, arc)
-    again = seen.at(angles_of(arc, seen.shift.size))
+    again = seen.at(arc.angles(seen.shift.size))
     np.testing.assert_allclose(again.squared, seen.squared)
     np.testing.assert_array_equal(again.good, seen.good)
-    ends = seen.at(np.array([seen.begin, seen.begin + seen.turn]))
+    ends = seen.at(np.array([arc.begin, arc.begin + arc.turn]))
     np.testing.assert_allclose(ends.squared, seen.squared[[0, -1]])
+
+
+@pytest.fixture(scope="module")
+def smooth_corner(tmp_path_factory):
+    """A plate whose corner at the origin is rounded by 10 mm, in steps of half a degree."""
+    outline = np.concatenate([parts.arc((10.0, 10.0), 10.0, 180.0, 270.0, 0.5), [[35, 0], [35, 35], [0, 35]]])
+    return scene_of(parts.plate(outline, 8.0), tmp_path_factory.mktemp("part"))
+
+
+def _off(scene, phase=0.0, move=0.0):
+    """Errors (3,), px, of its arc in an exact picture from straight above, where it ends along a row and a column, at a
+    place between pixels, by which the camera is moved, and ``move`` px each way from where it is expected.
+    """
+    camera = scene.camera
+    away = 10.0 + phase * camera.distance / camera.focal_px
+    scene = scene.with_(camera=camera.model_copy(update={"look_at": (away, away, 8.0)}))
+    (arc,) = upper(scene.solid)
+    loop = scene.solid.vertices[list(scene.solid.faces[arc.face])]
+    outline = project_ideal(loop, np.array([0.0, 0.0]), scene.camera) + move
+    image = polygon_image(outline, (camera.height, camera.width), camera.blur_px)
+    found = find_circle(image[None], Picture.of(scene, (0, 0)), arc.name)
+    assert found.state == ["ok"]
+    return found.errors[0] * camera.focal_px / camera.distance - [move, move, 0.0]
+
+
+PHASES = (0.0, 0.2, 0.4, 0.6, 0.8)
+
+
+def test_an_arc_is_found_wherever_in_its_pixels_it_lies(smooth_corner, monkeypatch):
+    """Centre and radius to 0.001 px; without what sampling by pixels does they go up and down with the place."""
+    off = np.array([_off(smooth_corner, phase) for phase in PHASES])
+    assert np.abs(off).max() < 1e-3
+    monkeypatch.setattr(Curve, "sampled", lambda self, moved, optics: 0 * moved)
+    assert np.ptp([_off(smooth_corner, phase)[2] for phase in PHASES]) > 0.01
+
+
+def test_an_arc_that_is_shifted_along_itself_turns_away(smooth_corner, monkeypatch):
+    """By 0.6 px each way, to 0.006 px, 0.004 px of which come from values half a px apart; without the second order,
+    d^2 / (2 R) along a tangent, twice that.
+    """
+    assert np.abs(_off(smooth_corner, move=0.6)).max() < 0.006
+    monkeypatch.setattr(Curve, "second_order", lambda self, found: np.zeros((len(found), self.bend.size)))
+    assert _off(smooth_corner, move=0.6)[2] < -0.01
 
 
 def test_a_short_arc_is_said_to_be(tmp_path):

@@ -7,7 +7,6 @@ from scipy.optimize import least_squares
 import planner
 import scenes
 from imaging.features.circles import fisher_circle, rim
-from imaging.features.seen import plane_axes
 from imaging.geometry.projection import project
 from imaging.models.paper import PAPER_KAPPA2, paper
 from imaging.pictures import Pictures
@@ -29,7 +28,7 @@ def test_design_against_central_differences():
     """How far each place of the rim moves along its normal when the circle moves in its plane or grows."""
     plate = scenes.load("plate")
     circle, pictures = plate.solid.circle("c2"), Pictures.of(plate, SENSOR, (20, 100))
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     found = rim(pictures, circle).design
     angle = 2 * np.pi * (np.arange(len(found)) + 0.5) / len(found)
     radial = np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two
@@ -54,7 +53,7 @@ def test_circle_of_a_hole_by_fitting(rng):
     weight = seen.squared / (PAPER_KAPPA2 * plate.noise.sigma**2)
     used = weight > 1.0  # a point worse than a pixel is nearly no point, and its distance is not linear
     predicted = fisher_circle(seen, np.where(used, weight, 0.0), used)
-    one, two = plane_axes(circle.axis)
+    one, two = circle.axes
     angle = 2 * np.pi * (np.arange(64) + 0.5) / 64
     radial = (np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two)[used]
     outward = seen.design[used, 2]  # px along the normal for a unit of the radius

@@ -1,5 +1,6 @@
 """Parts of a rim's image: where lines cross its outline, cells beside it, hidden points, and others that come near."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ from imaging.features import limb_look, rim_look, rim_sides
 from imaging.features.rim_look import RimLook
 from imaging.features.rim_outline import _crossed, zero_of_steps
 from imaging.pictures import Pictures
+from scenes import Circle
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +57,8 @@ def test_what_is_hidden_of_a_bores_far_rim_has_no_level(plate, polar):
     """From above: the line of sight to a point of it leaves the bore through the near rim, or does not."""
     near, far = sorted(plate.solid.circles, key=lambda circle: -circle.centre[2])
     pictures = Pictures.of(plate, np.array([polar, 20.0]), np.array([35.0, 30.0]))
-    angle = rim_sides.equal_angles()
-    points = far.centre + far.radius * rim_sides.radials(far, angle)
+    angle = far.angles(rim_sides.RIM_POINTS)
+    points = far.at(angle)
     toward = pictures.sensor_at - points
     above = points + toward * ((near.centre[2] - points[:, 2]) / toward[:, 2])[:, None]
     aside = np.linalg.norm(above - near.centre, axis=1) / near.radius
@@ -65,6 +67,28 @@ def test_what_is_hidden_of_a_bores_far_rim_has_no_level(plate, polar):
     assert (wall[aside > 1.01] == 0).all()
     assert (wall[aside < 0.99] > 0).any()
     assert 0.1 < (aside > 1.01).mean() < 0.9
+
+
+def test_a_far_rim_that_is_an_arc_comes_as_near_as_a_whole_one(plate):
+    """Within a step of its places, where there is one, and nowhere else: of a far rim cut to either half."""
+    near, far = sorted(plate.solid.circles, key=lambda circle: -circle.centre[2])
+    pictures = Pictures.of(plate, np.array([25.0, 0.0]), np.array([35.0, 30.0]))
+    angle = near.angles(rim_sides.RIM_POINTS)
+
+    def told(*others: Circle) -> np.ndarray:
+        solid = replace(plate.solid, circles=(near, *(c for c in others if c.ends is None)),
+                        arcs=tuple(c for c in others if c.ends is not None))  # fmt: skip
+        scene = SimpleNamespace(solid=solid, camera=plate.camera)
+        seen = SimpleNamespace(scene=scene, sensors=pictures.sensors, sensor_at=pictures.sensor_at)
+        return rim_sides.clearance(seen, near, angle)
+
+    halves = [replace(far, ends=far.centre + far.radius * side * np.array([[0.0, 1, 0], [0.0, -1, 0]]))
+              for side in (1, -1)]  # fmt: skip
+    whole, none, (one, other) = told(far), told(), (told(half) for half in halves)
+    assert (whole < none).any()
+    np.testing.assert_allclose(np.minimum(one, other), whole, atol=1.2)
+    assert (none - whole > 5).any()
+    assert max((half - whole > 3).mean() for half in (one, other)) > 0.2
 
 
 def test_places_of_a_rim_are_less_than_a_smoothing_scale_apart(plate):
@@ -99,7 +123,8 @@ def test_cells_that_are_looked_at_closely():
 def test_between_places_of_a_rim(rng):
     """Linear, round the end too; good where both neighbours are, at a place itself where it is."""
     count = 7
-    known = RimLook(*rng.uniform(1, 5, (3, count)), np.array([True, True, False, True, True, True, False]))
+    circle = Circle("c1", np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, 0, (), True)
+    known = RimLook(*rng.uniform(1, 5, (3, count)), np.array([True, True, False, True, True, True, False]), circle)
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     here = known.at(angles)
     assert here.good.tolist() == known.good.tolist()
@@ -130,12 +155,14 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
 
     for name, stand_in in {
         "clear_of_ends": lambda outline, scene: np.array([[True, True, True, True], [True, False, True, True]]),
-        "unlent": lambda pictures, outline: np.ones((2, 4), bool), "reach": lambda *_: 3.0, "first_face": first_face,
+        "unlent": lambda pictures, outline: np.ones((2, 4), bool),
+        "unlent_by_faces": lambda pictures, curved, outline: np.ones((2, 4), bool),
+        "reach": lambda *_: 3.0, "first_face": first_face,
         "from_axis": image, "steady": lambda *given: steady.append(given) or np.ones((2, 4), bool),
     }.items():  # fmt: skip
         monkeypatch.setattr(limb_look, name, stand_in)
     solid = SimpleNamespace(
-        circles=(), sharp=(SimpleNamespace(ends=(1, 0)),), vertices=np.array([[-1.0, 0, 7], [6.0, 0, 7]])
+        rims=(), lines=(SimpleNamespace(ends=(1, 0)),), vertices=np.array([[-1.0, 0, 7], [6.0, 0, 7]])
     )
     scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False), camera=SimpleNamespace(blur_px=1.0),
                             locator=SimpleNamespace(scale_px=1.0))  # fmt: skip

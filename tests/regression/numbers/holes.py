@@ -9,7 +9,6 @@ import numpy as np
 import measure
 import planner
 import scenes
-from imaging.features.rim_sides import equal_angles, radials
 from imaging.geometry.projection import project
 from measure.features import found, linearity, relations, rims, shape, tools
 from measure.features.layout import layout_of
@@ -29,7 +28,7 @@ def painted(name, sigma=1.3, moved=(0.0, 0.0)):
     image = polygon_image(hull[::-1] + moved, shape, camera.blur_px, 110.0, 30.0)
     for circle in scene.solid.circles:
         if circle.hole and circle.axis[2] > 0.5:
-            points = circle.centre + circle.radius * radials(circle, equal_angles(90))
+            points = circle.at(circle.angles(90))
             image -= polygon_image(project(points, sensor, camera) + moved, shape, camera.blur_px, 100.0, 0.0)
     return image + np.random.default_rng(6).normal(0, sigma, (2, *shape))
 

@@ -9,7 +9,6 @@ import scenes
 from imaging import sensor as imaging_sensor
 from imaging.contours import limb, shading, tori
 from imaging.features.measurand import required_edges
-from imaging.features.seen import plane_axes
 from imaging.geometry import projection, rays
 from imaging.light import backlight, bore, revolved
 from imaging.models import moments
@@ -21,7 +20,7 @@ from planner.uncertainty import Input, budget, conformity, gauge, improve, input
 from planner.uncertainty.groups import Group, draw
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import Noise, Picture, Pose, Tolerance
-from scenes.parts.surfaces import Torus
+from scenes.parts.surfaces import Torus, axes_beside
 from tests.curved import SURFACES
 from tests.regression.numbers.poses import load, uneven, without_error
 from tests.regression.stored import CLOSED, SEARCHED
@@ -73,7 +72,7 @@ def _shading():
 def _tori():
     torus, u = Torus(np.array([1.0, 2, 3]), np.array([0.48, -0.6, 0.64]), 2.3, 0.6), np.linspace(0.03, 0.97, 7)
     hole = Torus(np.array([1.0, 2, 3]), np.array([0.48, -0.6, 0.64]), 2.3, 0.6, hollow=True)
-    one, two = plane_axes(torus.axis)
+    one, two = axes_beside(torus.axis)
     eyes = {"above": 9 * torus.axis + 2 * one, "beside": 8 * one + 0.2 * torus.axis, "far": 30 * two + 0.3 * torus.axis,
             "within": 2.4 * one, "on": 2.9 * one, "hole": 0.3 * one + 0.1 * torus.axis,
             "over": 9 * torus.axis}  # fmt: skip
@@ -142,7 +141,7 @@ def _bores():
     found = {}
     for name in ("plate", "bracket_mm", "flange"):
         for i, each in enumerate(bore.bores(load(name).solid)[:2]):
-            one, two = plane_axes(each.rim.axis)
+            one, two = each.rim.axes
             turn = np.array([0.3, 2.1, 4.4, 5.9])
             wall = each.rim.centre + each.rim.radius * (np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * two)
             wall = wall - each.rim.axis * each.length * np.array([[0.1], [0.4], [0.7], [0.95]])
