@@ -219,9 +219,7 @@ def measure_by(
     )
 
 
-def _gathered(
-    found: MeasuredFeatures, picture: Picture, saturation: np.ndarray, lead: tuple[int, ...]
-) -> Measurements:
+def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray, lead: tuple[int, ...]) -> Measurements:
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)
