@@ -228,7 +228,7 @@ def _fine(part: Part, crop, quality: Quality, variant: str) -> np.ndarray:
             loaded = load(each, count, None, k)
             seen = view(mitsuba, picture, each, *film, count) | {"sampler": {"type": "ldsampler"}}
             start = tuple(part.start for part in film[1])
-            found.append(mosaic(mitsuba, loaded, seen, start, pixels, near, count, (quality.seed, 2)))
+            found.append(mosaic(mitsuba, loaded, seen, start, pixels.copy(), near, count, (quality.seed, 2)))
         return found[0] - found[1]
 
     if large:
