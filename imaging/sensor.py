@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +35,10 @@ def recorded(noise: Noise, level: np.ndarray) -> Levels:
     darkness keeps the noise away from it; the fixed pattern does not vary.
     """
     level = np.asarray(level, float)
-    variance = noise.variance + shot_noise(noise, level - noise.dark_level)
     full = full_scale(noise)
+    if noise.gain == 0 and not (level > full - _MARGIN * math.sqrt(noise.variance)).any():
+        return Levels(level, np.full(level.shape, noise.variance))
+    variance = noise.variance + shot_noise(noise, level - noise.dark_level)
     near = level > full - _MARGIN * np.sqrt(variance)
     if not near.any():
         return Levels(level, variance)

@@ -6,6 +6,9 @@ that is seen nearly edge-on may lie between the middles of pixels: pixels that i
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from scipy.ndimage import maximum_filter
@@ -34,7 +37,18 @@ def lent_to(picture: Picture, marked: np.ndarray, start: tuple[int, int], supers
     Returns
     -------
     ndarray of bool, as ``marked``
+        Not to be changed: renders of other rays from the same place ask for the same.
     """
+    bits = np.packbits(marked).tobytes()
+    return _lent_to(picture.unlit(), bits, marked.shape, start, supersample)
+
+
+@lru_cache(maxsize=2)
+def _lent_to(
+    picture: Picture, bits: bytes, shape: tuple[int, int], start: tuple[int, int], supersample: int
+) -> np.ndarray:
+    """The same of a mask as bits, so that it can be told whether it is asked for again."""
+    marked = np.unpackbits(np.frombuffer(bits, np.uint8), count=math.prod(shape)).reshape(shape).astype(bool)
     bodies, asked = picture.scene.bodies, maximum_filter(marked, 3)
     pixels = np.argwhere(asked)
     face, _ = looked_at(picture, ((pixels + start + 0.5) / supersample - 0.5)[:, ::-1])
@@ -45,7 +59,9 @@ def lent_to(picture: Picture, marked: np.ndarray, start: tuple[int, int], supers
     found = np.zeros(marked.shape, bool)
     found[tuple(pixels.T)] = lent[face]
     found |= _crossed(picture, lent[:-1], marked.shape, start, supersample)
-    return maximum_filter(found, 3) & marked
+    lent = maximum_filter(found, 3) & marked
+    lent.flags.writeable = False
+    return lent
 
 
 def _crossed(

@@ -208,7 +208,7 @@ class _Tracer:
             loaded = self.load(active, count, None, self.quality.supersample)
             seen = view(self.mitsuba, self.picture, active, *film, count) | {"sampler": {"type": "ldsampler"}}
             start = tuple(part.start for part in film[1])
-            return mosaic(self.mitsuba, loaded, seen, start, pixels, near, count, (self.quality.seed, 2))
+            return mosaic(self.mitsuba, loaded, seen, start, pixels.copy(), near, count, (self.quality.seed, 2))
 
         return with_effects(self.active) - with_effects(self.sharp)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import maximum_filter
@@ -104,9 +105,10 @@ def fine_pixels(
         first = renders.whole(False, ordinary)
         divided, asked = _fine(crossed(first, math.ceil(reach / k)) | near, k), None
     else:
-        first = np.zeros(near.shape)
+        first = None
         divided, asked = _fine(near, k), _fine(~maximum_filter(~near, 3), k)  # beside what is dark there is a step
-    fine = renders.again(False, _fine(first, k), divided, ordinary)
+    fine = np.zeros(divided.shape, np.float32) if first is None else _fine(first, k)
+    fine = renders.again(False, fine, divided, ordinary)
     marked, near = crossed(fine, reach, where=asked) & divided, _fine(near, k)
     lent = near if renders.lent_to is None or not renders.random else renders.lent_to(near)
     if renders.random:
@@ -157,9 +159,18 @@ def near_required(
     picture: Picture, crop: tuple[slice, slice], supersample: int, within: float | None = None
 ) -> np.ndarray:
     """Pixels of the crop that the task's edges and circles are measured from, and their surroundings, as a mask; or
-    those ``within`` so many standard deviations of scale and blur together of where they are."""
-    scene, (top, left) = picture.scene, (part.start // supersample for part in crop)
+    those ``within`` so many standard deviations of scale and blur together of where they are. Not to be changed."""
+    corner = tuple(part.start // supersample for part in crop)
     shape = tuple((part.stop - part.start) // supersample for part in crop)
+    return _near_required(picture.unlit(), corner, shape, within)
+
+
+@lru_cache(maxsize=4)
+def _near_required(
+    picture: Picture, corner: tuple[int, int], shape: tuple[int, int], within: float | None
+) -> np.ndarray:
+    """The same of a crop of whole pixels: all lights and rays share it."""
+    scene, (top, left) = picture.scene, corner
     circles = {circle.name: circle.edges for circle in scene.solid.rims}
     limbs = [each for each in scene.solid.curved if each.name in scene.required]
     circles |= dict.fromkeys((each.name for each in limbs), ())
@@ -178,4 +189,6 @@ def near_required(
     found[row[inside], column[inside]] = True
     spread = math.hypot(scene.locator.scale_px, scene.camera.blur_px)
     reach = 1 + (scene.locator.window_px + 4 * spread if within is None else within * spread)
-    return maximum_filter(found, 2 * math.ceil(reach) + 1)
+    near = maximum_filter(found, 2 * math.ceil(reach) + 1)
+    near.flags.writeable = False
+    return near

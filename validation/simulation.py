@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from scipy.ndimage import binary_erosion
@@ -142,7 +142,7 @@ def independent(
     """
     how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
-    images = _completed(picture, others, measured, how, how)
+    images = _completed(picture, others, measured, how)
     return tuple(
         measure.correction(images, picture, each.locator, each.threshold, told)
         for each, told in zip(methods, propagated, strict=True)
@@ -154,7 +154,7 @@ def of_render(
 ) -> Correction:
     """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
     how = how.by(method)
-    images, none = _completed(picture, (image,), (), how, how), np.zeros(len(picture.scene.quantities))
+    images, none = _completed(picture, (image,), (), how), np.zeros(len(picture.scene.quantities))
     images = replace(images, known={**images.known, RENDERING: (none, none)})
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
 
@@ -205,12 +205,12 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
     pair = how.by_pixel and camera.width * camera.height > LARGE_RANDOM  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
-        images = _completed(picture, few, (), how, how.rough)
+        images = _completed(picture, few, (), how)
         found = of(images)
         if _is_quiet(found):
             return found
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
-    images = _rebased(images, renders) if images else _completed(picture, renders, (), how, how)
+    images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
@@ -244,13 +244,12 @@ def _completed(
     renders: tuple[np.ndarray, ...],
     beside: tuple[np.ndarray, ...],
     how: How,
-    made: How,
 ) -> Images:
-    """With the images, or numbers, of what the scene is not sure of; the renders are ``made`` so."""
+    """With the images, or numbers, of what the scene is not sure of."""
     first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
-    dimmed = None
+    direct, dimmed = cache(partial(alike.direct, active=active)), None
     if active & MANY_WAYS == {_BETWEEN}:
-        alone = partial(made.direct, picture, active)
+        alone = partial(direct, picture)
         dimmed = of_one_surface(picture, first, alone, _u(picture.scene.uncertainty.reflectance))
     if dimmed is None:
         others = _steps(first, alike.image, _of_other_surfaces(picture), picture)
@@ -258,7 +257,6 @@ def _completed(
     if is_plain(picture.scene):
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
-        direct = partial(alike.direct, active=active)
         changed[LIGHT] = _steps(first, direct, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 

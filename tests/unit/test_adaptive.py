@@ -99,3 +99,15 @@ def test_only_pixels_that_are_asked_for_are_crossed(rng):
         expected = crossed(fine, step=step) & asked
         assert 0 < expected.sum() < asked.sum()
         assert (crossed(fine, step=step, where=asked) == expected).all()
+
+
+def test_pixels_near_required_edges_are_sought_once_for_all_lights(task1):
+    """Another light's picture has the same mask, which nobody can change; another sensor's has another."""
+    crop, dark = (slice(0, 480), slice(0, 512)), Picture.of(task1, Pose(30, 135))
+    first = near_required(Picture.of(task1, Pose(30, 135), Pose(15, 315)), crop, 2)
+    assert near_required(Picture.of(task1, Pose(30, 135), Pose(20, 300)), crop, 2) is first
+    assert near_required(dark, crop, 2) is first
+    with pytest.raises(ValueError, match="read-only"):
+        first[0, 0] = True
+    assert (near_required(Picture.of(task1, Pose(31, 135), Pose(15, 315)), crop, 2) != first).any()
+    assert (near_required(dark, crop, 2, 1.0) != first).any()

@@ -315,7 +315,7 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
     assert simulation.independent(picture, methods, measured, ("one", "two"), how) == (1, 2)
     assert [(given[2], given[3], given[4]) for given in asked] == [("strip", None, "one"), ("isophote", 0.4, "two")]
     of, renders, beside, *made = asked[0][0]
-    assert (of, beside, made) == (picture, measured, [how.by(*methods)] * 2)
+    assert (of, beside, made) == (picture, measured, [how.by(*methods)])
     assert [each.flat[0] for each in renders] == [1, 2, 3]
 
 
@@ -382,3 +382,22 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
     simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
     assert asked == [tuple(range(count))]
+
+
+def test_direct_light_is_rendered_once_for_all_that_compare_with_it(monkeypatch):
+    """What surfaces send to each other, and each of three steps of the light's place: four images, none twice."""
+    scene, asked = scenes.load("bracket"), []
+
+    def rendered(how, shown, effects, seed):
+        asked.append((shown, how.quality.alike, "interreflection" in effects))
+        return np.full((2, 2), float(len(asked)))
+
+    monkeypatch.setattr(How, "_rendered", rendered)
+    monkeypatch.setattr(simulation, "of_one_surface", lambda picture, first, direct, part: first - direct())
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    images = simulation._completed(picture, (np.full((2, 2), 7.0),), (), How())
+    assert [each[1:] for each in asked] == [(True, False)] * 4
+    assert [shown is picture for shown, *_ in asked] == [True, False, False, False]
+    assert len({shown for shown, *_ in asked}) == 4
+    assert [each.flat[0] for each in images.changed["reflectance"]] == [7 - 1]
+    assert [each.flat[0] for each in images.changed["light_place"]] == [7 + 2 - 1, 7 + 3 - 1, 7 + 4 - 1]
