@@ -1,25 +1,33 @@
 """More that no test had noticed when it was changed: angles, areas, sides, limits and orders of what is drawn."""
 
+from importlib import import_module
 from types import SimpleNamespace
 from unittest import mock
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import planner
 import scenes
+from measure.boards import approximate
 from measure.estimators import canny
 from measure.features import contrasts
+from planner.search import constraints
 from planner.search.design import Choice
 from planner.search.grid import APART
 from planner.search.varying import Place, Variation
+from planner.uncertainty import risks
 from render import Quality, fine
 from render.parts import Part
 from scenes import Picture
 from scenes.parts import arcs
+from validation import vary_check
 from validation.cli import measurands
 from validation.hard import precise, precise_models
-from validation.report import plan_figures
+from validation.report import budget_figure, plan_figures
+
+renderer = import_module("render.renderer")
 
 
 def test_places_differ_by_degrees():
@@ -127,3 +135,60 @@ def test_the_reference_of_the_calibrated_model_at_other_scales(scale):
     exact = precise_models.calibrated(scene, inputs, adaptive=False)
     told = planner.predict(scene, setting.sensor, setting.light).variance_px2
     assert told == pytest.approx(float(exact), rel=1e-3)
+
+
+@pytest.mark.parametrize(("at", "seen"), [(0.0, True), (-0.4, True), (-0.6, False), (639.4, True), (639.6, False)])
+def test_a_light_is_in_view_up_to_the_outer_sides_of_pixels(monkeypatch, at, seen):
+    scene = SimpleNamespace(camera=SimpleNamespace(width=640, height=480), lights=[None])
+    monkeypatch.setattr(constraints, "light_position", lambda camera, light, poses: np.zeros((len(poses), 3)))
+    monkeypatch.setattr(constraints, "project", lambda places, *_: np.full((len(places), 1, 2), [at, 240.0]))
+    assert constraints._in_view(scene, np.zeros((1, 2)), np.zeros((1, 2)), 0).tolist() == [seen]
+
+
+def test_a_density_is_integrated_in_steps_of_one():
+    """And in steps of the noise beside the ends of what is accepted."""
+    assert risks._pieces(-2.5, 1.5, [], 0.1).tolist() == [-2.5, -2, -1, 0, 1, 1.5]
+    assert risks._pieces(0.25, 0.75, [0.5], 0.125) == pytest.approx([0.25, 0.375, 0.5, 0.625, 0.75])
+
+
+def test_a_board_is_sought_in_a_smaller_picture_of_the_same_shape(monkeypatch):
+    """Where it is found is told in pixels of the whole one, middle to middle."""
+    asked = []
+    found = np.array([[[10.0, 20.0], [30.0, 40.0]]])
+    monkeypatch.setattr(approximate, "_counted", lambda small: asked.append(small.shape) or found)
+    longest = approximate._LONGEST
+    made = approximate.approximate_corners(np.random.default_rng(1).uniform(0, 255, (3 * longest, 2 * longest)), None)
+    assert asked == [(longest, round(2 * longest / 3))]
+    np.testing.assert_allclose(made, (found + 0.5) * 3 - 0.5, rtol=1e-3)
+
+
+def test_a_check_of_what_varies_reports_two_plans(monkeypatch):
+    told = []
+    monkeypatch.setattr(vary_check, "_scatter", lambda *_: None)
+    monkeypatch.setattr(vary_check, "judged", lambda *rows, same: (rows, same))
+    one = SimpleNamespace(choice=1, sensor=2, light=3)
+    found = SimpleNamespace(varied=SimpleNamespace(fixed=one, best=one))
+    assert vary_check.check_varied(found, report=lambda *what: told.append(what)) == ((None, None), True)
+    assert told == [("plans", 0, 2), ("plans", 1, 2), ("plans", 2, 2)]
+
+
+def test_a_backlight_is_dark_beside_its_cone(monkeypatch):
+    """Whatever its render says there."""
+    scene = scenes.load("backlight_plate")
+    setting = scene.settings[0]
+
+    def shining(part, crop, quality, which):
+        return np.full([each.stop - each.start for each in crop], 50.0 if part.silhouette else 0.0)
+
+    monkeypatch.setattr(renderer, "fine_image", shining)
+    for within, level in ((False, 0.0), (True, 50.0)):
+        monkeypatch.setattr(renderer, "within_cone", lambda picture, crop, k, within=within: np.array(within))
+        seen = renderer.image(scene, setting.sensor, setting.light, Quality(supersample=1), "scalar_rgb")
+        assert seen[100, 100] - scene.noise.dark_level == pytest.approx(level, abs=1e-9)
+
+
+def test_bars_of_small_budgets_fill_their_frame():
+    axis = plt.figure().subplots()
+    budget_figure._finished(axis, ["one", "two"], np.array([0.1, 0.2]), False)
+    assert axis.get_xlim() == pytest.approx((0, 0.29))
+    plt.close(axis.figure)
