@@ -149,8 +149,11 @@ def bias(
         noisy.append(found.noisy[:, found.trusted].ravel())
     values = np.concatenate(noisy)
     spread, count = rms(values), int(np.isfinite(values).sum())
-    low, high = np.sqrt(stats.chi2.ppf((0.005, 0.995), count) / count)
+    low, high = np.sqrt(stats.chi2.ppf((0.005, 0.995), count) / max(count, 1))
     print(f"All: left over u(bias) {rms(np.concatenate(quiet)):.3f}, pulls {spread:.3f}; 1 within 10 % is asked.")
+    if count == 0:
+        print("No value is ok: none is stated with an interval.")
+        raise typer.Exit(1)
     if stations:
         inside = int(np.sum(np.abs(values) <= _K))
         low, high = stats.binomtest(inside, count).proportion_ci(0.99)
