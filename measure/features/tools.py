@@ -11,6 +11,7 @@ from imaging.features.sampling import sampled_places
 from measure.estimators.crossing import CrossingLocator
 from measure.features.optics import Optics
 
+_NEAR = 1.0  # px: a circle that is farther from where it is expected is looked for again from there
 _PASSES = 3  # what is beside the first order is hundredths of a px, and changes by a part of that
 
 
@@ -89,6 +90,7 @@ class RimTool:
         found = np.einsum("nim,nm->ni", fit, offset + self.inward)
         for _ in range(_PASSES if self.curve else 0):
             near = np.nan_to_num(found)
+            near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
             second = self.curve.second_order(near)
             more = second + self.curve.sampled(near @ self.design.T + second, self.optics)
             found = np.einsum("nim,nm->ni", fit, offset + self.inward - more)
