@@ -4,6 +4,16 @@ import re
 
 # by file and mutated line
 EQUIVALENT: dict[str, str] = {
+    "imaging/blurred/kernels.py: return pixels, Scatter(place.take(slot), np.zeros(len(slot), int), 0, pixels.size)":
+        "of some nodes alone sums of all are asked for, never by piece",
+    "scenes/parts/mesh.py: used = used[np.lexsort(np.round(mesh.vertices[used] / mesh.extents.min(), 7).T[::-1])]":
+        "what is rounded away is far below what tells vertices apart, by either size",
+    "measure/boards/windows.py: first = np.unique(flat[:, 1] * width - flat[:, 0], return_index=True)[1]":
+        "another numbering of pixels, as unique",
+    "measure/estimators/expansion.py: none = np.zeros((len(told), self.inverse.shape[-1]))": "a square matrix",
+    "measure/photo/uneven.py: corners = layout.faces[-1]": "of a photograph's polygon, the only face",
+    "scenes/measurands/diameter.py: _, centre, radius, number = seen.circle(quantity.features[-1])":
+        "a diameter has one feature",
     "imaging/features/rim_sides.py: return circle.face, next(face for face in solid.edge(circle.edges[-1]).faces "
     "if face != circle.face)": "the wall beside a circle is the same at its last edge",
     "scenes/measurands/taper.py: return Evaluated(2 * DEGREE / sign * angle, {number: np.full(np.shape(angle), "
