@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = "scenes", "imaging", "planner", "measure", "render", "validation"
 _CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]*")
 _MACHINE = re.compile(r"\bos\.|\bsys\.")  # in the expression of what another machine may hold
+_EMPTY = re.compile(r"(OrderedDict|dict|list|set|deque)\(\)|\{\}|\[\]")  # an expression of what is filled while it runs
 _MOST = 300  # numbers of an array that are stored one by one
 _REL = 1e-12  # of a number, or of the largest of its array, where some cancel; measured: 2e-16
 
@@ -53,7 +54,8 @@ def _assigned(nodes: list[ast.stmt], owner: Any, before: str = "") -> Iterator[t
             continue
         targets = node.targets if isinstance(node, ast.Assign) else [node.target]
         names = [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
-        for name in names if not _MACHINE.search(ast.unparse(node.value)) else ():
+        text = ast.unparse(node.value)
+        for name in names if not (_MACHINE.search(text) or _EMPTY.fullmatch(text)) else ():
             if _CONSTANT.fullmatch(name) and hasattr(owner, name):
                 yield f"{before}{name}", getattr(owner, name)
 

@@ -178,7 +178,7 @@ def test_a_tile_shows_what_its_place_in_the_frame_shows(monkeypatch, lens, side)
     flat = (maximum_filter(whole, 25) - minimum_filter(whole, 25) < 0.1 * whole.max()) & (whole > 0)
     marked = np.zeros(whole.shape, bool)
     marked[tuple(np.random.default_rng(1).permutation(np.argwhere(flat))[:60].T)] = True
-    found = mosaic.refine_tiles(*arguments, whole, marked, 256, 1)
+    found = mosaic.refine_tiles(*arguments, whole.copy(), marked, 256, 1)
     assert ((found != whole) & marked).sum() > 50
     tiles = mosaic._held(marked, side).repeat(side, 0).repeat(side, 1)[:639, :799]
     assert not ((found != whole) & flat & ~tiles).any()
@@ -195,7 +195,7 @@ def test_crossed_pixels_that_were_not_marked_are_rendered_as_well():
     some = marked & (np.arange(marked.size).reshape(marked.shape) % 3 > 0)
     assert (some != marked).sum() > 1000
     corrupted = np.where(marked & ~some, 0.0, fine)  # as if their one ray had met the dark
-    found, full = (mosaic.refine_tiles(*arguments, corrupted, which, 64, 1) for which in (some, marked))
+    found, full = (mosaic.refine_tiles(*arguments, corrupted.copy(), which, 64, 1) for which in (some, marked))
     bright = full > 0.5 * full.max()
     assert (bright & (corrupted == 0)).sum() > 300
     # margin: 64 rays at an edge: what was dark came back to three quarters

@@ -28,7 +28,10 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     first = object()
     monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))
     picture = SimpleNamespace(scene=task1)
-    told = measurands._gathered(found, picture, lead)
+    saturated = np.arange(images) + 3
+    told = measurands._gathered(found, picture, saturated, lead)
+    assert told.saturated.tolist() == saturated.reshape(lead).tolist()
+    assert told.u_bias.shape == (*lead, 3)
     assert told.first == (first, found, picture, lead)
     assert told.units == ("cm",) * 3
     own = quantity.nominal if quantity.nominal is not None else 1.0

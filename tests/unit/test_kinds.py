@@ -55,8 +55,8 @@ def moved(seen, errors):
     turned = np.cos(theta)[:, None] * unit + np.sin(theta)[:, None] * normal
     lengths = np.linalg.norm(seen.along, axis=-1, keepdims=True)
     rest = errors[2 * edges :].reshape(-1, 3)
-    helper = [seen.solid.circle(name).axis for name in seen.circles]
-    shift = [r[0] * a + r[1] * np.cross(n, a) for r, n in zip(rest, helper, strict=True) for a in [first_axis(n)]]
+    axes = [seen.solid.circle(name).axes for name in seen.circles]
+    shift = [r[0] * one + r[1] * two for r, (one, two) in zip(rest, axes, strict=True)]
     new = replace(
         seen,
         start=seen.start + d[:, None] * normal,
