@@ -7,31 +7,32 @@ the difference has none of the noise of two renders' light between surfaces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from imaging.features.locator import edge_blur
 from imaging.geometry.lens import undistorted
 from imaging.geometry.looked_at import looked_at
-from imaging.light.between import left_of_dimmed
+from imaging.light.between import light_of_dimmed
 from imaging.pictures import Pictures
 from scenes import Picture
 
 _LEAST = 1e-6  # of the brightest pixel: less from other surfaces moves nothing
-_NEIGHBOURS = 1.5  # px, standard deviation: pixels that show no such face take after those beside them
+_NEIGHBOURS, _RARELY = 1.5, 1e-6  # px, standard deviation: pixels that show no such face take after those beside them
 
 
 def of_one_surface(
-    picture: Picture, render: np.ndarray, direct: Callable[[], np.ndarray], part: float
+    picture: Picture, renders: Sequence[np.ndarray], direct: Callable[[], np.ndarray], part: float
 ) -> np.ndarray | None:
-    """The render with every surface reflecting less by a part.
+    """The first render with every surface reflecting less by a part.
 
     Parameters
     ----------
     picture : Picture
-    render : ndarray, shape (height, width)
-        Grey levels.
+    renders : sequence of ndarray, shape (height, width)
+        Grey levels, each of other rays: together they tell light between surfaces.
     direct : callable
         To the same image without light between surfaces.
     part : float
@@ -45,22 +46,21 @@ def of_one_surface(
     scene = picture.scene
     if part == 0 or scene.materials or scene.bright_floor is not None or scene.solid.curved:
         return None
-    alone = direct()
-    between = render - alone
-    lent = np.argwhere(np.abs(between) > _LEAST * render.max())
+    between = np.mean(renders, axis=0) - direct()
+    lent = np.argwhere(np.abs(between) > _LEAST * renders[0].max())
     faces, places = looked_at(picture, undistorted(lent[:, ::-1].astype(float), scene.camera))
     inner = (faces >= 0) & ~np.append(scene.bodies.outer, True)[faces]
-    told = left_of_dimmed(Pictures.of(picture), part, places[inner], faces[inner])
+    told = light_of_dimmed(Pictures.of(picture), part, places[inner], faces[inner])
     if told is None:
         return None
-    left = _spread(told, lent[inner], render.shape, (1 - part) ** 2, part)
-    return render - part * (alone - scene.noise.dark_level) - (1 - left) * between
+    before, after = (_seen(light, lent[inner], between.shape, edge_blur(scene.camera.blur_px)) for light in told)
+    once, least = (1 - part) ** 2, 1e-12 * max(float(before.max()), np.finfo(float).tiny)
+    left = np.clip((after + once * least) / (before + least), (1 - part) ** 8, once)
+    return (1 - part) * renders[0] + part * scene.noise.dark_level - (1 - part - left) * between
 
 
-def _spread(told: np.ndarray, pixels: np.ndarray, shape: tuple[int, ...], once: float, part: float) -> np.ndarray:
-    """An image of what is told at some pixels (n, 2), NaN at others of them, and of ``once`` where nothing is near."""
-    good = np.isfinite(told)
-    at = tuple(pixels[good].T)
-    weights, values = np.full(shape, 1e-12), np.full(shape, 1e-12 * once)
-    weights[at], values[at] = 1.0, np.clip(told[good], (1 - part) ** 8, once)
-    return gaussian_filter(values, _NEIGHBOURS) / gaussian_filter(weights, _NEIGHBOURS)
+def _seen(light: np.ndarray, pixels: np.ndarray, shape: tuple[int, ...], blur: float) -> np.ndarray:
+    """Image, blurred as the camera's, of light at the middles of some pixels (n, 2), and a trace of it farther off."""
+    sharp = np.zeros(shape)
+    sharp[tuple(pixels.T)] = light
+    return gaussian_filter(sharp, blur) + _RARELY * gaussian_filter(sharp, _NEIGHBOURS)

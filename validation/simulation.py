@@ -45,6 +45,7 @@ _OTHERS = 1000  # where the seeds of renders begin that are measured, beside tho
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
 _ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_SMALL = {"supersample": 4, "edge_samples": 256}  # of direct light in small images, where they take little time
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,11 @@ class How:
     def compared(self) -> How:
         """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
         return replace(self, quality=replace(self.quality, **_ALIKE))
+
+    @property
+    def beside(self) -> How:
+        """With rays that tell direct light well: by what they tell wrongly, what a render holds beside it is wrong."""
+        return replace(self, quality=replace(self.compared.quality, **_SMALL))
 
     @property
     def by_pixel(self) -> bool:
@@ -237,8 +243,8 @@ def _completed(
     first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
     direct, dimmed = cache(partial(alike.direct, active=active)), None
     if active & MANY_WAYS == {_BETWEEN}:
-        alone = partial(direct, picture)
-        dimmed = of_one_surface(picture, first, alone, _u(picture.scene.uncertainty.reflectance))
+        alone = partial(how.beside.direct, picture, active) if _is_small(picture) else partial(direct, picture)
+        dimmed = of_one_surface(picture, renders, alone, _u(picture.scene.uncertainty.reflectance))
     if dimmed is None:
         others = _steps(first, alike.image, _of_other_surfaces(picture), picture)
     changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
@@ -247,6 +253,10 @@ def _completed(
     else:
         changed[LIGHT] = _steps(first, direct, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
+
+
+def _is_small(picture: Picture) -> bool:
+    return picture.scene.camera.width * picture.scene.camera.height <= LARGE_RANDOM
 
 
 def _steps(

@@ -41,21 +41,20 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
 
 
-def left_of_dimmed(pictures: Pictures, part: float, points: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
-    """Part of others' light that is left where all surfaces reflect less by ``part``, at points (n, 3) on faces (n,).
+def light_of_dimmed(
+    pictures: Pictures, part: float, points: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Signals by others' light as it is, and where all surfaces reflect less by ``part``, at points (n, 3) on faces.
 
-    Of light that met m surfaces (1 - part)^m is left; how much has met how many, patches of the faces tell. NaN where
-    there is no such light; None where it is not known at all: where there are turned parts, or no two faces see each
-    other.
+    Of light that met m surfaces (1 - part)^m is left; how much has met how many, patches of the faces tell. None where
+    it is not known at all: where there are turned parts, or no two faces see each other.
     """
     scene = pictures.scene
     dimmed = scene.material.dimmed(part)
     if scene.solid.curved or not is_exchanged(scene) or dimmed is None or not pictures.closely:
         return None
     before = light_between(pictures, points, faces)
-    after = light_between(pictures.with_scene(scene.tried(material=dimmed)), points, faces)
-    least = np.finfo(float).tiny
-    return np.where(before > least, after / np.maximum(before, least), np.nan)
+    return before, light_between(pictures.with_scene(scene.tried(material=dimmed)), points, faces)
 
 
 def reflected_share(pictures: Pictures, points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]) -> np.ndarray:

@@ -6,7 +6,7 @@ import pytest
 import scenes
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import facing, project_ideal, sensor_position
-from imaging.light.between import left_of_dimmed
+from imaging.light.between import light_of_dimmed
 from imaging.pictures import Pictures
 from render.between import lent_to
 from scenes import Picture
@@ -82,15 +82,16 @@ def test_what_is_left_of_light_that_met_two_surfaces_or_more(picture):
     part, inner = 0.1, np.flatnonzero(~picture.scene.bodies.outer)
     triangles = np.flatnonzero(np.isin(picture.scene.bodies.triangle_faces, inner))
     points, faces = picture.scene.bodies.triangles[triangles].mean(1), picture.scene.bodies.triangle_faces[triangles]
-    left = left_of_dimmed(Pictures.of(picture), part, points, faces)
-    lit = np.isfinite(left)
+    before, after = light_of_dimmed(Pictures.of(picture), part, points, faces)
+    lit = before > 0
     assert lit.any()
-    assert (left[lit] < 0.9**2).all()
-    assert (left[lit] > 0.9**5).all()
+    left = after[lit] / before[lit]
+    assert (left < 0.9**2).all()
+    assert (left > 0.9**5).all()
     scene = picture.scene
     dark = picture.with_scene(scene.tried(material=scene.material.dimmed(0.999)))
-    least = left_of_dimmed(Pictures.of(dark), part, points, faces)
-    assert least[lit] == pytest.approx(0.9**2, rel=2e-3)
+    before, after = light_of_dimmed(Pictures.of(dark), part, points, faces)
+    assert after[lit] / before[lit] == pytest.approx(0.9**2, rel=2e-3)
 
 
 def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatch):
@@ -105,9 +106,9 @@ def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatc
     assert inner.any()
     render[inner] += 8.0
     monkeypatch.setattr(
-        "validation.dimmed.left_of_dimmed", lambda pictures, part, points, faces: np.full(len(faces), 0.7)
+        "validation.dimmed.light_of_dimmed", lambda *_: (np.full(inner.sum(), 8.0), np.full(inner.sum(), 0.7 * 8.0))
     )
-    found = of_one_surface(picture, render, lambda: direct, 0.1)
+    found = of_one_surface(picture, (render,), lambda: direct, 0.1)
     assert found[~inner] == pytest.approx(render[~inner] - 5.0)
     assert found[inner] == pytest.approx(render[inner] - 5.0 - 0.3 * 8.0, abs=1e-6)
 
@@ -116,5 +117,5 @@ def test_other_scenes_are_rendered(picture):
     scene = picture.scene
     rendered = np.full((scene.camera.height, scene.camera.width), 90.0)
     floor = picture.with_scene(scene.with_(floor={"reflectance": 0.3, "height": -1.0}))
-    assert of_one_surface(floor, rendered, lambda: rendered, 0.1) is None
-    assert of_one_surface(picture, rendered, lambda: rendered, 0.0) is None
+    assert of_one_surface(floor, (rendered,), lambda: rendered, 0.1) is None
+    assert of_one_surface(picture, (rendered,), lambda: rendered, 0.0) is None

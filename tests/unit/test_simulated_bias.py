@@ -384,20 +384,27 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     assert asked == [tuple(range(count))]
 
 
-def test_direct_light_is_rendered_once_for_all_that_compare_with_it(monkeypatch):
-    """What surfaces send to each other, and each of three steps of the light's place: four images, none twice."""
-    scene, asked = scenes.load("bracket"), []
+@pytest.mark.parametrize("small", [False, True])
+def test_direct_light_is_rendered_once_for_all_that_compare_with_it(monkeypatch, small):
+    """What surfaces send to each other, and each of three steps of the light's place: four images, none twice.
+
+    Of a small image direct light is rendered once more, with rays that tell it better.
+    """
+    scene, asked, fine = scenes.load("bracket"), [], []
 
     def rendered(how, shown, effects, seed):
         asked.append((shown, how.quality.alike, "interreflection" in effects))
+        fine.append(how.quality.edge_samples == 256)
         return np.full((2, 2), float(len(asked)))
 
     monkeypatch.setattr(How, "_rendered", rendered)
-    monkeypatch.setattr(simulation, "of_one_surface", lambda picture, first, direct, part: first - direct())
+    monkeypatch.setattr(simulation, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
+    monkeypatch.setattr(simulation, "LARGE_RANDOM", 1 << 20 if small else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     images = simulation._completed(picture, (np.full((2, 2), 7.0),), (), How())
-    assert [each[1:] for each in asked] == [(True, False)] * 4
-    assert [shown is picture for shown, *_ in asked] == [True, False, False, False]
+    assert [each[1:] for each in asked] == [(True, False)] * (4 + small)
+    assert [shown is picture for shown, *_ in asked].count(True) == 1 + small
     assert len({shown for shown, *_ in asked}) == 4
+    assert fine == [small] + [False] * (3 + small)
     assert [each.flat[0] for each in images.changed["reflectance"]] == [7 - 1]
-    assert [each.flat[0] for each in images.changed["light_place"]] == [7 + 2 - 1, 7 + 3 - 1, 7 + 4 - 1]
+    assert [each.flat[0] for each in images.changed["light_place"]] == [7 + k - (5 if small else 1) for k in (2, 3, 4)]
