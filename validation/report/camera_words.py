@@ -15,29 +15,29 @@ def told(scene: Scene) -> str:
 
     >>> import scenes
     >>> told(scenes.load("task1"))
-    '256 x 240 px, 8 px per cm at the part, noise 2.4 grey levels (1 sigma)'
+    '256 x 240 px, 8 px per cm at the part, noise sigma 2.4 grey levels'
     """
     camera = scene.camera
     scale = camera.focal_px / camera.distance
     image = f"{camera.width} x {camera.height} px, {scale:.3g} px per {scene.units} at the part"
-    return f"{image}, noise {_noise(scene.noise)}"
+    return f"{image}, noise sigma {_noise(scene.noise)}"
 
 
 def _noise(noise: Noise) -> str:
-    """Standard deviation of a grey level in darkness, rounding left out; also at half of the scale where light adds some.
+    """Standard deviation of a level in darkness, without rounding; also at half of the scale where light adds noise.
 
     >>> _noise(Noise(sigma=2.0)), _noise(Noise(sigma=1.0))
-    ('2 grey levels (1 sigma)', '1 grey level (1 sigma)')
+    ('2 grey levels', '1 grey level')
     >>> _noise(Noise(sigma=1.0, gain=0.05, bits=8))
-    '1 grey level (1 sigma) in darkness, 2.7 at half of the scale'
+    '1 grey level in darkness, 2.7 at half of the scale'
     >>> _noise(Noise(sigma=1.5, gain=0.05))
-    '1.5 grey levels (1 sigma) in darkness, and that of the light'
+    '1.5 grey levels in darkness, and that of the light'
     """
     dark = f"{noise.sigma:.3g} grey level{'s' * (noise.sigma != 1)}"
     if not noise.gain > 0:
-        return f"{dark} (1 sigma)"
+        return dark
     middle = full_scale(noise) / 2
     if not math.isfinite(middle):
-        return f"{dark} (1 sigma) in darkness, and that of the light"
+        return f"{dark} in darkness, and that of the light"
     lit = math.sqrt(recorded(noise, np.array([middle])).noise_variance[0])
-    return f"{dark} (1 sigma) in darkness, {lit:.2g} at half of the scale"
+    return f"{dark} in darkness, {lit:.2g} at half of the scale"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from validation.report.requirements import HALF, WELL, Grade
+from validation.report.requirements import WELL, Grade
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ LOOKS = {
     Grade.MISSING: Look("#8c1a11", "#8c1a11", "#ffffff", "8", _OCTAGON),
 }
 MEANS = {
-    Grade.WELL: f"{Grade.WELL} (U at most {100 * WELL:.0f} % of {HALF})",
-    Grade.WITHIN: f"{Grade.WITHIN} (U {100 * WELL:.0f} to 100 % of it)",
-    Grade.OVER: f"{Grade.OVER} (U larger than {HALF})",
+    Grade.WELL: f"{Grade.WELL} (U / half zone at most {100 * WELL:.0f} %)",
+    Grade.WITHIN: f"{Grade.WITHIN} (U / half zone {100 * WELL:.0f} to 100 %)",
+    Grade.OVER: f"{Grade.OVER} (U / half zone over 100 %)",
     Grade.OPEN: str(Grade.OPEN),
     Grade.DOUBT: f"{Grade.DOUBT} (do not rely on the value)",
     Grade.MISSING: f"{Grade.MISSING} (there is no value)",

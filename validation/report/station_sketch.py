@@ -19,8 +19,8 @@ _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
 ARROW = "azimuth 0"
-AZIMUTH = "Sketches to scale; azimuth counterclockwise from the part's x axis (arrow)."
-_CORNERS = np.array([[0.82, 0.2], [0.82, 0.84], [0.18, 0.84]])  # in parts of a view; in the fourth stands the scale
+AZIMUTH = "Azimuth: counterclockwise from the part's x axis (arrow)."
+_CORNERS = np.array([[0.79, 0.24], [0.79, 0.84], [0.21, 0.84]])  # in parts of a view; in the fourth stands the scale
 _VIEWS = ("from the side", "from above")
 
 

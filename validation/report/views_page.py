@@ -41,7 +41,7 @@ def write(found: planner.Views, path: Path) -> Path:
         "simulated": page.SIMULATED,
         "sentence": sentence(asked), "wrong": wrong(asked), "nothing": nothing_wrong(asked), "next": next_step(asked),
         "need": need(asked), "checked": "", "is_sky": True,
-        "camera": camera_words.told(scene),
+        "places": f"{camera_words.told(scene)}.",
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),

@@ -54,7 +54,7 @@ def _how(grade: Grade, some: Sequence[Requirement]) -> str:
     if grade == Grade.WELL:
         return f"measured precisely enough: U is at most {100 * WELL:.0f} % of {HALF}"
     if grade == Grade.WITHIN:
-        return f"usable, but less precise than the {100 * WELL:.0f} % aimed at: U is {_most(some)}"
+        return f"usable, but less precise than aimed at: U is {_most(some)}"
     if grade == Grade.OVER:
         return f"measured too uncertainly: U is larger than {HALF}"
     if grade == Grade.OPEN:
