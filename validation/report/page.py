@@ -196,6 +196,8 @@ def words(text: str) -> Markup:
 
     >>> words("`ice plan` of v3-v6 & more")
     Markup('<code>ice plan</code> of <span class="name">v3-v6</span> &amp; more')
+    >>> words("of setting 12: 5 %")
+    Markup('of setting\\xa012: 5\\xa0%')
     """
     shown = re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%")
     shown = re.sub(r"\b([Ss]etting|[Pp]icture) (?=\d)", "\\g<1>\N{NO-BREAK SPACE}", shown)
