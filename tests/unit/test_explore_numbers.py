@@ -85,7 +85,8 @@ def test_the_worst_of_all_colours_the_sphere_unless_another_is_asked_for(scene):
     shown = sphere.to_message(scene, first, np.array([[0.010, 0.011], [0.002, 0.013], [np.inf, 0.013], [0.01, np.nan]]))
     assert shown["values"][:2] == [pytest.approx(2 * 0.010 / 0.02), pytest.approx(2 * 0.013 / 0.026)]
     assert shown["values"][2:] == [None, None]
-    assert (shown["what"], shown["unit"], shown["shown"]) == ("2 sigma in per cent of the tolerance", "", "worst")
+    what = "2 sigma in per cent of half the tolerance zone"
+    assert (shown["what"], shown["unit"], shown["shown"]) == (what, "", "worst")
     bare = scene.model_copy(
         update={"measurands": tuple(m.model_copy(update={"tolerance": None}) for m in scene.measurands)}
     )

@@ -13,12 +13,14 @@ import pytest
 import measure
 import planner
 import scenes
+from imaging.geometry.projection import project
 from scenes import Picture, Tolerance
 from scenes.status import MEANINGS, MEASURED, REMEDIES, legend
 from validation.batch.campaign import Campaign
 from validation.explore import preview
 from validation.report import (
     budget_figure,
+    camera_words,
     canvas,
     guide,
     page,
@@ -128,11 +130,11 @@ def test_the_sentence_counts_all_and_names_what_is_wrong():
     assert text.startswith(
         "8 of 10 requirements are measured precisely enough: the uncertainty U (95 %) of the measurement is at most"
     )
-    assert "Step (no. 9) is measured too uncertainly: U is larger than the tolerance. " in text
+    assert "Step (no. 9) is measured too uncertainly: U is larger than half the tolerance zone. " in text
     assert text.endswith("Square (no. 10) is not proven: its value must not be relied on.")
     square, step = wording.wrong(several)
     assert square == f"Square (no. 10), status clutter: {MEANINGS['clutter']}."
-    assert step == "Step (no. 9): U is 1.5 times the tolerance; most of it comes from pixel noise."
+    assert step == "Step (no. 9): U is 1.5 times half the tolerance zone; most of it comes from pixel noise."
     first, second = wording.next_step(several).split(". Step")
     assert first == f"Square (no. 10): {REMEDIES['clutter']}"
     assert second == (
@@ -191,14 +193,17 @@ def test_what_has_no_value_is_not_measured_and_what_has_one_is_not_proven():
     assert [line.cells[5] for line in lines] == ["-", "-"]
 
 
-def test_nothing_is_wrong_where_all_are_usable_and_those_below_the_aim_are_named():
+def test_nothing_is_wrong_where_all_are_usable_and_those_that_are_no_more_are_named():
     well, within = required(), required(2, u=0.012, name="slot")
     assert wording.nothing_wrong([well]) == "Nothing."
-    assert wording.nothing_wrong([well, within]) == ("Nothing is wrong; slot (no. 2) is less precise than aimed at.")
-    both = [within, dataclasses.replace(within, number=3, name="step")]
-    assert wording.nothing_wrong([well, *both]).endswith(
-        "slot (no. 2) and step (no. 3) are less precise than aimed at."
+    assert wording.nothing_wrong([well, within]) == (
+        "Nothing is wrong: slot (no. 2) is usable (U is 60 % of half the tolerance zone)."
     )
+    both = [within, dataclasses.replace(within, number=3, name="step", U=0.008)]
+    assert wording.nothing_wrong([well, *both]).endswith(
+        ": slot (no. 2) and step (no. 3) are usable (U is up to 60 % of half the tolerance zone)."
+    )
+    assert wording.nothing_wrong(both).startswith("Nothing is wrong: all 2 requirements are usable (U is up to 60 %")
 
 
 def test_a_run_is_titled_by_its_part():
@@ -348,8 +353,6 @@ def test_marks_lie_on_what_is_measured(plate):
     names = [quantity.name for quantity in scene.quantities]
     rim = marks[names.index("bore")].lines[0]
     circle = scene.solid.circle("c2")
-    from imaging.geometry.projection import project
-
     pose = np.array(list(plate.sensor))
     around = project(circle.centre + circle.radius * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0.0]]), pose, scene.camera)
     for point in around:
@@ -410,19 +413,24 @@ def test_lamps_are_drawn_where_they_stand(name, monkeypatch):
 
 @pytest.mark.parametrize("azimuth", [0.0, 85.0, 200.0])
 def test_the_view_from_above_shows_azimuth_0(plate, azimuth, monkeypatch):
-    """An arrow along the part's x axis as the view turns it, within the view, away from camera and lamp; no other."""
+    """An arrow along the part's x axis as the view turns it, within the view, off camera and lamp, named below it."""
     picture = Picture.of(plate.scene, (20, azimuth), (30, azimuth + 130))
     kept = []
     monkeypatch.setattr(station_sketch, "inline", lambda figure, *given: kept.append(figure) or "")
     station_sketch.draw(picture)
     try:
         side, above = (figure.axes[0] for figure in kept)
-        assert not any(text.get_text() == "x" for text in side.texts)
+        assert not any(text.get_text() == "azimuth 0" for text in side.texts)
         (arrow,) = (text for text in above.texts if getattr(text, "arrow_patch", None) is not None)
-        (letter,) = (text for text in above.texts if text.get_text() == "x")
+        (letter,) = (text for text in above.texts if text.get_text() == "azimuth 0")
         way, turn = np.array(arrow.xy) - arrow.get_position(), np.radians(azimuth)
         assert way / np.linalg.norm(way) == pytest.approx([np.cos(turn), -np.sin(turn)], abs=1e-9)
         (left, right), (low, high) = above.get_xlim(), above.get_ylim()
+        above.figure.canvas.draw()
+        box, inside = letter.get_window_extent(), above.get_window_extent()
+        assert inside.x0 < box.x0 < box.x1 < inside.x1
+        assert inside.y0 < box.y0
+        assert box.y1 < above.transData.transform([arrow.xy, arrow.get_position()])[:, 1].min()
         for x, y in (arrow.xy, arrow.get_position(), letter.get_position()):
             assert left + 0.06 * (right - left) < x < right - 0.06 * (right - left)  # margin: by half a letter's size
             assert low + 0.06 * (high - low) < y < high - 0.06 * (high - low)  # margin: by half a letter's size
@@ -479,14 +487,14 @@ def test_the_tables_cells_say_unit_zone_and_part():
     assert [line.number for line in made] == [4, 3, 5]
     assert [line.fails for line in made] == [True, False, False]
     assert well.cells[:5] == ("bore", "4 mm", "+0.03 -0.01 mm", "0.00050 mm", "+0.00010 mm")
-    assert well.cells[5:] == ("0.0040 mm", "20 %", "precise enough", "pixel noise, 90 %")
+    assert well.cells[5:] == ("0.00400 mm", "20 %", "precise enough", "pixel noise, 90 %")
     assert well.part == pytest.approx(0.2)
     assert (doubtful.part, doubtful.cells[5], doubtful.cells[7]) == (None, "-", "not proven: clutter")
-    assert (free.part, free.cells[2], free.cells[7]) == (None, "-", "no tolerance given")
+    assert (free.part, free.cells[2], free.cells[5], free.cells[7]) == (None, "-", "0.0010 mm", "no tolerance given")
     bare = station_table.lines([required(3, u=0.004)], units=False)[0]
-    assert bare.cells[1:6] == ("4 mm", "+0.03 -0.01", "0.00050", "+0.00010", "0.0040")
+    assert bare.cells[1:6] == ("4 mm", "+0.03 -0.01", "0.00050", "+0.00010", "0.00400")
     lean = dataclasses.replace(required(u=0.004), unit="degrees", nominal=90.0)
-    assert station_table.lines([lean])[0].cells[1:6] == ("90°", "+0.03 -0.01°", "0.00050°", "+0.00010°", "0.0040°")
+    assert station_table.lines([lean])[0].cells[1:6] == ("90°", "+0.03 -0.01°", "0.00050°", "+0.00010°", "0.00400°")
 
 
 def test_the_terms_explain_what_the_table_needs():
@@ -499,6 +507,40 @@ def test_the_terms_explain_what_the_table_needs():
     assert station_table.note([placed]).endswith(
         "x, y: distances of a position from its first and its second datum edge."
     )
+    told = [line.about for line in station_table.lines([placed, required(2, name="bore from sides.y"), well])]
+    assert told == ["distance from its first datum edge", "distance from its second datum edge", ""]
+
+
+@pytest.mark.parametrize("half", [0.02, 0.03, 0.07])
+def test_a_ratio_follows_from_the_u_beside_it(half):
+    """To the half of its last digit that it is rounded by, and what three digits of U leave: a two-hundredth."""
+    for u in half * np.geomspace(0.01, 0.99, 97):
+        cells = station_table.lines([required(u=u, tolerance=Tolerance(plus=half, minus=half))])[0].cells
+        shown, printed = float(cells[6].split()[0]), 100 * float(cells[5].split()[0]) / half
+        digit = 10.0 ** (np.floor(np.log10(shown)) - 1)
+        assert abs(shown - printed) <= 0.5 * digit + 0.005 * printed
+
+
+@pytest.mark.parametrize("name", ["plate", "bracket_mm", "backlight_plate"])
+def test_the_cameras_scale_is_that_of_the_image_at_what_it_looks_at(name):
+    """By two points of the scene a thousandth of the distance apart, across the camera's axis."""
+    scene = scenes.load(name)
+    pose, camera = np.array(list(scene.settings[0].sensor)), scene.camera
+    azimuth = np.radians(pose[1])
+    across = np.array([[-np.sin(azimuth), np.cos(azimuth), 0.0]]) * camera.distance / 2000
+    one, other = project(np.array(camera.look_at) + np.concatenate([-across, across]), pose, camera)
+    size, noise = f"{camera.width} x {camera.height} px", f"noise sigma {scene.noise.sigma:g} grey levels"
+    scale = np.linalg.norm(one - other) / (camera.distance / 1000)
+    assert camera_words.told(scene) == f"{size}, {scale:.3g} px per {scene.units} at the part, {noise}"
+
+
+def test_pages_tell_the_camera(plate):
+    """In their first paragraph on places, and in Markdown."""
+    first = page.first_screen(station.of_picture(plate))
+    assert first["places"].startswith(
+        "256 x 240 px, 8 px per cm at the part, noise sigma 2.4 grey levels. Camera 100 cm"
+    )
+    assert first["section"].answer.endswith(f" Camera: {camera_words.told(plate.scene)}.")
 
 
 def test_the_scale_of_the_sketch_is_a_length_of_its_view(plate, monkeypatch):
@@ -543,8 +585,8 @@ def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
         "simulated": page.SIMULATED,
     }
     told = page._of_run(first, found, SimpleNamespace(number=1))
-    after = "In 2 of the 3 other settings, not shown here, not everything is proven: "
-    after += f"{MEANINGS['short']} (status short), once; not measured, once."
+    after = f"In 2 of the 3 other settings not everything is proven ({MEANINGS['short']} (status short), once; "
+    after += "not measured, once); this need not concern setting 1, shown here."
     assert told["wrong"][-2:] == ["It is dark.", after]
     assert told["what"] == "1 width. 4 settings of camera and lamp were tried; shown is the best, setting 1"
     if agrees:
@@ -633,11 +675,14 @@ def test_a_page_does_not_sign_what_a_simulation_doubts(plate, tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("bias", "u", "told"),
     [
-        (0.0123, 0.0021, "+0.0123 ± 0.0021"), (-0.00001, 0.0021, "0 ± 0.0021"), (0.0, 0.00003, "0, ± less than 0.0001"),
+        (0.0123, 0.0021, "+0.0123 ± 0.0021"), (-0.00001, 0.0021, "0 ± 0.0021"), (0.01234, 0.032, "+0.012 ± 0.032"),
+        (0.00012, 0.00021, "+0.00012 ± 0.00021"), (0.0, 0.000003, "0, ± less than 0.00001"),
+        (0.0, 0.0, "0, ± less than 0.0001"),
         (0.0123, None, "+0.0123"), (0.0123, math.inf, "+0.0123 ± not known"), (None, 0.1, "not known"),
     ],
 )  # fmt: skip
-def test_a_bias_is_said_with_the_digits_of_sigma(bias, u, told):
+def test_a_bias_is_said_with_two_digits_of_its_uncertainty(bias, u, told):
+    """Without one with those of sigma, and never with more than one digit more than that."""
     one = Requirement(1, "bore", "mm", 4.0, TOLERANCE, 0.0005, bias, u, 0.001, "ok", "")
     assert station_table._bias(one, 4) == told
 

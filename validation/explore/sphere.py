@@ -121,7 +121,7 @@ def to_message(scene: Scene, state: State, sigmas: np.ndarray) -> dict[str, Any]
     return {
         "borders": cells(below=is_below(state)).borders.tolist(),
         "values": [float(f"{value:.4g}") if np.isfinite(value) else None for value in chosen],
-        "what": "2 sigma in per cent of the tolerance" if ratio else "sigma",
+        "what": "2 sigma in per cent of half the tolerance zone" if ratio else "sigma",
         "unit": "" if ratio else "degrees" if quantity.is_angle else scene.units,
         "shown": state.shown,
         "moving": state.moving,

@@ -19,6 +19,7 @@ from scenes.status import is_trusted
 from validation.report.canvas import TEXT, WIDTH, inline, save
 from validation.report.cells import name as shown_name
 from validation.report.cells import percent
+from validation.report.requirements import HALF
 from validation.report.source_words import keyed
 
 _SOURCES = 6  # that have a colour of their own; the others are one
@@ -104,11 +105,11 @@ def _finished(axis, names: list[str], ends: np.ndarray, toleranced: bool) -> Non
     most = float(ends.max(initial=0))
     far = toleranced and most < 20
     if toleranced and not far:
-        axis.axvline(100, color="black", lw=1.4, ls="--", label="limit: U is as large as the tolerance")
+        axis.axvline(100, color="black", lw=1.4, ls="--", label=f"limit: U is as large as {HALF}")
     axis.set(ylim=(len(names) - 0.45, -0.55), xlim=(0, max(1.45 * most, 110 if toleranced and not far else 0, 1e-9)))
     axis.set_yticks(range(len(names)), [n if len(n) <= _LONGEST else n[: _LONGEST - 1] + "…" for n in names])
     axis.tick_params(labelsize=TEXT)
-    what = "U, % of the tolerance" if toleranced else "U, each 100 %: no tolerance is given"
+    what = f"U, % of {HALF}" if toleranced else "U, each 100 %: no tolerance is given"
     axis.set_xlabel(f"{what} (limit: 100 %)" if far else what, fontsize=TEXT)
     axis.figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=1, frameon=False,
                        fontsize=TEXT)  # fmt: skip

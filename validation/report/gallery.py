@@ -89,8 +89,8 @@ def page(told: Callable[[Scene], str] = told) -> str:
         "# Gallery",
         "The bundled scenes, each rendered at its first setting, with what is measured in it (`ice scenes` lists them, "
         "`ice validate NAME` proves one). All is simulated; biases that a simulation tells are taken off, and what it "
-        "is not sure of is part of U. Blue circles: measured precisely enough, U at most a quarter of the "
-        "tolerance; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; "
+        "is not sure of is part of U. Blue circles: measured precisely enough, U at most a quarter of half "
+        "the tolerance zone; squares: usable, U up to all of it; diamonds: too uncertain; grey: no tolerance is given; "
         "octagons: white not proven, red not measured.",
     ]
     return "\n\n".join(parts + [_entry(scene, told(scene)) for scene in map(scenes.load, scenes.names())]) + "\n"

@@ -36,9 +36,9 @@ LOOKS = {
     Grade.MISSING: Look("#8c1a11", "#8c1a11", "#ffffff", "8", _OCTAGON),
 }
 MEANS = {
-    Grade.WELL: f"{Grade.WELL} (U at most {100 * WELL:.0f} % of the tolerance)",
-    Grade.WITHIN: f"{Grade.WITHIN} (U {100 * WELL:.0f} to 100 % of the tolerance)",
-    Grade.OVER: f"{Grade.OVER} (U larger than the tolerance)",
+    Grade.WELL: f"{Grade.WELL} (U / half zone at most {100 * WELL:.0f} %)",
+    Grade.WITHIN: f"{Grade.WITHIN} (U / half zone {100 * WELL:.0f} to 100 %)",
+    Grade.OVER: f"{Grade.OVER} (U / half zone over 100 %)",
     Grade.OPEN: str(Grade.OPEN),
     Grade.DOUBT: f"{Grade.DOUBT} (do not rely on the value)",
     Grade.MISSING: f"{Grade.MISSING} (there is no value)",

@@ -209,7 +209,8 @@ def elsewhere(found: Validation, number: int | None) -> list[str]:
     which = "the other setting" if len(others) == 1 else f"{doubtful} of the {len(others)} other settings"
     told = Counter(state for each in states for state in each).most_common()
     why = "; ".join(f"{_meant(state)}, {_times(count)}" for state, count in told)
-    return [f"In {which}, not shown here, not everything is proven: {why}."]
+    shown = f"; this need not concern setting {number}, shown here" if number else ""
+    return [f"In {which} not everything is proven ({why}){shown}."]
 
 
 def _times(count: int) -> str:

@@ -19,6 +19,7 @@ from validation.report import (
     budget_figure,
     budget_section,
     budget_table,
+    camera_words,
     cells,
     guide,
     page_tables,
@@ -109,7 +110,7 @@ def _context(station: Station, first: dict[str, Any], title: str, sections: list
 def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     """What the template of a page's first screen takes; of photographs nothing is simulated."""
     found, picture = station.requirements, station.picture
-    told = station_sketch.told(picture)
+    told, camera = station_sketch.told(picture), camera_words.told(picture.scene)
     placed = f"Setting {station.number}: " if station.number else ""
     how = f"{_shown(station, is_simulated)}{station_view.enlarged(picture)}"
     named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
@@ -127,14 +128,15 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
         "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"What is measured{how} {named}."),
-        "sketched": f"{told[0].upper()}{told[1:]}. {station_sketch.AZIMUTH}",
+        "places": f"{camera}. {told[0].upper()}{told[1:]}. {station_sketch.AZIMUTH}",
+        "sketched": "",
         "caption": f"What is measured{how}",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
         "lines": station_table.lines(found),
         "above": station_table.ABOVE,
         "note": station_table.note(found),
-        "section": Section("Requirements", answer=f"{placed}{told}.", tables=[table]),
+        "section": Section("Requirements", answer=f"{placed}{told}. Camera: {camera}.", tables=[table]),
     }
 
 
@@ -189,12 +191,16 @@ def linked(text: str, numbers: Sequence[int]) -> Markup:
 
 
 def words(text: str) -> Markup:
-    """A text as HTML: commands between backticks as such, names with a hyphen not broken there.
+    """A text as HTML: commands between backticks as such, names with a hyphen not broken there, nor numbers after what
+    they count.
 
     >>> words("`ice plan` of v3-v6 & more")
     Markup('<code>ice plan</code> of <span class="name">v3-v6</span> &amp; more')
+    >>> words("of setting 12: 5 %")
+    Markup('of setting\\xa012: 5\\xa0%')
     """
     shown = re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text))).replace(" %", "\N{NO-BREAK SPACE}%")
+    shown = re.sub(r"\b([Ss]etting|[Pp]icture) (?=\d)", "\\g<1>\N{NO-BREAK SPACE}", shown)
     return Markup(re.sub(r"(?<![\w&;<-])\w[\w.]*(?:-[\w.]*\w)+(?!\w)", r'<span class="name">\g<0></span>', shown))
 
 

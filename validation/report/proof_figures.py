@@ -22,6 +22,7 @@ from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import cells
 from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.requirements import HALF
 
 MOST = 5000  # settings that are looked at, evenly spaced
 _SINGLE = 60  # lines up to which each has its own place; beyond they are grouped
@@ -171,7 +172,7 @@ def bias(lines: Sequence[Line]) -> Markup:
         axis.axvline(place, color="black", lw=0.9, ls="--")
     axis.axvline(0, color="black", lw=0.6)
     axis.set_xlim(-1.1 * max(ends), 1.1 * max(ends))
-    axis.set_xlabel("bias, % of the tolerance" if toleranced else "bias, sigmas of one picture")
+    axis.set_xlabel(f"bias, % of {HALF}" if toleranced else "bias, sigmas of one picture")
     return inline(figure, "bias", bias_told(shown))
 
 
@@ -192,7 +193,7 @@ def bias_told(lines: Sequence[Line]) -> str:
     worst = max(some, key=lambda line: (round(abs(line.bias) / line.half, 9), -line.setting))
     part = 100 * abs(worst.bias) / worst.half
     name = cells.name(worst.name)
-    what = "Mean errors and their 95 % intervals against the tolerance (band)"
+    what = f"Mean errors and their 95 % intervals against {HALF} (band)"
     return f"{what}: the largest, of {name}, is {part:.2g} % of it."
 
 

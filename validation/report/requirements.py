@@ -17,7 +17,8 @@ from scenes.results import finite
 from scenes.status import MEASURED, is_trusted
 from validation.report import cells, source_words
 
-WELL = 0.25  # of half the tolerance: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
+HALF = "half the tolerance zone"  # what U is compared with, in words
+WELL = 0.25  # of it: a test uncertainty ratio of 4 to 1 (ANSI/NCSL Z540.3)
 
 
 class Grade(StrEnum):

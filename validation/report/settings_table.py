@@ -26,7 +26,7 @@ def table(found: Validation, halves: dict[str, float], chosen: int | None) -> Ta
              for row in rows]  # fmt: skip
     note = f"The best {_ROWS} of {len(found.rows)}; all are in table.csv." if len(found.rows) > _ROWS else ""
     what = f"{PLACED} {_proof(rows)} " + (
-        "largest sigma: of the requirement whose sigma is largest against its tolerance, in per cent of it."
+        "largest sigma: of the requirement whose sigma is largest against its tolerance, in per cent of half the zone."
         if halves
         else f"largest sigma: of {shown_name(found.rows[0].measurands[0].name)}, one picture's; no tolerance is given."
     )

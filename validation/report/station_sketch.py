@@ -18,8 +18,9 @@ from validation.report.canvas import TEXT, inline
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
-AZIMUTH = "The sketches are to scale; azimuth is counted counterclockwise from the part's x axis (arrow)."
-_CORNERS = np.array([[0.84, 0.16], [0.84, 0.84], [0.16, 0.84]])  # in parts of a view; in the fourth stands the scale
+ARROW = "azimuth 0"
+AZIMUTH = "Azimuth: counterclockwise from the part's x axis (arrow)."
+_CORNERS = np.array([[0.79, 0.24], [0.79, 0.84], [0.21, 0.84]])  # in parts of a view; in the fourth stands the scale
 _VIEWS = ("from the side", "from above")
 
 
@@ -121,7 +122,8 @@ def _azimuth(axis, flat: np.ndarray, places: list[np.ndarray]) -> None:
     away = [min(np.linalg.norm(place - corner) for place in places) for corner in corners]
     centre, half = corners[np.argmax(np.round(away, 6))], 0.05 * size[0] * along
     axis.annotate("", centre + half, xytext=centre - half, arrowprops={"arrowstyle": "->", "lw": 1.2})
-    axis.text(*(centre + 1.8 * half), "x", fontsize=TEXT, ha="center", va="center")
+    below = np.array([0.0, abs(half[1]) + 0.06 * size[1]])
+    axis.text(*(centre - below), ARROW, fontsize=TEXT, ha="center", va="center")
 
 
 def _scale(axis, units: str) -> None:

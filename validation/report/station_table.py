@@ -10,33 +10,33 @@ from validation.report import cells
 from validation.report.budget_table import decimals
 from validation.report.grades import LOOKS, Look
 from validation.report.page_tables import Table
-from validation.report.requirements import WELL, Grade, Requirement
+from validation.report.requirements import HALF, WELL, Grade, Requirement
 
+_DATUMS = ((", x", "first"), (", y", "second"))  # how names of coordinates end, and the edges they are counted from
 COLUMNS = (
     "", "requirement", "nominal", "tolerance", "sigma", "bias", "U", "U / half zone", "measurement", "limited by",
 )  # fmt: skip
-PART = (
-    "U / half zone: U over half of the tolerance zone (of ±0.02 mm: over 0.02 mm), in words per cent of the tolerance."
-)
+PART = f"U / half zone: U over {HALF} (of ±0.02 mm: over 0.02 mm)."
 ABOVE = f"U: expanded uncertainty (95 %). {PART}"
-GRADED = f"Up to {100 * WELL:.0f} % of the tolerance a measurement is precise enough, up to 100 % usable."
+GRADED = f"Up to {100 * WELL:.0f} % of {HALF} a measurement is precise enough, up to 100 % usable."
 NOTE = (
-    "sigma: standard deviation of one picture's value, by noise. bias: mean error once the simulated correction, where "
-    "one was made, is taken off, ± its standard uncertainty where that is known. U: by all that is not exactly known. "
-    f"limited by: what adds most to U, and its share of U². {GRADED}"
+    "sigma: standard deviation of one picture's value, by noise. bias: mean error that is left after the simulated "
+    "correction (all of it where none was made), ± standard uncertainty of the correction, which is part of U. "
+    "limited by: what adds most to U, and its share of U²."
 )
 
 
 @dataclass(frozen=True)
 class Line:
     """A requirement as text; ``part`` is U over half of the tolerance zone, for the bar, at most 1; ``fails``: as of
-    its grade."""
+    its grade; ``about`` what its name does not say, empty where that is nothing."""
 
     number: int
     look: Look
     cells: tuple[str, ...]
     part: float | None
     fails: bool
+    about: str = ""
 
 
 def lines(found: Sequence[Requirement], *, units: bool = True) -> list[Line]:
@@ -45,7 +45,7 @@ def lines(found: Sequence[Requirement], *, units: bool = True) -> list[Line]:
     worst = [each for grade in (Grade.MISSING, Grade.DOUBT, Grade.OVER) for each in found if each.grade == grade]
     return [
         Line(each.number, LOOKS[each.grade], _cells(each, each.unit if units else ""),
-             None if each.ratio is None else min(each.ratio, 1.0), each.grade.fails)
+             None if each.ratio is None else min(each.ratio, 1.0), each.grade.fails, _about(each))
         for each in (*worst, *(each for each in found if not each.grade.fails))
     ]  # fmt: skip
 
@@ -72,7 +72,7 @@ def _cells(each: Requirement, unit: str) -> tuple[str, ...]:
     part = "-" if each.ratio is None else cells.percent(each.ratio)
     doubtful = each.grade in (Grade.MISSING, Grade.DOUBT)
     sigma = "-" if not math.isfinite(each.sigma) else f"{each.sigma:.{places}f}"
-    whole = "-" if each.U is None or doubtful else f"{each.U:.{decimals(each.U)}f}"
+    whole = "-" if each.U is None or doubtful else f"{each.U:.{_places(each.U, each.ratio is not None)}f}"
     return (
         each.title, cells.united(f"{each.nominal:.6g}", each.unit), cells.united(cells.zone(each.tolerance), unit),
         cells.united(sigma, unit), _bias(each, places, unit), cells.united(whole, unit),
@@ -80,10 +80,27 @@ def _cells(each: Requirement, unit: str) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+def _places(U: float, compared: bool) -> int:
+    """Decimal places of U: two digits, and a third where its ratio to the tolerance, which has two, stands beside it.
+
+    >>> _places(0.00134, True), _places(0.00134, False), _places(13.4, True), _places(134.0, True)
+    (5, 4, 1, 0)
+    """
+    return decimals(U) + (compared and U < 100)
+
+
+def _about(each: Requirement) -> str:
+    """What a coordinate of a position is counted from."""
+    return next((f"distance from its {which} datum edge" for axis, which in _DATUMS if each.title.endswith(axis)), "")
+
+
 def _bias(each: Requirement, places: int, unit: str = "") -> str:
-    """With its standard uncertainty, the unit once at the end."""
+    """With its standard uncertainty, to two digits of that, the unit once at the end; ``places`` those of sigma, which
+    nothing has more than one more of."""
     if each.bias is None:
         return "not known"
+    if each.u_bias and math.isfinite(each.u_bias):
+        places = min(decimals(each.u_bias), places + 1)
     told = f"{each.bias:+.{places}f}"
     told = "0" if float(told) == 0 else told
     if each.u_bias is None:

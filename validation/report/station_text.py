@@ -24,7 +24,7 @@ def report(found: Sequence[Requirement], title: str) -> Group:
         for line in station_table.lines(found, units=False)
     )
     table = cells.table(title, *columns, rows=rows, words=_WORDS, wrap=True)
-    terms = _plain(f"{station_table.ABOVE} {station_table.note(found)}")
+    terms = _plain(f"{station_table.ABOVE} {station_table.note(found)} {station_table.GRADED}")
     lines = [Text(f" {terms} {_UNITS}"), Text(f"\n{sentence(found)}", style="bold")]
     lines += [Text(f"What is wrong: {line}") for line in wrong(found)]
     lines.append(Text(f"What to do next: {next_step(found)}"))

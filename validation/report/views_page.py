@@ -16,7 +16,7 @@ from scipy.stats import norm
 import planner
 from scenes import Picture
 from scenes.results import finite
-from validation.report import cells, map_figure, page, station_table, station_view
+from validation.report import camera_words, cells, map_figure, page, station_table, station_view
 from validation.report.canvas import TEXT, WIDTH, inline
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
@@ -41,6 +41,7 @@ def write(found: planner.Views, path: Path) -> Path:
         "simulated": page.SIMULATED,
         "sentence": sentence(asked), "wrong": wrong(asked), "nothing": nothing_wrong(asked), "next": next_step(asked),
         "need": need(asked), "checked": "", "is_sky": True,
+        "places": f"{camera_words.told(scene)}.",
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from scenes.status import MEANINGS, REMEDIES, WORST_FIRST, is_trusted
 from validation.report import cells, source_words
-from validation.report.requirements import WELL, Grade, Requirement
+from validation.report.requirements import HALF, WELL, Grade, Requirement
 
 _NAMED = 4  # requirements that a sentence names
 _UNCERTAINTY = "the uncertainty U (95 %) of the measurement"  # where U is first spoken of
@@ -52,18 +52,22 @@ def sentence(found: Sequence[Requirement]) -> str:
 def _how(grade: Grade, some: Sequence[Requirement]) -> str:
     """Of requirements of one grade."""
     if grade == Grade.WELL:
-        return f"measured precisely enough: U is at most {100 * WELL:.0f} % of the tolerance"
+        return f"measured precisely enough: U is at most {100 * WELL:.0f} % of {HALF}"
     if grade == Grade.WITHIN:
-        most = f"{'up to ' * (len(some) > 1)}{cells.percent(max(each.ratio for each in some))}"
-        return f"usable, but less precise than the {100 * WELL:.0f} % aimed at: U is {most} of the tolerance"
+        return f"usable, but less precise than aimed at: U is {_most(some)}"
     if grade == Grade.OVER:
-        return "measured too uncertainly: U is larger than the tolerance"
+        return f"measured too uncertainly: U is larger than {HALF}"
     if grade == Grade.OPEN:
         return f"measured{_known(some)}; no tolerance is given to compare with"
     if grade == Grade.MISSING:
         states = {each.status for each in some}
         return f"not measured: {MEANINGS[states.pop()] if len(states) == 1 else 'they have no value'}"
     return f"not proven: {'its value' if len(some) == 1 else 'their values'} must not be relied on"
+
+
+def _most(some: Sequence[Requirement]) -> str:
+    """The largest U of some that are usable, against their tolerances."""
+    return f"{'up to ' * (len(some) > 1)}{cells.percent(max(each.ratio or 0.0 for each in some))} of {HALF}"
 
 
 def _known(some: Sequence[Requirement]) -> str:
@@ -85,7 +89,7 @@ def wrong(found: Sequence[Requirement]) -> list[str]:
             lines.append(f"{_named(some, found)}, status {status}: {about}.")
     for each in found:
         if each.grade == Grade.OVER and each.ratio is not None:
-            lines.append(f"{_named([each], found)}: U is {each.ratio:.2g} times the tolerance{_mostly(each)}.")
+            lines.append(f"{_named([each], found)}: U is {each.ratio:.2g} times {HALF}{_mostly(each)}.")
     if some := [each for each in found if each.grade == Grade.OPEN]:
         whose = "" if len(some) == len(found) else f" for {_named(some, found)}"
         lines.append(f"no tolerance is given{whose}: whether U is small enough cannot be told.")
@@ -93,9 +97,11 @@ def wrong(found: Sequence[Requirement]) -> list[str]:
 
 
 def nothing_wrong(found: Sequence[Requirement]) -> str:
-    """What is said where nothing is wrong: also which are less precise than aimed at."""
+    """What is said where nothing is wrong: also which are usable only, and how precise they are."""
     within = [each for each in found if each.grade == Grade.WITHIN]
-    return f"Nothing is wrong; {_which(within, found)} less precise than aimed at." if within else "Nothing."
+    if not within:
+        return "Nothing."
+    return f"Nothing is wrong: {_which(within, found)} usable (U is {_most(within)})."
 
 
 def next_step(found: Sequence[Requirement]) -> str:

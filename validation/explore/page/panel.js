@@ -105,7 +105,7 @@ export function budget(rows) {
   $("budget").replaceChildren(...rows.map((each) => {
     const made = element("div", "", "source"), head = element("p"), bar = element("span", "", "part wide");
     const told = each.U === null ? "cannot be measured" : each.ratio === null ? `U ${united(number(each.U, 2), each.unit)}, no tolerance given`
-      : `U ${united(number(each.U, 2), each.unit)}, ${percent(each.ratio)} of the tolerance`;
+      : `U ${united(number(each.U, 2), each.unit)}, ${percent(each.ratio)} of half the tolerance zone`;
     head.append(element("span", named(each.name)), element("span", told));
     const long = each.ratio === null ? 1 : Math.min(each.ratio, 1);
     each.parts.forEach(([name, share]) => {
