@@ -108,7 +108,8 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
 
 def _by_inputs(off: measure.Correction) -> np.ndarray:
     """Standard uncertainties (M,) of the biases by all but the renderer's noise: `beside` has that."""
-    return np.sqrt(np.maximum(off.u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
+    with np.errstate(invalid="ignore"):  # infinite where a value is not measured
+        return np.sqrt(np.maximum(off.u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
 
 
 def _true(picture: Picture, off: measure.Correction) -> np.ndarray:
