@@ -1,6 +1,7 @@
 """The notebook of the documentation, `docs/notebook.ipynb`: it is what `python -m validation.report.executed` makes."""
 
 import json
+import re
 import sys
 
 import pytest
@@ -44,6 +45,16 @@ def test_the_notebook_runs_and_shows_what_is_stored():
     found = executed.run(stored, less)
     assert kinds(found) == kinds(stored)
     assert [cell["source"] for cell in found["cells"]] == [cell["source"] for cell in stored["cells"]]
+
+
+def test_the_notebook_names_no_folder_of_the_machine_that_it_was_run_on(tmp_path):
+    """Files of this project are named as from its root."""
+    assert not re.search(r"Path\('/", (DOCS / "notebook.ipynb").read_text(encoding="utf-8"))
+    path, source = tmp_path / "small.ipynb", f"'{executed.ROOT}/scenes/plate.ply'"
+    cell = {"cell_type": "code", "metadata": {}, "execution_count": None, "outputs": [], "source": [source]}
+    path.write_text(json.dumps({"cells": [cell], "metadata": {}}))
+    executed.write(path)
+    assert json.loads(path.read_text())["cells"][0]["outputs"][0]["data"]["text/plain"] == ["'scenes/plate.ply'"]
 
 
 def test_a_cell_shows_what_it_prints_and_what_its_last_line_is_worth(tmp_path):

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).parents[2]
+
 
 def run(notebook: dict[str, Any], change: Callable[[str], str] = str) -> dict[str, Any]:
     """The same notebook (nbformat 4) with the outputs that its code cells have now.
@@ -36,9 +38,9 @@ def run(notebook: dict[str, Any], change: Callable[[str], str] = str) -> dict[st
 
 
 def write(path: Path) -> None:
-    """Run a notebook's file and write it back."""
-    notebook = json.loads(path.read_text(encoding="utf-8"))
-    path.write_text(json.dumps(run(notebook), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    """Run a notebook's file and write it back; files of this project are named as from its root."""
+    text = json.dumps(run(json.loads(path.read_text(encoding="utf-8"))), indent=1, ensure_ascii=False)
+    path.write_text(text.replace(f"{ROOT}/", "") + "\n", encoding="utf-8")
 
 
 def _executed(cell: dict[str, Any], number: int, change: Callable[[str], str], names: dict[str, Any]) -> dict[str, Any]:
