@@ -29,6 +29,7 @@ from render import variant as variants
 from scenes import ImageTexture, Picture
 from scenes.status import ALL
 from validation import dimmed, simulation
+from validation.code_digest import digest
 from validation.remeasured import Method
 from validation.simulation import How
 
@@ -92,11 +93,7 @@ def _digest(picture: Picture, method: Method, how: How) -> str:
 @functools.cache
 def _code() -> bytes:
     """Digest of the code that makes the numbers."""
-    folders = [Path(package.__file__).parent for package in (scenes, imaging, render, measure)]
-    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
-        Path(module.__file__) for module in (dimmed, simulation)
-    ]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).digest()
+    return digest((scenes, imaging, render, measure), (dimmed, simulation))
 
 
 def _read(file: Path, picture: Picture, method: Method) -> Correction | None:

@@ -24,7 +24,7 @@ EQUIVALENT: dict[str, str] = {
     "imaging/models/texture.py: middle = edge_points(scene.solid, (name,), np.array([0.5]))[-1]":
         "of one edge the last is the first",
     "planner/search/exhaustive.py: _NONE = np.inf, - 2, -1": "numbers of no pair, before one is found",
-    'validation/batch/job.py: return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[: 15]':
+    "validation/batch/job.py: return digest((scenes, imaging, planner, render, measure), modules).hex()[: 15]":
         "a digit less of a digest",
     "planner/view_sets.py: told = zip(self.views[-1].prediction.measurands, self.combination.variances, strict=True)":
         "names and tolerances are those of the scene, in each picture the same",

@@ -66,3 +66,11 @@ def test_files_are_found_wherever_a_document_names_them(tmp_path):
     assert scene["object"]["file"] == f"content {digests['part.stl']} of part.stl"
     assert scene["textures"][1]["file"] == "content unknown of none"
     assert told["seed"] == 3
+
+
+@pytest.mark.parametrize("module", ["dimmed", "simulation", "remeasured", "work", "photographs"])
+def test_a_run_is_of_the_code_that_made_its_numbers(module, tmp_path, monkeypatch):
+    before = job._code()
+    (tmp_path / "changed.py").write_text("another = 1\n")
+    monkeypatch.setattr(getattr(job, module), "__file__", str(tmp_path / "changed.py"))
+    assert job._code() != before

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import time
 from collections import deque
@@ -21,7 +20,7 @@ import scenes
 from render import Quality, Tolerance
 from render import variant as variants
 from scenes import InvalidInput, Scene
-from validation import remeasured, simulation
+from validation import dimmed, remeasured, simulation
 from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign
@@ -34,6 +33,7 @@ from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
 from validation.batch.work import CHUNK, Rendering, Task, TaskResult
+from validation.code_digest import digest
 from validation.defaults import DEFAULT_SEED
 
 log = logging.getLogger("validation")
@@ -177,11 +177,8 @@ def _identity(
 
 def _code() -> str:
     """Digest of the code that makes the numbers."""
-    folders = [Path(package.__file__).parent for package in (scenes, imaging, planner, render, measure)]
-    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))] + [
-        Path(module.__file__) for module in (work, photographs, remeasured, simulation)
-    ]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+    modules = work, photographs, remeasured, dimmed, simulation
+    return digest((scenes, imaging, planner, render, measure), modules).hex()[:16]
 
 
 def _note_machine(store: RunFile) -> None:
