@@ -111,7 +111,7 @@ class Correction:
     def status_of(self, found: Sequence[str], of: np.ndarray | bool = True) -> list[str]:
         """The same of values whose statuses as measured are ``found``, (M,), of a picture that the biases are ``of``.
 
-        Textures scatter by what a closed form tells, and where it does, count in `u_bias` alone.
+        Textures scatter by what `measure.unevenness` tells, and where it does, count in `u_bias` alone.
         """
         doubts = {name: np.where(np.isfinite(u) & (name == TEXTURE), 0.0, u) for name, u in self.sources.items()}
         left = np.where(of, _together(doubts, self.bias), np.inf)

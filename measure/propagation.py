@@ -10,8 +10,6 @@ import numpy as np
 from scipy import sparse
 
 from imaging.models.bias import MOST
-from imaging.models.texture import TextureErrors, texture_errors
-from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
@@ -20,6 +18,7 @@ from measure.features.rims import circle_response
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import MeasuredFeatures, find
+from measure.unevenness import Unevenness
 from scenes import Picture, Scene, Side, status
 from scenes.arrays import picture as one_picture
 
@@ -40,7 +39,8 @@ class PropagatedValues:
     status : tuple of str
     texture_variance, texture_variance_image : ndarray, shape (M,), or None
         Predicted variances over parts by statistical textures, which are no part of the covariances: they do not
-        average over pictures. None where there are no textures, or the light is not known.
+        average over pictures. NaN of a quantity that has no value; None where there are no textures, or the light is
+        not known.
     response, response_image : csr_array, shape (M, height * width), or None
         Derivatives of the values by the pixels, of grey levels; none of a quantity that has no value.
     """
@@ -129,12 +129,17 @@ def propagate(
     errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
     image, plane = (_covariance(gradient, errors, state) for gradient in gradients)
-    textures = texture_errors(Pictures.of(picture)) if picture.lights else None
-    image_response, plane_response = (sparse.csr_array(gradient) @ rows for gradient in gradients)
-    values = replace(
-        _values(found, image, plane, state, not photographed, textures),
-        response=plane_response, response_image=image_response,
-    )  # fmt: skip
+    responses = [sparse.csr_array(gradient) @ rows for gradient in gradients]
+    uneven = Unevenness.about(picture, responses[1]) if picture.lights and picture.scene.textures else None
+    shifts = np.zeros(len(state))
+    if uneven is not None:
+        even = find((clean - uneven.change)[None], picture, estimator, threshold)
+        shifts = np.nan_to_num(found.image.value[0] - even.image.value[0])
+    values = _values(found, image, plane, state, not photographed, shifts)
+    if uneven is not None:
+        over_parts = [np.where(np.isin(state, status.MEASURED), uneven.variances(each), np.nan) for each in responses]
+        values = replace(values, texture_variance_image=over_parts[0], texture_variance=over_parts[1])
+    values = replace(values, response_image=responses[0], response=responses[1])
     return _of_first(found, rows, errors, values, clean.shape)
 
 
@@ -201,17 +206,16 @@ def _values(
     plane: np.ndarray,
     state: list[str],
     is_told: bool,
-    textures: TextureErrors | None,
+    shifts: np.ndarray,
 ) -> PropagatedValues:
     measured = np.isin(state, status.MEASURED)
     value, value_image = (np.where(measured, part.value[0], np.nan) for part in (found.plane, found.image))
     bias, bias_image = value - found.known.value_object, value_image - found.known.value
-    unexplained = bias_image if textures is None else bias_image - np.nan_to_num(textures.shifts[0])
+    unexplained = bias_image - shifts  # by textures
     for m in range(len(state)):
         if state[m] == status.OK and is_told and abs(unexplained[m]) > MOST * np.sqrt(image[m, m]):
             state[m] = status.CLUTTER
-    over_parts = (None, None) if textures is None else textures.variances[::-1]
-    return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state), *over_parts)
+    return PropagatedValues(value, value_image, bias, bias_image, plane, image, tuple(state))
 
 
 def _of_first(

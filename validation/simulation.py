@@ -23,17 +23,18 @@ import measure
 import render
 from imaging.light.appearance import is_plain
 from imaging.models.bias import bias
-from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from measure import Correction, Images
 from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
+from measure.unevenness import Unevenness
 from render import Quality, Tolerance
 from render import variant as variants
 from render.build import MANY_WAYS
 from render.large import LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
+from scenes.status import MISFIT, OK
 from validation.dimmed import of_one_surface
 from validation.remeasured import Method
 
@@ -42,6 +43,7 @@ _BETWEEN = "interreflection"
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
+_NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
 _ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
@@ -179,13 +181,27 @@ def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     found = _until_quiet(alike, method, how)
     if alike is picture or alike.scene == picture.scene:
         return found
-    spread = texture_errors(Pictures.of(picture)).variances
-    image, plane = (np.where(np.isfinite(each), np.sqrt(each), np.inf) for each in spread)
+    told = measure.propagate(how.rough.image(alike), alike, estimator=method.locator, threshold=method.threshold)
+    uneven = Unevenness.about(picture, told.measurands.response)
+    plane, image = (
+        np.where(np.isfinite(found.bias), np.sqrt(uneven.variances(response)), np.inf)
+        for response in (told.measurands.response, told.measurands.response_image)
+    )
     return replace(
         found,
         sources={**found.sources, TEXTURE: plane},
         sources_image={**found.sources_image, TEXTURE: image},
+        simulated=_with_textures(picture, method, how, found.simulated),
     )
+
+
+def _with_textures(picture: Picture, method: Method, how: How, states: tuple[str, ...]) -> tuple[str, ...]:
+    """Statuses (M,) of a simulated picture, ``misfit`` where textures like the part's make noisy pictures so."""
+    rng, noise = np.random.default_rng(how.quality.seed), picture.scene.noise
+    images = render.expose(how.rough.image(picture), noise, rng, _NOISY)
+    found = measure.measure(images, picture, estimator=method.locator, threshold=method.threshold)
+    misfit = (found.status == MISFIT).any(0)
+    return tuple(MISFIT if new and old == OK else old for new, old in zip(misfit, states, strict=True))
 
 
 def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:

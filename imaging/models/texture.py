@@ -62,7 +62,7 @@ class TextureErrors:
     def covariance(self) -> np.ndarray:
         """Over parts, of statistical textures, shape (2 E, 2 E)."""
         count = len(self.part)
-        return sum((_covariance(sheet, parts, count) for sheet, parts in self.responses), np.zeros((count, count)))
+        return sum((field_covariance(sheet, parts, count) for sheet, parts in self.responses), np.zeros((count, count)))
 
     @property
     def variances(self) -> tuple[np.ndarray, np.ndarray]:
@@ -257,7 +257,7 @@ def _on_face(pictures: Pictures, view, e: int, along: np.ndarray, across: np.nda
     return pictures.sensor_at + (height / (way @ solid.normals[face]))[..., None] * way
 
 
-def _covariance(sheet: Sheet, parts, count: int) -> np.ndarray:
+def field_covariance(sheet: Sheet, parts, count: int) -> np.ndarray:
     """Covariance (count, count) over parts of sums over a field: the field's filter applied to the sums' weights."""
     margin, shape = np.array(sheet.field.margin), np.array(sheet.values.shape)
     places = np.concatenate([where for _, where, _ in parts])[:, ::-1]

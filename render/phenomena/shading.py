@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.features.measurand import measurands
+from imaging.geometry.projection import facing
 from imaging.light.backlight import backlights
+from imaging.light.sheets import printed
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit, with_materials
@@ -143,10 +145,15 @@ class Texture(Effect):
         return None if pictures.scene.textures else "the faces are even"
 
     def influence(self, pictures: Pictures) -> Influence:
-        """Shifts by prints and twice the standard deviation by statistical textures; contrast by both."""
+        """Shifts by prints and twice the standard deviation by statistical textures; contrast by both.
+
+        A print counts wherever it is seen: how far from an edge an estimator looks is its own.
+        """
         scene = pictures.scene
         variance = compare(pictures, self.without(scene)).variance
-        uneven = max((each.contrast for each in scene.textures if each.kind == "statistical"), default=0.0)
+        contrasts = [2 * each.contrast for each in scene.textures if each.kind == "statistical"]
+        seen = facing(scene.solid, pictures.sensor_at).reshape(-1, len(scene.solid.normals)).any(0)
+        contrasts += [float(np.abs(sheet.values - 1).max()) for face, sheet in printed(scene).items() if seen[face]]
         poses = (pictures.sensors, *pictures.lights)
         moved = []
         for sensor, *lights in zip(*(each.reshape(-1, 2) for each in poses), strict=True):
@@ -154,7 +161,7 @@ class Texture(Effect):
             found = texture_errors(alone)
             spread = 2 * np.sqrt(found.variances[0][0])
             moved.append(abs(measurands(alone).gradient[0, : found.printed.size] @ found.printed) + spread)
-        found = largest(np.array(moved), np.array([2 * uneven]))
+        found = largest(np.array(moved), np.array([max(contrasts, default=0.0)]))
         return Influence(found.bias_px, found.variance + variance)
 
     def without(self, scene: Scene) -> Scene:

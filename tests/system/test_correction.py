@@ -1,5 +1,6 @@
 """A bias that is simulated and taken off, against exact images that share nothing with the renderer."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -257,3 +258,24 @@ def test_rays_are_added_until_their_noise_does_not_matter(
     found = simulation._until_quiet(picture, Method("gradient"), simulation.How())
     assert found.renders == renders
     assert (asked.count(True), asked.count(False)) == (few, all_)
+
+
+@pytest.mark.render
+def test_uneven_paper_is_no_misfit_where_the_scene_tells_of_it():
+    """Another box than the simulated one: no faces are as even as the model says, and its values are `ok`.
+
+    Without the texture in the simulated pictures each is `misfit`; a box without paper is so in neither.
+    """
+    picture = Picture.of(load("printed_label"), (30, 135), (15, 315))
+    method = Method("arrangement")
+    off = simulation.simulated(picture, method)
+    assert (off.simulated, off.status) == (("misfit",), ("ok",))
+    paper = picture.scene.textures[1].tried(seed=77)
+    box = picture.with_scene(picture.scene.tried(textures=(picture.scene.textures[0], paper)))
+    images = render.expose(simulation.How().rough.image(box), box.scene.noise, np.random.default_rng(4), 10)
+    found = measure.measure(images, picture, correction=off)
+    assert (found.status == "ok").all()
+    plain = measure.measure(images, picture, correction=dataclasses.replace(off, simulated=("ok",)))
+    assert (plain.status == "misfit").all()
+    even = picture.with_scene(picture.scene.tried(textures=picture.scene.textures[:1]))
+    assert simulation.simulated(even, method).simulated == ("ok",)

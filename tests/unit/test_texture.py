@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 from scipy.signal import convolve2d
 
 import scenes
-from imaging.models.texture import _covariance
+from imaging.models.texture import field_covariance
 from render import texture
 from render.build import textured
 from scenes import Material, Picture, Pose
@@ -131,5 +131,5 @@ def test_sums_over_a_filtered_field_vary_as_on_an_endless_sheet(rng):
         weights[k, rows, columns] = own = rng.normal(size=3)
         parts.append((slice(k, k + 1), np.stack([columns, rows], 1).astype(float), own[None]))
     endless = [convolve2d(np.pad(each, 8), kernel, mode="same").ravel() for each in weights]
-    found = _covariance(sheet, parts, 2)
+    found = field_covariance(sheet, parts, 2)
     assert found == pytest.approx(np.array([[a @ b for b in endless] for a in endless]), abs=1e-12)
