@@ -176,9 +176,12 @@ def _of_lines(
     """Of the lines, (2 E, pixels); NaN where there is none."""
     tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
     if isinstance(tool, ArrangementEstimator):
-        if str(found.shape.status[0]) not in status.MEASURED:
+        counted = np.isin(found.shape.counted[0], status.MEASURED)
+        if str(found.shape.whole[0]) not in status.MEASURED or not counted.any():
             return _none(2 * len(layout.names), clean.size)
-        return sparse.csr_array(arranged.line_response(tool, layout, clean))
+        rows = arranged.line_response(tool, layout, clean)
+        rows[np.repeat(~counted, 2)] = np.nan
+        return sparse.csr_array(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
         near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)

@@ -144,6 +144,12 @@ class Arrangement:
         rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         return replace(self, vertices=(self.vertices - middle) @ rotation.T + middle + np.asarray(shift))
 
+    def only(self, edges: np.ndarray, corners: np.ndarray) -> Arrangement:
+        """With some of the required edges and of the corners, by their numbers; the rest is seen as before."""
+        number = np.full(len(self.required) + 1, -1)  # the last is of pieces of no required edge
+        number[edges] = np.arange(len(edges))
+        return replace(self, required=self.required[edges], edges=number[self.edges], corners=self.corners[corners])
+
     def recorded(self, ideal: np.ndarray) -> np.ndarray:
         """Where ideal image points (..., 2) are recorded, px."""
         return ideal if self.camera is None else recorded(ideal, self.camera)

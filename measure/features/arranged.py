@@ -28,8 +28,11 @@ Part = tuple[np.ndarray, np.ndarray, ArrangementEstimator]
 
 @BLAS.wrap(limits=1)
 def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> Shape:
-    """Lines and corners in images (n, height, width)."""
-    if not _is_shown(tool, layout):
+    """Lines and corners in images (n, height, width); what is hidden of them is left out."""
+    shown = _shown(layout)
+    if shown.size < len(layout.names):
+        return _beside_hidden(images, layout, tool, shown)
+    if not tool.pixels.size:
         return _nothing(len(images), layout)
     parts = [(which, _shape(some, layout, part)) for which, some, part in _parts(images, layout, tool)]
     if len(parts) == 1:
@@ -44,7 +47,10 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
 def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
     """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
     probability = np.full(len(images), np.nan)
-    if not _is_shown(tool, layout):
+    shown = _shown(layout)
+    if shown.size < len(layout.names):
+        return goodness(images, *_only(tool, layout, tuple(shown))[1::-1]) if shown.size else probability
+    if not tool.pixels.size:
         return probability
     for which, some, part in _parts(images, layout, tool):
         found, reliable = _find(some, layout, part)
@@ -173,8 +179,45 @@ def _fits(found: Solutions) -> np.ndarray:
     return found.settled & (_probabilities(found) >= WORST)
 
 
-def _is_shown(tool: ArrangementEstimator, layout: Layout) -> bool:
-    return bool(layout.visible.all() and (tool.arrangement.required >= 0).all() and tool.pixels.size)
+def _shown(layout: Layout) -> np.ndarray:
+    """Numbers of the required edges that are seen."""
+    return np.flatnonzero(layout.visible & (layout.arrangement.required >= 0).all(1))
+
+
+@once
+def _only(
+    tool: ArrangementEstimator, layout: Layout, shown: tuple[int, ...]
+) -> tuple[ArrangementEstimator, Layout, np.ndarray]:
+    """Tool and layout of some edges, and numbers of the corners between these."""
+    some, corners = layout.only(np.array(shown))
+    return replace(tool, arrangement=some.arrangement), some, corners
+
+
+def _beside_hidden(images: np.ndarray, layout: Layout, tool: ArrangementEstimator, shown: np.ndarray) -> Shape:
+    """Lines and corners of the edges that are seen, beside others that are not."""
+    none = _nothing(len(images), layout)
+    if not shown.size:
+        return none
+    part, some, corners = _only(tool, layout, tuple(shown))
+    found = find_arranged(images, some, part)
+    by_edge = {}
+    for name in ("normals", "points", "edge_status", "counted", "edge_contrast", "used", "rejected"):
+        by_edge[name] = getattr(none, name).astype(np.result_type(getattr(none, name), getattr(found, name)))
+        by_edge[name][:, shown] = getattr(found, name)
+    places = none.corners.copy()
+    places[:, corners] = found.corners
+    return replace(
+        none, **by_edge, corners=places, whole=found.whole, p_value=found.p_value,
+        covariance=_among(none.covariance, found.covariance, corners), lines=_among(none.lines, found.lines, shown),
+    )  # fmt: skip
+
+
+def _among(whole: np.ndarray, part: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Covariances (n, 2 k, 2 k) with those of some pairs, by their numbers."""
+    rows = (2 * which[:, None] + [0, 1]).ravel()
+    whole = whole.copy()
+    whole[:, rows[:, None], rows] = part
+    return whole
 
 
 def _probabilities(found: Solutions) -> np.ndarray:
@@ -186,11 +229,16 @@ def _probabilities(found: Solutions) -> np.ndarray:
 def line_response(tool: ArrangementEstimator, layout: Layout, clean: np.ndarray) -> np.ndarray:
     """Derivative of the lines (displacement, rotation) by the pixels at the very solution of a noise-free image.
 
-    Shape (2 E, height * width).
+    Shape (2 E, height * width); NaN of edges that are not seen.
     """
+    rows, shown = np.full((2 * len(layout.names), clean.size), np.nan), _shown(layout)
+    if shown.size < len(layout.names):
+        part = line_response(*_only(tool, layout, tuple(shown))[:2], clean)
+        rows[(2 * shown[:, None] + [0, 1]).ravel()] = part
+        return rows
     ((_, _, tool),) = _parts(clean[None], layout, tool)
     centre = locate(tool, layout, tool.taken(clean[None])[0], clean)
-    rows = np.zeros((2 * len(tool.arrangement.required), clean.size))
+    rows[:] = 0.0
     rows[:, tool.pixels] = line_rows(tool, centre) @ tool.derivative(centre)
     return rows
 
@@ -271,9 +319,11 @@ def line_rows(tool: ArrangementEstimator, centre: Centre) -> np.ndarray:
 
 
 def _nothing(count: int, layout: Layout) -> Shape:
+    """No lines: of edges that are hidden, and of those that have darkness on both sides."""
     edges, corners = len(layout.names), len(layout.corners)
     none = np.zeros((count, edges), int)
-    state = np.where(layout.visible, status.OK, status.NOT_VISIBLE)
+    drawn = np.where((layout.arrangement.required >= 0).all(1), status.OK, status.LOW_CONTRAST)
+    state = np.where(layout.visible, drawn, status.NOT_VISIBLE)
     return Shape(
         corners=np.full((count, corners, 2), np.nan),
         covariance=np.full((count, 2 * corners, 2 * corners), np.nan),

@@ -99,6 +99,22 @@ class Layout:
         """The layout with each edge's two ends moved along its normal by offsets (E, 2), px."""
         return replace(self, ends=self.ends + offsets[..., None] * self.normals[:, None])
 
+    def only(self, edges: np.ndarray) -> tuple[Layout, np.ndarray]:
+        """The layout of some of its edges that nothing hides, by their numbers, and numbers of the corners it keeps."""
+        number = {int(e): k for k, e in enumerate(edges)}
+        corners = np.array([c for c, pair in enumerate(self.corners) if set(pair) <= number.keys()], int)
+        joints = [pair for pair in self.joints if {e for e, _ in pair} <= number.keys()]
+        kept = replace(
+            self,
+            **{key: getattr(self, key)[edges] for key in ("ends", "visible", "shown", "sides", "defocus")},
+            **{key: tuple(getattr(self, key)[e] for e in edges) for key in ("names", "beside", "apart")},
+            corners=tuple(tuple(number[e] for e in self.corners[c]) for c in corners),
+            joints=tuple(tuple((number[e], end) for e, end in pair) for pair in joints),
+            clutter=None if self.clutter is None else self.clutter[edges],
+            arrangement=self.arrangement and self.arrangement.only(edges, corners),
+        )
+        return kept, corners
+
     @property
     def directions(self) -> np.ndarray:
         """Unit direction of each edge, shape (E, 2)."""

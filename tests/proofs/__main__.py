@@ -26,6 +26,7 @@ from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
+from tests.proofs.usable import usable
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command()(affine_fits)
@@ -49,6 +50,7 @@ app.command()(photographs)
 app.command()(processed)
 app.command()(rate)
 app.command()(uneven)
+app.command()(usable)
 app.command()(stations)
 
 if __name__ == "__main__":

@@ -5,11 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import measure
+import render
 from measure.features import contrasts
 from measure.features.arranged import _area, _inverted, _is_beyond
 from measure.features.contrasts import _contrast
 from measure.features.locating import _rivals
-from scenes import Noise
+from scenes import Noise, Picture, load
 
 USED = np.s_[2:5, 3:6]
 
@@ -136,3 +138,30 @@ def test_a_face_turned_inside_out_is_seen(vertex, place, inverted):
     turned[vertex] = place
     tool, vertices = beside_an_edge([PLACES, turned, PLACES])
     assert _inverted(tool, vertices).tolist() == [False, inverted, False]
+
+
+@pytest.mark.render
+def test_a_quantity_is_measured_beside_another_that_is_hidden():
+    """Nothing of the front is seen: the top's width is what it is where the top alone is asked for, and its sigma too."""
+    scene, sensor, lights = load("two_lights"), (22.5, 152.4), ((30.5, 342.2), (15.8, 341.5))
+    picture = Picture.of(scene, sensor, lights)
+    clean = render.image(picture, quality=render.Quality(supersample=2, everywhere=True))
+    images = render.expose(clean, scene.noise, np.random.default_rng(1), 3)
+    alone = picture.with_scene(scene.tried(measurands=scene.measurands[:1]))
+    both, one = (measure.measure(images, each, estimator="arrangement") for each in (picture, alone))
+    assert both.status.tolist() == [["ok", "not_visible"]] * 3
+    assert both.value[:, 0] == pytest.approx(one.value[:, 0], rel=1e-12)
+    told, known = (measure.propagate(clean, each, estimator="arrangement").measurands for each in (picture, alone))
+    assert told.status == ("ok", "not_visible")
+    assert told.covariance[0, 0] == pytest.approx(known.covariance[0, 0], rel=1e-12)
+    assert np.isinf(told.covariance[1, 1])
+    assert told.response[[0]].toarray() == pytest.approx(known.response.toarray(), rel=1e-9, abs=1e-15)
+    assert not told.response[[1]].nnz
+
+
+@pytest.mark.render
+def test_an_edge_between_dark_faces_leaves_the_others_alone():
+    """Both faces beside it are dark: its quantity has low contrast, the other one is measured."""
+    picture = Picture.of(load("two_lights"), (40.1, 193.7), ((43.1, 147.3), (32.0, 9.9)))
+    clean = render.image(picture, quality=render.Quality(supersample=2, everywhere=True))
+    assert measure.propagate(clean, picture, estimator="arrangement").measurands.status == ("ok", "low_contrast")

@@ -65,7 +65,9 @@ def test_nothing_is_reported_of_an_edge_that_is_not_seen(task1):
     assert all(np.isnan(getattr(shape, name)).all() for name in ("corners", "covariance", "normals", "points", "lines"))
     assert np.isnan(shape.p_value).all()
     assert shape.status.tolist() == shape.whole.tolist() == [status.NOT_VISIBLE] * 3
-    assert (shape.edge_status == np.where(layout.visible, status.OK, status.NOT_VISIBLE)).all()
+    drawn = (layout.arrangement.required >= 0).all(1)
+    assert (shape.edge_status[0] == status.NOT_VISIBLE).tolist() == (~layout.visible).tolist()
+    assert (shape.edge_status[0] == status.LOW_CONTRAST).tolist() == (layout.visible & ~drawn).tolist()
     assert not shape.used.any()
     assert shape.edge_contrast.shape == shape.rejected.shape == (3, edges)
 

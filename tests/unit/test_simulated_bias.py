@@ -320,7 +320,7 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
 
 
 def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u(small_task1, monkeypatch):
-    """The simulation is of the part without them; u(bias) has what the closed form tells."""
+    """The simulation is of the part without them; u(bias) has what the gradient locator's closed form tells."""
     asked = []
 
     def quiet(picture, method, how):
@@ -330,12 +330,13 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
     monkeypatch.setattr(simulation, "_until_quiet", quiet)
     grain = {"kind": "statistical", "where": "top", "contrast": 0.1, "correlation": 0.3}
     scene = small_task1.with_(textures=[grain])
-    picture, how = Picture.of(scene, *POSES), _Rendered()
+    picture, how = Picture.of(scene, *POSES), How()
     found = simulation._simulated.__wrapped__(picture, Method("gradient"), how)
     spread = texture_errors(Pictures.of(picture)).variances
     assert asked[0].scene.textures == ()
+    # margin: the closed form is of the first order, and has no corners
     assert (found.sources["texture"][0], found.sources_image["texture"][0]) == pytest.approx(
-        (spread[1][0] ** 0.5, spread[0][0] ** 0.5)
+        (spread[1][0] ** 0.5, spread[0][0] ** 0.5), rel=0.1
     )
     assert found.sources["rendering"].tolist() == [0.03]
     plain = simulation._simulated.__wrapped__(Picture.of(small_task1, *POSES), Method("gradient"), how)
