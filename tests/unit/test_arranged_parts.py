@@ -142,7 +142,7 @@ def test_a_face_turned_inside_out_is_seen(vertex, place, inverted):
 
 @pytest.mark.render
 def test_a_quantity_is_measured_beside_another_that_is_hidden():
-    """Nothing of the front is seen: the top's width is what it is where the top alone is asked for, and its sigma too."""
+    """Nothing of the front is seen: the top is what it is where it alone is asked for, and its sigma too."""
     scene, sensor, lights = load("two_lights"), (22.5, 152.4), ((30.5, 342.2), (15.8, 341.5))
     picture = Picture.of(scene, sensor, lights)
     clean = render.image(picture, quality=render.Quality(supersample=2, everywhere=True))
