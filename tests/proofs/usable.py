@@ -1,7 +1,7 @@
 """``python -m tests.proofs usable``: how many values of the bundled scenes are `ok` at random poses that measure them?
 
-Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; lights that face the camera stand as in the
-scene's first setting. Measured is a value where a prediction without an image says that it can be, whatever its bias;
+Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; lights that go with the camera, or face it,
+stand where they do. Measured is a value where a prediction without an image says that it can be, whatever its bias;
 then its bias is simulated and taken off, as `ice measure` does, by the scene's default estimator, and it is counted
 whether it is `ok`. At least 90 % have to be.
 """
@@ -28,11 +28,8 @@ _TRIES = 200
 
 def placed(scene: Scene, rng: np.random.Generator) -> Picture:
     """A picture at random poses."""
-    lights = [
-        tuple(stood) if light.faces_sensor else _anywhere(rng)
-        for light, stood in zip(scene.lights, scene.settings[0].lights, strict=True)
-    ]
-    return Picture(scene, _anywhere(rng), tuple(Pose(*each) for each in lights))
+    stated = scene.settings[0].lights  # those that go with the camera, or face it, are not
+    return Picture.of(scene, _anywhere(rng), tuple(_anywhere(rng) for _ in stated))
 
 
 def _anywhere(rng: np.random.Generator) -> Pose:
