@@ -145,15 +145,20 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
     points = circle.centre + circle.radius * radial
     there = _image(pictures, points)
     nearest = np.full(there.shape[:-1], np.inf)
-    for other in solid.rims:
-        if _coaxial(circle, other):
-            spokes = other.spokes(other.angles(RIM_POINTS))
-            far = other.centre + other.radius * spokes
-            wall = -spokes if other.hole else spokes
-            turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
-            nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), other.joined(turned)))
+    for other in _far_rims(solid, circle):
+        spokes = other.spokes(other.angles(RIM_POINTS))
+        far = other.centre + other.radius * spokes
+        wall = -spokes if other.hole else spokes
+        turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
+        nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), other.joined(turned)))
     ends = _image(pictures, _straight_around(solid, circle))
     return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
+
+
+@lru_cache(maxsize=64)
+def _far_rims(solid: Solid, circle: Circle) -> tuple[Circle, ...]:
+    """The other rims that may be those of a circle's wall."""
+    return tuple(other for other in solid.rims if _coaxial(circle, other))
 
 
 @lru_cache(maxsize=64)
@@ -207,11 +212,12 @@ def _to_pieces(points: np.ndarray, start: np.ndarray, stop: np.ndarray, shown: n
     pieces = start.shape[-2]
     many = max(1, _AT_ONCE // max(points.size, 1))
     for k in range(0, pieces, many):
-        a, b = (ends[..., None, k : k + many, :] for ends in (start, stop))
-        along, away = b - a, points[..., None, :] - a
-        size = np.maximum((along**2).sum(-1), np.finfo(float).tiny)
-        share = np.clip((away * along).sum(-1) / size, 0, 1)
-        apart = np.linalg.norm(away - share[..., None] * along, axis=-1)
+        from_x, from_y = (start[..., None, k : k + many, i] for i in (0, 1))
+        along_x, along_y = (stop[..., None, k : k + many, i] - a for i, a in enumerate((from_x, from_y)))
+        away_x, away_y = (points[..., None, i] - a for i, a in enumerate((from_x, from_y)))
+        size = np.maximum(along_x**2 + along_y**2, np.finfo(float).tiny)
+        share = np.clip((away_x * along_x + away_y * along_y) / size, 0, 1)
+        apart = np.sqrt((away_x - share * along_x) ** 2 + (away_y - share * along_y) ** 2)
         if shown is not None:
             apart = np.where(shown[..., None, k : k + many], apart, np.inf)
         nearest = np.minimum(nearest, apart.min(-1))

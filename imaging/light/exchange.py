@@ -13,6 +13,7 @@ and all shares of a place add to 1.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -109,6 +110,13 @@ class Exchange:
     floor: Floor | None = None
 
     @cached_property
+    def has(self) -> np.ndarray:
+        """Whether a face is one of those, bool (F + 1,); the last says that nothing is not."""
+        found = np.zeros(len(self.solid.faces) + 1, bool)
+        found[self.faces] = True
+        return found
+
+    @cached_property
     def between(self) -> np.ndarray:
         """Form factors between patches, (p, p)."""
         met = self.met(self.places.points, self.places.normals, _RAYS, _square(len(self.places.points)))
@@ -139,7 +147,7 @@ class Exchange:
         face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
         if self.floor is not None:
             face, t = self._met_or_floor(face, t, starts, ways)
-        point, ray = np.nonzero(np.isin(face, self.faces))
+        point, ray = np.nonzero(self.has[face])  # nothing met, -1, is the last
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
         return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.cell))[1])
@@ -200,9 +208,9 @@ class Exchanged:
     def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What arrives at points (..., 3) on faces (...)."""
         found = np.zeros(faces.shape)
-        for face in np.intersect1d(faces, self.exchange.faces):
-            here = faces == face
-            found[here] = _told(self, int(face)).at(points[here])
+        for face, here in _by_face(faces.ravel()):
+            if self.exchange.has[face]:
+                found.flat[here] = _told(self, face).at(points.reshape(-1, 3)[here])
         return found
 
     def gathered(self, met: Hits, count: int, rays: int) -> np.ndarray:
@@ -217,6 +225,15 @@ class Exchanged:
             direct[asked] = several * _arriving(self.scene, emitter, met.points[asked], solid.normals[met.faces[asked]])
         sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
         return np.bincount(met.starts, sent, count) / rays
+
+
+def _by_face(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Each of the faces (n,) and where it stands, in rising order."""
+    order = np.argsort(faces, kind="stable")
+    starts = np.flatnonzero(np.diff(faces[order], prepend=-2))
+    for here in np.split(order, starts[1:]):
+        if here.size:
+            yield int(faces[here[0]]), here
 
 
 @dataclass(frozen=True, eq=False)

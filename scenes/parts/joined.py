@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Iterable
 from itertools import combinations
 
 import numpy as np
@@ -39,18 +40,27 @@ def joined(
     for row in rows.tolist():
         for end in chains[row][0]:
             meeting[end].append(row)
-    pairs = [
-        pair
-        for vertex, found in meeting.items()
-        for pair in combinations(found, 2)
-        if _in_line(vertices, vertex, *(chains[k] for k in pair))
-        and _alike(normals, region, *(chains[k] for k in pair))
-    ]
+    pairs = []
+    for vertex, found in meeting.items():
+        pairs += _clear(
+            pair
+            for pair in combinations(found, 2)
+            if _in_line(vertices, vertex, *(chains[k] for k in pair))
+            and _alike(normals, region, *(chains[k] for k in pair))
+        )
     group = components(len(chains), np.array(pairs, int))
     parts: dict[int, list[Chain]] = defaultdict(list)
     for row in rows.tolist():
         parts[int(group[row])].append(chains[row])
     return [_one(vertices, each) for each in parts.values()]
+
+
+def _clear(pairs: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Those of a vertex's pairs of which neither piece has another partner: where pieces lie upon each other, it is not
+    said which of them goes on."""
+    found = list(pairs)
+    partners = Counter(piece for pair in found for piece in pair)
+    return [pair for pair in found if all(partners[piece] == 1 for piece in pair)]
 
 
 def _in_line(vertices: np.ndarray, vertex: int, one: Chain, other: Chain) -> bool:

@@ -44,6 +44,8 @@ def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, no
     list of tuple of int
         Vertices of each, counter-clockwise around the face.
     """
+    if len(triangles) == 1:
+        return [tuple(v for v in triangles[0].tolist() if kept[v])]
     halves = np.concatenate([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
     there = {(a, b) for a, b in halves.tolist()}
     after: dict[int, list[int]] = {}
@@ -51,7 +53,7 @@ def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, no
         if (b, a) not in there:
             after.setdefault(a, []).append(b)
     loops = [tuple(v for v in loop if kept[v]) for loop in _simple(after)]
-    return sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
+    return loops if len(loops) == 1 else sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
 
 
 def _simple(after: dict[int, list[int]]) -> list[list[int]]:

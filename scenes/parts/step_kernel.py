@@ -72,14 +72,13 @@ def _faces(shape: Any) -> list[Any]:
 def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
     """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
     _cut(cut, pieces, controlled=cut is shape)
-    faces = _faces(shape)
-    found = [
+    every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
+    if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
+        raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(shape)}")
+    return [
         {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
-        for face, divided in zip(faces, _faces(cut), strict=True)
+        for face, divided in zip(_faces(shape), _faces(cut), strict=True)
     ]
-    for face in _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")[len(faces) :]:
-        _triangles(face)  # or the file is broken, and this one may be missing in a solid
-    return found
 
 
 def _cut(shape: Any, pieces: int, controlled: bool) -> None:
@@ -215,20 +214,40 @@ def _surface(face: Any) -> dict[str, Any]:
 
 
 def _triangles(face: Any) -> dict[str, Any]:
-    """Corners (n, 3, 3) of the face's triangles, counter-clockwise from outside."""
-    from OCP.BRep import BRep_Tool
+    """Corners (n, 3, 3) of the triangles of a face that has been cut, counter-clockwise from outside."""
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopLoc import TopLoc_Location
 
     location = TopLoc_Location()
-    mesh = BRep_Tool.Triangulation_s(face, location)
-    if mesh is None:
-        raise Unusable("of faces that can be cut into triangles, got others")
+    mesh = _mesh(face, location)
     turn = location.Transformation()
     nodes = [_vector(mesh.Node(i).Transformed(turn)) for i in range(1, mesh.NbNodes() + 1)]
     order = (1, 3, 2) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2, 3)
     corners = [[mesh.Triangle(i).Value(k) - 1 for k in order] for i in range(1, mesh.NbTriangles() + 1)]
     return {"nodes": nodes, "triangles": corners}
+
+
+def _mesh(face: Any, location: Any = None) -> Any:
+    """The kernel's triangles of a face, and where they stand; None where it found none."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopLoc import TopLoc_Location
+
+    return BRep_Tool.Triangulation_s(face, TopLoc_Location() if location is None else location)
+
+
+def _named(faces: list[Any]) -> str:
+    """What faces are, the first of them by its surface and a point of its boundary."""
+    kind, edges = _surface(faces[0])["kind"], _parts(faces[:1], "TopAbs_EDGE", "Edge")
+    told = f"{len(faces)} that cannot: a {'surface' if kind == 'other' else kind}"
+    if not edges:
+        return told
+    return told + " through ({:.6g}, {:.6g}, {:.6g}) mm".format(*_curve(edges[0])["ends"][0])
+
+
+def _hint(shape: Any) -> str:
+    """That one of several bodies may do without those faces."""
+    bodies = len(_parts([shape], "TopAbs_SOLID", "Solid"))
+    return f" (of {bodies} bodies object.body chooses one)" if bodies > 1 else ""
 
 
 def _edges(faces: list[Any]) -> list[dict[str, Any]]:

@@ -130,6 +130,16 @@ def test_pieces_are_one_where_single_precision_tells_no_turn_and_both_bend_alike
     assert len(joined(vertices, chains, normals, np.full(2, -1), np.array([True] * 2))) == count
 
 
+def test_pieces_that_lie_upon_each_other_are_not_joined_with_what_goes_on():
+    """As where walls without thickness meet: it is not said which of the two goes on; what lies beyond is joined."""
+    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [5, 0, 0], [6, 0, 0], [8, 0, 0]])
+    pieces = (0, 2), (1, 2), (2, 3), (3, 4)
+    chains = [(ends, (0, 1), True) for ends in pieces]
+    normals = np.array([[0.0, 0, 1], [0, -1, 0]])
+    found = joined(vertices, chains, normals, np.full(2, -1), np.array([True] * 4))
+    assert sorted(tuple(sorted(chain[0])) for chain in found) == [(0, 2), (1, 2), (2, 4)]
+
+
 def arc(centre, radius, start, stop, steps):
     angle = np.radians(np.linspace(start, stop, steps + 1))
     return [(centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a)) for a in angle]

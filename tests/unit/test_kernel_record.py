@@ -173,9 +173,6 @@ def test_triangles_are_counter_clockwise_from_outside(kernel):
     assert found["nodes"] == [[10.5, 1.25, -3], [20.5, 2.25, -3], [30.5, 3.25, -3], [40.5, 4.25, -3]]
     assert found["triangles"] == [[0, 1, 2], [1, 2, 3]]
     assert step_kernel._triangles(Shape("f", turned=True))["triangles"] == [[0, 2, 1], [1, 3, 2]]
-    kernel.mesh = None
-    with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
-        step_kernel._triangles(plain("f"))
 
 
 def test_ways_to_a_closed_surface(kernel):
@@ -216,8 +213,17 @@ def test_ways_to_a_closed_surface(kernel):
 
 
 def test_faces_that_cannot_be_cut_are_refused(kernel):
+    """By their number, what the first is, and where."""
     kernel.whole = body(plain("f"))
-    with pytest.raises(Unusable, match="of faces that can be cut into triangles"):
+    with pytest.raises(Unusable, match="of faces that can be cut into triangles, got 1 that cannot: a surface$"):
+        step_kernel.record(b"data", 20, 2000)
+    edge = Shape("e", kind="edge", curve=curve("Line"))
+    kernel.whole = body(plain("f", [edge]), plain("g"))
+    with pytest.raises(Unusable, match=r"got 2 that cannot: a surface through \(0.5, 1, 1.5\) mm$"):
+        step_kernel.record(b"data", 20, 2000)
+    solids = [Shape(name, (plain(name),), kind="solid") for name in "abc"]
+    kernel.whole = Shape("bodies", [*(solid.parts[0] for solid in solids), *solids])
+    with pytest.raises(Unusable, match=r"got 3 that cannot: a surface \(of 3 bodies object.body chooses one\)$"):
         step_kernel.record(b"data", 20, 2000)
 
 
