@@ -33,7 +33,7 @@ class FirstLook:
     Attributes
     ----------
     measurands : tuple of Measurand
-        At most six, of different sorts.
+        Of different sorts; at most six where nothing else is asked for.
     statuses : tuple of str
         What is predicted of each; those that are not ``ok`` are there only where none is.
     sensor, light : Pose
@@ -54,7 +54,9 @@ class FirstLook:
         return [{"name": each.name, "kind": each.kind, "status": status} for each, status in rows]
 
 
-def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable[[str, int, int], None]) -> FirstLook:
+def first_look(
+    scene: Scene, candidates: tuple[Measurand, ...], report: Callable[[str, int, int], None], most: int = _MOST
+) -> FirstLook:
     """Look from everywhere at all that could be measured, then closely from where most is seen.
 
     Parameters
@@ -65,6 +67,8 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
         At least one, each of one number with a tolerance.
     report : callable
         Called with what is done, how many steps are done, and of how many.
+    most : int
+        Measurands that are proposed.
     """
     looks = int(np.clip(_TRIANGLES // len(scene.solid.triangles), *_CLOSELY))
     report("looking from everywhere", 1, 2 + looks)
@@ -73,16 +77,16 @@ def first_look(scene: Scene, candidates: tuple[Measurand, ...], report: Callable
     for step, number in enumerate(_apart(worth.sum(-1), looks), 2):
         report("looking closely", step, 2 + looks)
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
-        some = _varied([candidates[m] for m in seen], _ASKED) or candidates[:_MOST]
+        some = _varied([candidates[m] for m in seen], max(_ASKED, most)) or candidates[:most]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
         forecasts = planner.predict(scene.with_(measurands=some), sensor, light).measurands
         told = dict(zip(some, forecasts, strict=True))
         good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:
-            shown = tuple(_varied(good or some, _MOST))
+            shown = tuple(_varied(good or some, most))
             statuses, reasons = (tuple(getattr(told[m], each) for m in shown) for each in ("status", "reason"))
             best = len(good), FirstLook(shown, statuses, sensor, light, reasons)
-        if len(good) >= _ENOUGH:
+        if len(good) >= max(_ENOUGH, most // 2):
             break
     return best[1]
 

@@ -6,16 +6,20 @@ import json
 import os
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import scenes
 from scenes import InvalidInput, Measurand, Mesh, Scene, Solid
+from scenes.files.door import read_bytes
 from scenes.load import from_document
+from scenes.measurands.drawn import Drawn, drawn
 from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
-from scenes.parts import step
+from scenes.parts import pmi, step
 from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
@@ -58,15 +62,47 @@ bits = 8
 """
 _ASKED = """\
 
-# What could be measured, as ice new proposes it, with tolerances of ISO 2768-1, class m: put in those of the drawing.
+# {whose}
 {measurands}
 [[settings]] # where they stand for ice validate; ice plan proposes better places
 sensor = {sensor}
 light = {light}
 """
+_UNSEEN = """\
+# The file asks for this, too; it is not seen from there (ice plan --views finds several pictures):
+{measurands}
+"""
+_PROPOSED = (
+    "What could be measured, as ice new proposes it, with tolerances of ISO 2768-1, class m: "
+    "put in those of the drawing."
+)
+_DRAWN = "What the part's file asks for, with its limits."
 _NOTHING = """
 # Nothing to measure was found: [[measurands]] say what is wanted (docs/requirements.md).
 """
+
+
+@dataclass(frozen=True)
+class NewScene:
+    """A scene that was written.
+
+    Attributes
+    ----------
+    scene : Scene
+    look : FirstLook or None
+        What is proposed to be measured; None where nothing is.
+    drawn : tuple of Drawn
+        Dimensions and tolerances of the part's file, if it has any.
+    """
+
+    scene: Scene
+    look: FirstLook | None
+    drawn: tuple[Drawn, ...] = ()
+
+    @property
+    def characteristics(self) -> list[dict[str, Any]]:
+        """For JSON: one for each dimension and tolerance of the file."""
+        return [_facts(each, self.scene) for each in self.drawn]
 
 
 def written(
@@ -75,8 +111,8 @@ def written(
     units: str,
     report: Callable[[str, int, int], None] = lambda *_: None,
     body: str | int | None = None,
-) -> tuple[Scene, FirstLook | None]:
-    """Write a scene of a part's file.
+) -> NewScene:
+    """Write a scene of a part's file; of the dimensions in the file, where it has any (STEP AP242).
 
     Parameters
     ----------
@@ -91,12 +127,6 @@ def written(
     body : str or int, optional
         One of several bodies by its name or number; all where not given.
 
-    Returns
-    -------
-    scene : Scene
-    look : FirstLook or None
-        What is proposed to be measured; None where nothing is.
-
     Raises
     ------
     InvalidInput
@@ -108,12 +138,52 @@ def written(
     record = _record(part, units, body)
     text = _text(record, path, units, *_box(record.solid_in(units)))
     scene = _loaded(text, path, record)
-    candidates = proposed(scene.all_walls, units)
-    look = first_look(scene, candidates, report) if candidates else None
-    text += _NOTHING if look is None else _asked(look)
+    asked = _asked_by_file(record, units)
+    options = [measurand for each in asked for some in each.candidates for measurand in some]
+    candidates = tuple(options) or proposed(scene.all_walls, units)
+    look = None
+    if candidates:
+        look = first_look(scene, candidates, report, **({"most": len(options)} if options else {}))
+        look = _each_once(look, asked) if options else look
+    text += _NOTHING if look is None else _measured(look, asked)
     made = _loaded(text, path, record)
     path.write_text(text, encoding="utf-8")
-    return made, look
+    return NewScene(made, look, asked)
+
+
+def _asked_by_file(record: Step | Mesh, units: str) -> tuple[Drawn, ...]:
+    """Dimensions and tolerances of the part's file."""
+    if not isinstance(record, Step):
+        return ()
+    found = pmi.read(read_bytes(record.file, step.MOST_BYTES))
+    return drawn(record.part_in(units), found, units) if found.characteristics else ()
+
+
+def _each_once(look: FirstLook, asked: tuple[Drawn, ...]) -> FirstLook:
+    """By one measurand each feature of a characteristic, in the file's order."""
+    shown = {measurand.name: k for k, measurand in enumerate(look.measurands)}
+    groups = (some for each in asked for some in each.candidates)
+    kept = [next(iter([shown[m.name] for m in some if m.name in shown]), None) for some in groups]
+    rows = [k for k in kept if k is not None]
+    reasons = look.reasons or ("",) * len(look.measurands)
+    return replace(look, **{
+        name: tuple(values[k] for k in rows)
+        for name, values in (("measurands", look.measurands), ("statuses", look.statuses), ("reasons", reasons))
+    })  # fmt: skip
+
+
+def _facts(each: Drawn, scene: Scene) -> dict[str, Any]:
+    """A characteristic, by which measurands of the scene it is measured, or why not."""
+    told, known = each.characteristic, {measurand.name for measurand in scene.measurands}
+    measured = [m.name for some in each.candidates for m in some if m.name in known]
+    lost, features = len(each.candidates) - len(measured), len(each.candidates)
+    unseen = f"{lost} of {features} " * (features > 1) + "not seen from the setting that is proposed" if lost else ""
+    return {
+        "number": told.number, "kind": told.kind, "value": told.value, "plus": told.plus, "minus": told.minus,
+        "fit": told.fit or None, "zone": told.zone, "round_zone": told.is_round, "modifiers": list(told.modifiers),
+        "datums": list(told.datums), "unit": told.unit, "faces": list(each.faces),
+        "measurand": measured[0] if measured else None, "measurands": measured, "reason": each.reason or unseen or None,
+    }  # fmt: skip
 
 
 def _record(part: Path, units: str, body: str | int | None) -> Step | Mesh:
@@ -148,18 +218,27 @@ def _text(record: Step | Mesh, path: Path, units: str, low: np.ndarray, high: np
     )
 
 
-def _asked(look: FirstLook) -> str:
-    """What is measured, and where."""
+def _measured(look: FirstLook, asked: tuple[Drawn, ...]) -> str:
+    """What is measured, and where; what the file asks for and is not seen, commented out."""
     measurands = "\n".join(map(_measurand, look.measurands))
     poses = ([float(x) for x in pose] for pose in (look.sensor, look.light))
-    return _ASKED.format(measurands=measurands, **dict(zip(("sensor", "light"), poses, strict=True)))
+    whose = _DRAWN if any(each.candidates for each in asked) else _PROPOSED
+    text = _ASKED.format(whose=whose, measurands=measurands, **dict(zip(("sensor", "light"), poses, strict=True)))
+    shown = {measurand.name for measurand in look.measurands}
+    unseen = [some[0] for each in asked for some in each.candidates if shown.isdisjoint(m.name for m in some)]
+    if not unseen:
+        return text
+    lines = "\n".join(map(_measurand, unseen)).splitlines()
+    return text + "\n" + _UNSEEN.format(measurands="\n".join(f"# {line}".rstrip() for line in lines))
 
 
 def _measurand(each: Measurand) -> str:
     features = ", ".join(map(_inline, each.features))
+    limits = each.tolerance
+    tolerance = limits.plus if limits.plus == limits.minus else f"{{ plus = {limits.plus}, minus = {limits.minus} }}"
     return (
         f"[[measurands]]\nname = {json.dumps(each.name)}\nkind = {json.dumps(each.kind)}\n"
-        f"features = [{features}]\ntolerance = {each.tolerance.plus}\n"
+        f"features = [{features}]\ntolerance = {tolerance}\n"
     )
 
 

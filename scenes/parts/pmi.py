@@ -38,8 +38,8 @@ _TOLERANCES = {
 }
 _MODIFIERS = {"MAXIMUM_MATERIAL_REQUIREMENT": "M", "LEAST_MATERIAL_REQUIREMENT": "L", "RECIPROCITY_REQUIREMENT": "R",
               "FREE_STATE": "F", "TANGENT_PLANE": "T", "COMMON_ZONE": "CZ"}  # fmt: skip
-_PREFIXES = {"EXA": 1e18, "PETA": 1e15, "TERA": 1e12, "GIGA": 1e9, "MEGA": 1e6, "KILO": 1e3, "HECTO": 1e2, "DECA": 10.0,
-             "DECI": 0.1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6, "NANO": 1e-9, "PICO": 1e-12, None: 1.0}  # fmt: skip
+_PREFIXES = {"KILO": 1e3, "HECTO": 1e2, "DECA": 10.0, "DECI": 0.1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6,
+             "NANO": 1e-9, None: 1.0}  # fmt: skip
 _TO_UNIT = {"METRE": ("mm", 1000.0), "RADIAN": ("deg", 57.29577951308232)}
 _DEEPEST = 16  # aspects of aspects
 
@@ -239,8 +239,9 @@ class _File:
 
     @cached_property
     def _related(self) -> list[tuple[int, int]]:
-        kinds = ("SHAPE_ASPECT_RELATIONSHIP", "FEATURE_FOR_DATUM_TARGET_RELATIONSHIP", "SHAPE_ASPECT_DERIVING_RELATIONSHIP")
-        told = [self.part[number].of(*kinds) or () for number in self.part.numbers(*kinds)]
+        kinds = ("SHAPE_ASPECT_RELATIONSHIP", "FEATURE_FOR_DATUM_TARGET_RELATIONSHIP")
+        found = [self.part[number] for number in self.part.numbers(*kinds)]
+        told = [each.of(*kinds) or () for each in found if each.of(*_LOCATIONS) is None]  # a dimension joins nothing
         pairs = [(_number(each, 2), _number(each, 3)) for each in told]
         return [(one, other) for one, other in pairs if one is not None and other is not None]
 

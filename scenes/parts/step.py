@@ -91,6 +91,8 @@ class StepPart:
     edges : tuple of StepEdge
     triangles : ndarray, shape (T, 3, 3)
     triangle_faces : ndarray of int, shape (T,)
+    places : tuple of int
+        Which instance of the file each face is, counted from 0; -1 where that is not known.
     """
 
     names: tuple[str, ...]
@@ -98,6 +100,7 @@ class StepPart:
     edges: tuple[StepEdge, ...]
     triangles: np.ndarray
     triangle_faces: np.ndarray
+    places: tuple[int, ...] = ()
 
     @cached_property
     def solid(self) -> Solid:
@@ -234,6 +237,7 @@ def part(record: dict[str, Any], unit: Unit = "mm") -> StepPart:
         edges=tuple(_edge(edge, scale) for edge in edges),
         triangles=np.concatenate(corners),
         triangle_faces=np.repeat(np.arange(len(faces)), [len(c) for c in corners]),
+        places=tuple(face.get("place", -1) for face in faces),
     )
 
 

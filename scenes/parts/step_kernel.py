@@ -15,6 +15,7 @@ import math
 import os
 import sys
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 FORMAT = 2
@@ -75,10 +76,25 @@ def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, A
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(shape)}")
+    places = _places(reader)
     return [
-        {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
+        {"name": _name(reader, face), "place": places(face), **_surface(face), **_triangles(divided)}
         for face, divided in zip(_faces(shape), _faces(cut), strict=True)
     ]
+
+
+def _places(reader: Any) -> Callable[[Any], int]:
+    """Which instance of the file a face is, counted from 0; -1 of one that healing made."""
+    model, transfer = reader.WS().Model(), reader.WS().TransferReader()
+    entities = [model.Value(number) for number in range(1, model.NbEntities() + 1)]
+    places = {id(entity): place for place, entity in enumerate(entities)}  # each has one object as long as it is kept
+
+    def place(face: Any) -> int:
+        entity = transfer.EntityFromShapeResult(face, 1)
+        found = places.get(id(entity), -1)
+        return found if found >= 0 and entities[found] is entity else -1
+
+    return place
 
 
 def _cut(shape: Any, pieces: int, controlled: bool) -> None:

@@ -187,8 +187,9 @@ def told_by(measurand: Measurand, names: dict[str, str]) -> Measurand | None:
 def sigmas(exact: Path, tessellated: Path) -> dict[str, float]:
     """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting."""
     with tempfile.TemporaryDirectory() as folder:
-        scene, look = new_scene.written(exact, Path(folder) / "exact.toml", "mm")
-        other, _ = new_scene.written(tessellated, Path(folder) / "mesh.toml", "mm")
+        new = new_scene.written(exact, Path(folder) / "exact.toml", "mm")
+        scene, look = new.scene, new.look
+        other = new_scene.written(tessellated, Path(folder) / "mesh.toml", "mm").scene
     if look is None:
         return {}
     called = names(scene.solid, other.solid)

@@ -77,7 +77,12 @@ def kernel(monkeypatch):
         TransferRoots = staticmethod(lambda: said.roots)
         NbShapes = staticmethod(lambda: said.shapes)
         OneShape = staticmethod(lambda: said.whole)
-        WS = staticmethod(lambda: SimpleNamespace(TransferReader=lambda: SimpleNamespace(EntityFromShapeResult=entity)))
+        WS = staticmethod(lambda: SimpleNamespace(
+            TransferReader=lambda: SimpleNamespace(EntityFromShapeResult=entity),
+            Model=lambda: SimpleNamespace(
+                NbEntities=lambda: len(said.names), Value=lambda number: list(said.names.values())[number - 1]
+            ),
+        ))  # fmt: skip
 
     def cut(*given):
         said.cut = given
@@ -215,7 +220,7 @@ def test_ways_to_a_closed_surface(kernel):
 def test_faces_that_cannot_be_cut_are_refused(kernel):
     """By their number, what the first is, and where."""
     kernel.whole = body(plain("f"))
-    with pytest.raises(Unusable, match="of faces that can be cut into triangles, got 1 that cannot: a surface$"):
+    with pytest.raises(Unusable, match=r"of faces that can be cut into triangles, got 1 that cannot: a surface$"):
         step_kernel.record(b"data", 20, 2000)
     edge = Shape("e", kind="edge", curve=curve("Line"))
     kernel.whole = body(plain("f", [edge]), plain("g"))
@@ -248,6 +253,7 @@ def test_pieces_of_a_turn(kernel, faces, most, pieces):
     assert kernel.cut[3] == pytest.approx(2 * (2 * math.pi / pieces))  # an angle of two pieces
     assert [face["name"] for face in found["faces"]] == ["", "bore", ""][:faces]
     assert [face["kind"] for face in found["faces"]] == ["plane", "other", "other"][:faces]
+    assert [face["place"] for face in found["faces"]] == [1, 0, -1][:faces]
     assert found["faces"][0]["triangles"] == [[0, 1, 2]]
 
 

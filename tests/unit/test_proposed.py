@@ -89,7 +89,8 @@ def test_circles_on_one_axis_have_no_distance():
 
 def test_nothing_to_measure_is_a_scene_all_the_same(tmp_path):
     trimesh.creation.icosphere(2, 10.0).export(tmp_path / "ball.stl")
-    scene, look = written(tmp_path / "ball.stl", tmp_path / "ball.toml", "mm")
+    new = written(tmp_path / "ball.stl", tmp_path / "ball.toml", "mm")
+    scene, look = new.scene, new.look
     again = scenes.load(tmp_path / "ball.toml")
     assert (look is None) == (again.measurands == ()) == (scene.measurands == ())
 
@@ -97,7 +98,7 @@ def test_nothing_to_measure_is_a_scene_all_the_same(tmp_path):
 def test_what_is_written_is_what_was_predicted(tmp_path):
     """The scene of the file has the measurands, poses and statuses that were told; every value is the part's own."""
     bracket(24).export(tmp_path / "part.stl")
-    _, look = written(tmp_path / "part.stl", tmp_path / "part.toml", "mm")
+    look = written(tmp_path / "part.stl", tmp_path / "part.toml", "mm").look
     scene = scenes.load(tmp_path / "part.toml")
     assert scene.measurands == look.measurands
     assert (scene.settings[0].sensor, scene.settings[0].light) == (look.sensor, look.light)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -43,7 +43,8 @@ def new_command(
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
 
-        made, look = written(part, path, units, shown, int(body) if body and body.isdecimal() else body)
+        new = written(part, path, units, shown, int(body) if body and body.isdecimal() else body)
+    made, look = new.scene, new.look
     asked = [] if look is None else look.facts
     facts = {
         "file": str(path),
@@ -53,11 +54,13 @@ def new_command(
         "sensor": look and list(look.sensor),
         "light": look and list(look.light),
         "mended": made.solid.mended,
+        "characteristics": new.characteristics,
     }
     text = "\n".join(
         [
             *(f"Mended: {each}" for each in made.solid.mended),
             f"{path}: {facts['edges']} edges, {facts['circles']} circles",
+            *_characteristics(new.characteristics),
             *(["What could be measured, as seen from the setting that is proposed:"] if asked else []),
             *(f"  {each['name']}: {each['status']}" for each in asked),
             *(f"  {line}" for line in _legend(look)),
@@ -66,6 +69,29 @@ def new_command(
         ]
     )
     say(facts, as_json, text)
+
+
+def _characteristics(rows: list[dict[str, Any]]) -> list[str]:
+    """A line for each dimension and tolerance of the part's file."""
+    if not rows:
+        return []
+    return ["The file asks for:", *(f"  #{row['number']} {_said(row)}: {_outcome(row)}" for row in rows)]
+
+
+def _said(row: dict[str, Any]) -> str:
+    """A dimension with its limits, or a tolerance with its zone and datums."""
+    unit = "degrees" if row["unit"] == "deg" else row["unit"]
+    if row["zone"] is not None:
+        words = [row["kind"], f"{'diameter ' * row['round_zone']}{row['zone']:.6g} {unit}", *row["modifiers"]]
+        return " ".join([*words, *([f"to {' '.join(row['datums'])}"] if row["datums"] else [])])
+    value = "" if row["value"] is None else f" {row['value']:.6g} {unit}"
+    limits = "" if row["plus"] is None else f" +{abs(row['plus']):.6g} -{abs(row['minus']):.6g}"
+    return f"{row['kind']}{value}{limits}{' ' * bool(row['fit'])}{row['fit'] or ''}"
+
+
+def _outcome(row: dict[str, Any]) -> str:
+    how = f"measured as {', '.join(row['measurands'])}" if row["measurands"] else "not measured"
+    return f"{how}; {row['reason']}" if row["reason"] else how
 
 
 def _legend(look: FirstLook | None) -> list[str]:
