@@ -17,6 +17,7 @@ from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import planner
+    from validation.cli.plan import Options
     from validation.views_check import ViewsCheck
 
 
@@ -31,21 +32,19 @@ def check_options(context: typer.Context, views: int | None, share: str | None) 
     check_left_out(context, "--views", "--search", "--edges", "--start", "--tolerance", "--map", "--vary", "--hold")
 
 
-def run(
-    scene: scenes.Scene, count: int, objective: str, how: dict, checked: bool, out: Path | None, as_json: bool
-) -> None:
+def run(scene: scenes.Scene, given: Options, how: dict, *, checked: bool) -> None:
     """Plan, check by rendering, show; the command ends with 1 if the pictures contradict the plan."""
     import planner
 
-    began = time.perf_counter()
+    began, count = time.perf_counter(), given.views
     with progress(
         f"{scene.name}: searching 1 to {count} pictures that measure best together", "steps", at_once=True
     ) as shown:
-        found = planner.plan_views(scene, count, objective, **how, report=shown)
+        found = planner.plan_views(scene, count, given.objective, **how, share=given.views_share, report=shown)
     seconds = time.perf_counter() - began
     check = _check(found) if checked else None
-    pictures = _pictures(found, out) if out else []
-    if as_json:
+    pictures = _pictures(found, given.out) if given.out else []
+    if given.as_json:
         say(facts(found, check, pictures, seconds), True, "")
     else:
         from validation.report import views_table
