@@ -11,6 +11,7 @@ import typer
 
 import scenes
 from planner.views import MOST_VIEWS
+from scenes.results import picked
 from validation.cli.common import check_left_out, progress, say
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -80,14 +81,9 @@ def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], 
     return plain({
         "scene": found.scene.name,
         "objective": "object",
-        "over": found.over,
-        "model": found.model,
-        "share": found.share,
+        **picked(found, "over", "model", "share"),
         "views": [_set(each) for each in found.sets],
-        "most_over_repeats": found.most_over_repeats,
-        "pairs": found.pairs,
-        "looked": found.looked,
-        "guarantee": found.guarantee,
+        **picked(found, "most_over_repeats", "pairs", "looked", "guarantee"),
         "check": None if check is None else _checked(check),
         "pictures": pictures,
         "seconds": seconds,
@@ -99,28 +95,19 @@ def _set(each: planner.ViewSet) -> dict:
     return {
         "count": len(each.views),
         "poses": [{"sensor": list(view.sensor), "light": list(view.light)} for view in each.views],
-        "minimised": each.minimised,
-        "worst_ratio": each.worst_ratio,
-        "limiting": each.limiting,
+        **picked(each, "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),
-        "over_one": each.over_one,
-        "over_repeats": each.over_repeats,
-        "exhaustive": each.exhaustive,
-        "gap": each.gap,
-        "bound": each.bound,
+        **picked(each, "over_one", "over_repeats", "exhaustive", "gap", "bound"),
         "measurands": [_measurand(each, m) for m in range(len(first))],
-        "covariance": both.covariance,
-        "covariance_least_squares": both.covariance_least_squares,
+        **picked(both, "covariance", "covariance_least_squares"),
     }
 
 
 def _measurand(each: planner.ViewSet, m: int) -> dict:
     both, forecast = each.combination, each.views[0].prediction.measurands[m]
     return {
-        "name": forecast.name,
-        "kind": forecast.kind,
-        "unit": forecast.unit,
+        **picked(forecast, "name", "kind", "unit"),
         "sigma": math.sqrt(both.covariance[m, m]),
         "sigma_least_squares": math.sqrt(both.covariance_least_squares[m, m]),
         "bias": both.bias[m],

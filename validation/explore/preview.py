@@ -18,8 +18,9 @@ from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced
 from scenes import Picture, Scene
+from scenes.results import finite
 from scenes.status import GLANCED, OK
-from validation.explore.answers import Answer, finite
+from validation.explore.answers import Answer
 
 WIDE = 420  # px, at most, of what is sent
 _MARGIN = 0.12  # of the object's image, around it

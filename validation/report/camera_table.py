@@ -13,6 +13,7 @@ import scenes
 from measure.boards.camera import CameraCalibration
 from measure.goodness import WORST
 from scenes import InvalidInput
+from scenes.results import picked
 from scenes.status import legend
 from validation.boards import Boards
 from validation.report import cells
@@ -131,20 +132,13 @@ def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
         "status": found.status,
         "image": list(found.image_shape[::-1]),
         "units": units,
-        "lens": {
-            **{name: getattr(lens, name) for name in ("fx", "fy", "cx", "cy")},
-            "distortion": list(lens.distortion),
-        },
+        "lens": {**picked(lens, "fx", "fy", "cx", "cy"), "distortion": list(lens.distortion)},
         "names": list(found.names),
         "values": found.values.tolist(),
         "sd": found.sd.tolist(),
         "covariance": found.covariance.tolist(),
         "correlation": found.correlation.tolist(),
-        "rms_px": found.rms_px,
-        "chi_square": found.chi_square,
-        "freedom": found.freedom,
-        "p_value": found.p_value,
-        "dispersion": found.dispersion,
+        **picked(found, "rms_px", "chi_square", "freedom", "p_value", "dispersion"),
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }

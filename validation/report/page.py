@@ -17,7 +17,6 @@ from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.report import (
     budget_figure,
-    budget_section,
     budget_table,
     camera_words,
     cells,
@@ -254,8 +253,8 @@ def _budget(found: SceneBudget | None) -> list[Section]:
         "to improve. `ice budget SCENE --reach U` says how well a source must be known for a wanted U."
     )
     folded = [
-        Table(f"{cells.name(each.name)} [{each.unit}]", budget_table.COLUMNS, budget_section.cells(each),
-              budget_section.note(found, m))
+        Table(f"{cells.name(each.name)} [{each.unit}]", budget_table.COLUMNS, budget_table.lines(each),
+              budget_table.note(found, m))
         for m, each in enumerate(found)
     ]  # fmt: skip
     plots = [Plot(budget_figure.drawn(found), caption)]
