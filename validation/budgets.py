@@ -78,9 +78,8 @@ def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 
     rows = []
     for m, (each, stream) in enumerate(zip(found, streams[:-1], strict=True)):
         rng = np.random.default_rng(stream)
-        draws = drawn_until_stable(
-            chain.model(m), each.sources, rng, each.p, digits, _BLOCK, _MOST_DRAWS, margin, name=each.name
-        )
+        enough = {"digits": digits, "block": _BLOCK, "most": _MOST_DRAWS, "margin": margin}
+        draws = drawn_until_stable(chain.model(m), each.sources, rng, each.p, name=each.name, **enough)
         told = validate(each, draws, digits)
         rows.append({
             "name": each.name, "unit": each.unit, "value": draws.y, "u": draws.u, "draws": draws.draws,

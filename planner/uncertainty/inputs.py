@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy import special, stats
@@ -83,18 +83,18 @@ class Input:
         value: float,
         half_width: float,
         distribution: Distribution = "rectangular",
-        dof: float = math.inf,
-        type: Type = "B",
-        unit: str = "",
-        kind: Kind = "systematic",
+        **about: Any,
     ) -> Input:
-        """An input within value +- half_width: rectangular, triangular or arcsine (GUM 4.3.7, 4.3.9, H.1.3.4)."""
+        """An input within value +- half_width: rectangular, triangular or arcsine (GUM 4.3.7, 4.3.9, H.1.3.4).
+
+        ``about``: dof, type, unit and kind as of an Input.
+        """
         if distribution not in _HALF_WIDTHS:
             allowed = ", ".join(_HALF_WIDTHS)
             raise InvalidInput(f"{name}: distribution must be one of {allowed} with a half-width, got {distribution}")
         if not 0 <= half_width < math.inf:
             raise InvalidInput(f"{name}: half_width must be a finite number of at least 0, got {half_width}")
-        return cls(name, value, half_width / _HALF_WIDTHS[distribution], distribution, dof, type, unit, kind)
+        return cls(name, value, half_width / _HALF_WIDTHS[distribution], distribution, **about)
 
     @property
     def sd(self) -> float:

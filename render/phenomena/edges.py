@@ -17,7 +17,7 @@ from imaging.features.projected_edges import circles, straight
 from imaging.geometry.projection import edge_points, facing, project_ideal
 from imaging.light.appearance import face_signal
 from imaging.pictures import Pictures
-from render.phenomena.base import Influence, largest
+from render.phenomena.base import Effect, Influence, largest
 from scenes import Curved, Scene
 
 NEAR_STEP = float(np.exp(-0.5))
@@ -99,6 +99,13 @@ def compare(pictures: Pictures, other: Scene) -> Influence:
         ratio = np.maximum(ratio, np.abs((second.contrast / first.contrast) ** 2 - 1))
     moved = np.abs(first.shift(variance) - second.shift(variance)).max(-1)
     return largest((lever(pictures) * moved).sum(-1), ratio.max((-1, -2)))
+
+
+class Shading(Effect):
+    """An effect on what surfaces send: its influence is that of the same scene without it."""
+
+    def influence(self, pictures: Pictures) -> Influence:
+        return compare(pictures, self.without(pictures.scene))
 
 
 def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influence:
