@@ -109,12 +109,7 @@ def _over(solid: Solid, place: np.ndarray, sine: float = _GRAZING) -> np.ndarray
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
     """Mitsuba's meshes of the parts that `faces` gives."""
     return [
-        mesh(
-            mitsuba,
-            part.triangles,
-            {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)},
-            texels(part),
-        )
+        mesh(mitsuba, part.triangles, {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)}, texels(part))
         for part in parts
         if len(part.triangles)
     ]

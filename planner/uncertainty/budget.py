@@ -144,12 +144,7 @@ class Budget(Shown):
 
 
 def budget(
-    name: str,
-    unit: str,
-    value: float,
-    inputs: Iterable[Source],
-    sensitivities: Mapping[str, float],
-    p: float = 0.95,
+    name: str, unit: str, value: float, inputs: Iterable[Source], sensitivities: Mapping[str, float], p: float = 0.95
 ) -> Budget:
     """The budget of a measurand from its inputs.
 

@@ -78,12 +78,7 @@ class Input:
 
     @classmethod
     def from_half_width(
-        cls,
-        name: str,
-        value: float,
-        half_width: float,
-        distribution: Distribution = "rectangular",
-        **about: Any,
+        cls, name: str, value: float, half_width: float, distribution: Distribution = "rectangular", **about: Any
     ) -> Input:
         """An input within value +- half_width: rectangular, triangular or arcsine (GUM 4.3.7, 4.3.9, H.1.3.4).
 

@@ -159,10 +159,7 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
 
 
 def _say_measurands(
-    file: Path,
-    found: measure.Measurements,
-    distance: measure.Measurement | None,
-    as_json: bool,
+    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)

@@ -105,22 +105,17 @@ def _set(each: planner.ViewSet) -> dict:
 
 
 def _measurand(each: planner.ViewSet, m: int) -> dict:
-    both, forecast = each.combination, each.views[0].prediction.measurands[m]
+    both, alone = each.combination, [view.prediction.measurands[m] for view in each.views]
     return {
-        **picked(forecast, "name", "kind", "unit"),
+        **picked(alone[0], "name", "kind", "unit"),
         "sigma": math.sqrt(both.covariance[m, m]),
         "sigma_least_squares": math.sqrt(both.covariance_least_squares[m, m]),
         "bias": both.bias[m],
         "status": both.status[m],
         "pictures": [v + 1 for v in range(len(each.views)) if both.used[v, m]],
         "weights": both.weights[:, m].tolist(),
-        "single": [_alone(view.prediction.measurands[m]) for view in each.views],
+        "single": [{"sigma": math.sqrt(one.variance_object), "status": one.status} for one in alone],
     }
-
-
-def _alone(forecast: planner.Forecast) -> dict:
-    """What one picture tells."""
-    return {"sigma": math.sqrt(forecast.variance_object), "status": forecast.status}
 
 
 def _checked(check: ViewsCheck) -> dict:

@@ -113,7 +113,8 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
         )
     lens = found.lens
     off = lens.cx - (width - 1) / 2, lens.cy - (height - 1) / 2
-    given = json.dumps(beside.name) if beside else _inline(_covariance(found))
+    told = ", ".join(f"{key} = {json.dumps(value)}" for key, value in _covariance(found).items())
+    given = json.dumps(beside.name) if beside else f"{{ {told} }}"
     return "\n".join([
         "[camera]",
         f"focal_px = {float(np.sqrt(lens.fx * lens.fy))!r}  # fx {lens.fx:.3f}, fy {lens.fy:.3f}",
@@ -175,7 +176,3 @@ def _covariance(found: CameraCalibration) -> dict[str, Any]:
         raise InvalidInput("BOARD must determine a camera, got boards that leave its covariance infinite")
     told = found.for_budget
     return {"names": list(told.names), "matrix": [list(row) for row in told.matrix]}
-
-
-def _inline(covariance: dict[str, Any]) -> str:
-    return f"{{ names = {json.dumps(covariance['names'])}, matrix = {json.dumps(covariance['matrix'])} }}"

@@ -70,7 +70,8 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     if found.refused:
         sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
     sections.append(_done(found, store))
-    context = _context(station, first, _title(found, station), sections) | {"agrees": found.verdict.agrees}
+    name, title = station.picture.scene.name, _title(found, station)
+    context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
     paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
@@ -95,15 +96,6 @@ def _environment(escaped: bool) -> jinja2.Environment:
     made = jinja2.Environment(loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined)
     made.filters |= {"md": markdown, "words": words, "linked": linked}
     return made
-
-
-def _context(station: Station, first: dict[str, Any], title: str, sections: list[Section]) -> dict[str, Any]:
-    return {
-        "name": station.picture.scene.name,
-        "title": title,
-        "sections": sections,
-        "station": first,
-    }
 
 
 def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:

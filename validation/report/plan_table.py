@@ -12,7 +12,6 @@ import planner
 from planner.search.candidates import Candidate
 from planner.search.setting_up import how_far
 from render import Tolerance
-from scenes import Scene
 from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
 from validation.report.cells import MODELS
@@ -79,11 +78,8 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
 
 def _textures(p: planner.Prediction) -> list[str]:
     """What textures add to each measurand; nothing without textures."""
-    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in p.measurands if _is_uneven(each)]
-
-
-def _is_uneven(each: planner.Forecast) -> bool:
-    return each.texture_variance_object is not None
+    uneven = (each for each in p.measurands if each.texture_variance_object is not None)
+    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in uneven]
 
 
 def _over_parts(each: planner.Forecast) -> str:
@@ -101,26 +97,19 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         f"  Guarantee: {found.guarantee}.",
     ]
     if not found.steady:
-        lines.append(f"  Hard to set up: {_how_far(found.scene)} degrees off something cannot be measured any more.")
+        off = " or ".join(sorted({f"{how_far(found.scene, role):.2g}" for role in ("sensor", "light")}))
+        lines.append(f"  Hard to set up: {off} degrees off something cannot be measured any more.")
     if found.shares:
         lines.insert(
             0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
         )
     if found.set_aside and found.set_aside[0].variance < found.variance:
-        many = len(found.set_aside)
+        many, part = len(found.set_aside), 100 * found.set_aside[0].variance / found.variance
         lines.append(
-            f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {_part(found)} of this one's"
+            f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {part:.0f} % of this one's"
             " variance): more of the values there would be biased by what lies around their edges (clutter)."
         )
     return "\n".join(lines)
-
-
-def _how_far(scene: Scene) -> str:
-    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
-
-
-def _part(found: planner.Plan) -> str:
-    return f"{100 * found.set_aside[0].variance / found.variance:.0f} %"
 
 
 def _ruled_out(found: planner.Plan) -> str:
