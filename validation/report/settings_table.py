@@ -22,8 +22,7 @@ def table(found: Validation, halves: dict[str, float], chosen: int | None) -> Ta
     rows = heapq.nsmallest(_ROWS, found.rows, key=lambda row: (*merit(row, halves), row.index))
     headings, cells = names(found, rows)
     columns = ["setting", *map(placed, headings), "largest sigma", "proven", "not proven, by status"]
-    lines = [[str(row.index + 1), *cells[row.index], _largest(row, halves),
-              f"{sum(is_trusted(each.status) for each in row.measurands)} of {len(row.measurands)}", _doubtful(row)]
+    lines = [[str(row.index + 1), *cells[row.index], _largest(row, halves), _proven(row), _doubtful(row)]
              for row in rows]  # fmt: skip
     note = f"The best {_ROWS} of {len(found.rows)}; all are in table.csv." if len(found.rows) > _ROWS else ""
     what = f"{PLACED} {_proof(rows)} " + (
@@ -49,6 +48,10 @@ def _proof(rows: list[Row]) -> str:
     told = "proven: value and sigma can be relied on (status ok), whatever the tolerance."
     states = dict.fromkeys(each.status for row in rows for each in row.measurands if not is_trusted(each.status))
     return " ".join([told, *(f"{state}: {MEANINGS[state]}." for state in states)])
+
+
+def _proven(row: Row) -> str:
+    return f"{sum(is_trusted(each.status) for each in row.measurands)} of {len(row.measurands)}"
 
 
 def _doubtful(row: Row) -> str:
