@@ -6,10 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 from scipy import stats
@@ -21,7 +17,7 @@ from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import cells
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.requirements import HALF
 
 MOST = 5000  # settings that are looked at, evenly spaced

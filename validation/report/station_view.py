@@ -6,10 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 from scipy.optimize import linear_sum_assignment
@@ -20,7 +16,7 @@ from scenes.measurands.features import point_of
 from scenes.measurands.measurands import Quantity
 from scenes.parts.surfaces import Sphere
 from validation.explore import preview
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.grades import LOOKS
 from validation.report.requirements import Grade, Requirement
 

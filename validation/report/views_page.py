@@ -6,10 +6,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 from markupsafe import Markup
 from scipy.stats import norm
 
@@ -17,7 +13,7 @@ import planner
 from scenes import Picture
 from scenes.results import finite
 from validation.report import camera_words, cells, map_figure, page, station_table, station_view
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
 from validation.report.requirements import Requirement
