@@ -115,7 +115,7 @@ def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influenc
     """
     contrast = sides(pictures).contrast
     share = np.abs(levels / np.where(contrast == 0, np.nan, contrast))
-    slope = px_per_cm(pictures)[:, None, None] * near
+    slope = px_per_unit(pictures)[:, None, None] * near
     moved = (total_variance(pictures.scene) * share / slope).max(-1)
     return largest((lever(pictures) * moved).sum(-1), _loss(share).max((-1, -2)))
 
@@ -133,7 +133,7 @@ def total_variance(scene: Scene) -> float:
     return scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
 
 
-def px_per_cm(pictures: Pictures) -> np.ndarray:
+def px_per_unit(pictures: Pictures) -> np.ndarray:
     """Image scale at the reference point, shape (S,)."""
     return np.full(len(pictures.sensors), pictures.scene.camera.focal_px / pictures.scene.camera.distance)
 

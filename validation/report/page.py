@@ -30,6 +30,7 @@ from validation.report import (
 )
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
+from validation.report.requirements import Requirement
 from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
 from validation.report.wording import Need, need, next_step, nothing_wrong, sentence, what, wrong
@@ -105,29 +106,37 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     placed = f"Setting {station.number}: " if station.number else ""
     how = f"{_shown(station, is_simulated)}{station_view.enlarged(picture)}"
     named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
-    grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
         "what": f"{what(found)}, numbered in the picture, from one picture of one camera",
+        **said(found),
         "simulated": SIMULATED if is_simulated else "",
-        "sentence": sentence(found),
-        "wrong": wrong(found),
-        "nothing": nothing_wrong(found),
-        "next": next_step(found),
-        "need": need(found),
-        "checked": "",
         "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"What is measured{how} {named}."),
         "places": f"{camera}. {told[0].upper()}{told[1:]}. {station_sketch.AZIMUTH}",
         "sketched": "",
         "caption": f"What is measured{how}",
-        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
-        "lines": station_table.lines(found),
         "above": station_table.ABOVE,
         "note": station_table.note(found),
         "section": Section("Requirements", answer=f"{placed}{told}. Camera: {camera}.", tables=[table]),
+    }
+
+
+def said(found: Sequence[Requirement]) -> dict[str, Any]:
+    """What a first screen says of requirements, wherever they are measured from."""
+    grades = dict.fromkeys(each.grade for each in found)
+    return {
+        "simulated": SIMULATED,
+        "sentence": sentence(found),
+        "wrong": wrong(found),
+        "nothing": nothing_wrong(found),
+        "next": next_step(found),
+        "need": need(found),
+        "checked": "",
+        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
+        "lines": station_table.lines(found),
     }
 
 
