@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from planner.uncertainty.checks import check_not_negative
 from planner.uncertainty.groups import Source, draw
 from scenes.errors import InvalidInput
 
@@ -163,8 +164,7 @@ def numerical_tolerance(u: float, digits: int = 2) -> float:
     """
     if digits < 1:
         raise InvalidInput(f"digits must be at least 1, got {digits}")
-    if not 0 <= u < math.inf:
-        raise InvalidInput(f"u must be a finite number of at least 0, got {u}")
+    check_not_negative("u", u)
     if u == 0:
         return 0.0
     exponent = int(f"{u:.{digits - 1}e}".split("e")[1])  # of u rounded: 0.0996 is 1.0e-01
