@@ -174,20 +174,12 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     first = found.candidates[0]
     itself = [*map(_pose, (first.sensor, first.light))] == [*map(_pose, (best.sensor, best.light))]
     for c in (best, *found.candidates[itself:]):
-        mark, ratio = "best" if c is best else "", c.variance / best.variance
         if several:
-            table.add_row(
-                mark,
-                _pose(c.sensor),
-                _pose(c.light),
-                " ".join(c.edges),
-                c.limiting,
-                f"{c.variance:.4g}",
-                f"{ratio:.3f}",
-            )
-            continue
-        values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
-        table.add_row(mark, _pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
+            values = c.limiting, f"{c.variance:.4g}"
+        else:
+            values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"
+        row = "best" if c is best else "", _pose(c.sensor), _pose(c.light), " ".join(c.edges)
+        table.add_row(*row, *values, f"{c.variance / best.variance:.3f}")
     return table
 
 
@@ -232,17 +224,9 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
     several = len(found.prediction.measurands) > 1
     unit = "1e-6" if several else f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
     columns = (
-        "place",
-        "now",
-        "sensor",
-        "light",
-        f"calibrated, {unit}",
-        "propagated",
-        "with u(bias)",
-        "ratio",
-        "status",
+        "place", "now", "sensor", "light", f"calibrated, {unit}", "propagated", "with u(bias)", "ratio", "status",
         "not in formulas",
-    )
+    )  # fmt: skip
     table = _table(f"\nThe best settings rendered, and measured by {ESTIMATOR}", *columns)
     for row in checked.settings:
         values = (
