@@ -23,7 +23,6 @@ from planner.search.constraints import Constraints
 from planner.search.design import Choice, Chosen, Varied, with_choice
 from planner.search.exhaustive import exhaustive
 from planner.search.grid import ViewingSpace
-from planner.search.local import alternate
 from planner.search.objective import Aim
 from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
@@ -51,7 +50,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
     "Forecast", "Map", "Pictures", "Plan", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
-    "View", "ViewSet", "ViewingSpace", "Views", "alternate", "budget", "combine", "exhaustive",
+    "View", "ViewSet", "ViewingSpace", "Views", "budget", "combine", "exhaustive",
     "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter",
     "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from imaging.models.errors import Errors
 from planner.ranks import quantity_ranks
 from planner.reasons import reason
 from scenes import Scene, Tolerance
-from scenes.results import finite, value
+from scenes.results import finite, picked, value
 from scenes.status import CLUTTER, WORST_FIRST, unsure
 
 
@@ -82,9 +82,7 @@ class Forecast:
         """A record: value, standard deviations (not variances) in object and image; None where not known."""
         zone = self.tolerance
         return {
-            "name": self.name,
-            "kind": self.kind,
-            "unit": self.unit,
+            **picked(self, "name", "kind", "unit"),
             "value": self.value_object,
             "sigma": finite(np.sqrt(self.variance_object)),
             "sigma_image": finite(np.sqrt(self.variance_image)),
@@ -92,7 +90,7 @@ class Forecast:
             "nominal": self.nominal,
             "plus": zone and zone.plus,
             "minus": zone and zone.minus,
-            "ratio": None if self.ratio is None else finite(self.ratio),
+            "ratio": finite(self.ratio),
             "status": self.status,
         }
 

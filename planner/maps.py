@@ -125,12 +125,8 @@ def pose_map(
     >>> sorted(set(found.status.tolist()))
     ['clutter', 'not_visible', 'ok', 'short']
     """
-    looked = cluttered if biased and model != "bound" else _not_asked
+    looked = cluttered if biased and model != "bound" else lambda _: np.array(False)
     return _map(SearchProblem.of(scene, model, objective), sensor, light, space, looked)
-
-
-def _not_asked(_: Pictures) -> np.ndarray:
-    return np.array(False)
 
 
 def _map(

@@ -167,11 +167,7 @@ class Prediction(Shown):
 
 
 def variances(
-    scene: Scene,
-    sensors: Any,
-    lights: Any,
-    model: ModelName = DEFAULT_MODEL,
-    objective: Objective = DEFAULT_OBJECTIVE,
+    scene: Scene, sensors: Any, lights: Any, model: ModelName = DEFAULT_MODEL, objective: Objective = DEFAULT_OBJECTIVE
 ) -> np.ndarray:
     """Variance of the measurand, or what is minimised of several, for arrays of settings.
 

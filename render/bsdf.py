@@ -82,17 +82,17 @@ def _register(variant: str) -> None:
 
         def eval(self, ctx, si, wo, active=True):
             known = self.surface
-            analyser = None if known.analyser is None else _local(dr, mi, si, known.analyser, si.wi)
+            analyser = None if known.analyser is None else _local(si, known.analyser, si.wi)
             to_sensor = _along(dr, mi, si, known.sensor, si.wi, known.sensor_angle)
             factor = 1.0 if self.texture is None else self.texture.eval_1(si, active)
-            value = self._seen(dr, wo, si.wi, None, analyser, to_sensor, factor)
+            value = self._seen(wo, si.wi, None, analyser, to_sensor, factor)
             for lamp in known.lamps:
-                polarisation = _local(dr, mi, si, lamp.polarisation, wo)
-                lit = self._seen(dr, wo, si.wi, polarisation, analyser, to_sensor, factor)
+                polarisation = _local(si, lamp.polarisation, wo)
+                lit = self._seen(wo, si.wi, polarisation, analyser, to_sensor, factor)
                 value = dr.select(_along(dr, mi, si, lamp.at, wo, lamp.angle), lit, value)
             return mi.Spectrum(value / math.pi) & active
 
-        def _seen(self, dr, wo, wi, polarisation, analyser, to_sensor, factor):
+        def _seen(self, wo, wi, polarisation, analyser, to_sensor, factor):
             """The sensor looks through the analyser, other surfaces do not."""
             value = self._value(wo, wi, polarisation, None, factor)
             if analyser is None:
@@ -119,7 +119,7 @@ def _register(variant: str) -> None:
         def to_string(self):
             return f"Reflecting[{self.surface}]"
 
-    def _local(dr, mi, si, axis, beam):
+    def _local(si, axis, beam):
         local = si.to_local(mi.Vector3f(*axis))
         return across((local.x, local.y, local.z), (beam.x, beam.y, beam.z), ops)
 

@@ -7,7 +7,6 @@ random (interreflection, an aperture, a light of some size), all that something 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,14 +17,15 @@ from imaging.geometry.lens import confusion
 from imaging.geometry.projection import depth
 from imaging.light.appearance import is_plain
 from render import variant as variants
-from render.adaptive import bent, crossed, near_edges, refine
+from render.adaptive import bent, crossed, refine
 from render.between import lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.large import Renders, fine_pixels, is_large, whole_pixels
-from render.mosaic import mosaic, refine_tiles
+from render.mosaic import Tiles
 from render.parts import Part
 from render.quality import Quality
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
+from render.surroundings import near_edges
 from render.texture import Face
 from scenes import Picture
 
@@ -104,6 +104,11 @@ class _Tracer:
         return self.part.picture
 
     @property
+    def start(self) -> tuple[int, int]:
+        """First row and column of the crop."""
+        return self.crop[0].start, self.crop[1].start
+
+    @property
     def sharp(self) -> frozenset[str]:
         """Effects whose single rays are not random."""
         return self.part.active - MANY_WAYS
@@ -176,19 +181,21 @@ class _Tracer:
 
     def again(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
         """The image with marked fine pixels rendered again; in scalar variants also what turns out to be crossed."""
-        return self._again(loaded, active, fine, marked, rays, refine_tiles, self.quality.seed)
+        if not self.scalar:
+            return refine(loaded, self.rays, fine, marked, rays)
+        return self._tiles(loaded, active, rays).refined(fine, marked, rays, self.quality.seed)
 
     def again_alone(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
         """The image with marked fine pixels rendered again, and no others."""
-        return self._again(loaded, active, fine, marked, rays, mosaic, (self.quality.seed, 0))
-
-    def _again(self, loaded, active, fine, marked, rays: int, tiles: Callable[..., np.ndarray], seed) -> np.ndarray:
         if not self.scalar:
             return refine(loaded, self.rays, fine, marked, rays)
+        return self._tiles(loaded, active, rays).rendered(fine, marked, rays, (self.quality.seed, 0))
+
+    def _tiles(self, loaded: Any, active, rays: int) -> Tiles:
+        """Of fine pixels, in scalar variants."""
         seen = view(self.mitsuba, self.picture, active, *self.film(), rays)
         seen["sampler"] = {"type": "stratified", "jitter": False} if self.quality.alike else {"type": "multijitter"}
-        start = self.crop[0].start, self.crop[1].start
-        return tiles(self.mitsuba, loaded, seen, start, fine, marked, rays, seed)
+        return Tiles(self.mitsuba, loaded, seen, self.start)
 
     def whole(self, random: bool, count: int) -> np.ndarray:
         """Image of whole pixels, with or without random rays."""
@@ -207,8 +214,8 @@ class _Tracer:
         def with_effects(active) -> np.ndarray:
             loaded = self.load(active, count, None, self.quality.supersample)
             seen = view(self.mitsuba, self.picture, active, *film, count) | {"sampler": {"type": "ldsampler"}}
-            start = tuple(part.start for part in film[1])
-            return mosaic(self.mitsuba, loaded, seen, start, pixels.copy(), near, count, (self.quality.seed, 2))
+            tiles = Tiles(self.mitsuba, loaded, seen, (film[1][0].start, film[1][1].start))
+            return tiles.rendered(pixels.copy(), near, count, (self.quality.seed, 2))
 
         return with_effects(self.active) - with_effects(self.sharp)
 
@@ -217,7 +224,6 @@ class _Tracer:
         picture, k = self.picture, self.quality.supersample
         between = self.active - self.sharp == {"interreflection"}
         apart, plane = self.scalar and self.quality.alike, not (picture.scene.solid.curved or self.part.silhouette)
-        start = self.crop[0].start, self.crop[1].start
         loaded = {
             False: (self.load(self.sharp, self.ordinary, self.textures), self.sharp),
             True: (self.load(self.active, self.few), self.active),
@@ -229,7 +235,7 @@ class _Tracer:
             self.random,
             self.quality.everywhere,
             self.bounced if apart and between else None,
-            (lambda marked: lent_to(picture, marked, start, k)) if between and plane else None,
+            (lambda marked: lent_to(picture, marked, self.start, k)) if between and plane else None,
         )
         rays = self.ordinary, self.few, self.many
         return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), rays)

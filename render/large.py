@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from imaging.geometry.projection import project, project_ideal
-from render.adaptive import MISSED, crossed, limb_pieces
+from render.adaptive import MISSED, crossed
+from render.surroundings import near_required
 from scenes import Picture
 
 LARGE = 1 << 20  # pixels of an image whose fine pixels are not all rendered
@@ -153,42 +152,3 @@ def _some(fine: np.ndarray, supersample: int) -> np.ndarray:
     """Whole pixels one of whose fine ones is marked."""
     height, width = (size // supersample for size in fine.shape)
     return fine.reshape(height, supersample, width, supersample).any((1, 3))
-
-
-def near_required(
-    picture: Picture, crop: tuple[slice, slice], supersample: int, within: float | None = None
-) -> np.ndarray:
-    """Pixels of the crop that the task's edges and circles are measured from, and their surroundings, as a mask; or
-    those ``within`` so many standard deviations of scale and blur together of where they are. Not to be changed."""
-    corner = tuple(part.start // supersample for part in crop)
-    shape = tuple((part.stop - part.start) // supersample for part in crop)
-    return _near_required(picture.unlit(), corner, shape, within)
-
-
-@lru_cache(maxsize=4)
-def _near_required(
-    picture: Picture, corner: tuple[int, int], shape: tuple[int, int], within: float | None
-) -> np.ndarray:
-    """The same of a crop of whole pixels: all lights and rays share it."""
-    scene, (top, left) = picture.scene, corner
-    circles = {circle.name: circle.edges for circle in scene.solid.rims}
-    limbs = [each for each in scene.solid.curved if each.name in scene.required]
-    circles |= dict.fromkeys((each.name for each in limbs), ())
-    names = [piece for name in scene.required for piece in circles.get(name, (name,))]
-    ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
-    places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
-    sensor = np.array(list(picture.sensor))
-    seen = (project, project_ideal) if scene.camera.lens.bends else (project,)  # rendered by a pinhole, bent after
-    places = np.concatenate([made(places, sensor, scene.camera) for made in seen])
-    pieces = [np.linspace(*ends, 2 + max(shape)) for each in limbs for ends in limb_pieces(picture, each)]
-    places = np.concatenate([places, *pieces])
-    x, y = places[np.isfinite(places).all(1)].T
-    column, row = np.rint(x - left).astype(int), np.rint(y - top).astype(int)
-    inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
-    found = np.zeros(shape, bool)
-    found[row[inside], column[inside]] = True
-    spread = math.hypot(scene.locator.scale_px, scene.camera.blur_px)
-    reach = 1 + (scene.locator.window_px + 4 * spread if within is None else within * spread)
-    near = maximum_filter(found, 2 * math.ceil(reach) + 1)
-    near.flags.writeable = False
-    return near

@@ -7,6 +7,7 @@ call of the renderer takes as long as a thousand rays, making a sensor as long a
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,11 @@ _SENSOR = {"perspective": 20, "thinlens": 200}  # rays that take as long as maki
 _AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
 
 
-def refine_tiles(
-    mitsuba: Any,
-    scene: Any,
-    view: dict,
-    start: tuple[int, int],
-    fine: np.ndarray,
-    marked: np.ndarray,
-    samples: int,
-    seed: int,
-) -> np.ndarray:
-    """The image itself, its marked fine pixels rendered again, and then those that turn out to be crossed as well.
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """What single fine pixels are seen by.
 
-    Parameters
+    Attributes
     ----------
     mitsuba : module
         With a scalar variant set.
@@ -38,46 +31,49 @@ def refine_tiles(
     view : dict
         Description of the sensor, its sampler among it.
     start : tuple of int
-        Row and column in the sensor's whole frame of the first pixel of ``fine``.
-    fine : ndarray
-        The image as rendered so far, changed in place: that of a large camera is copied in a tenth of a second.
-    marked : ndarray of bool
-    samples : int
-        Rays a fine pixel, a square number.
-    seed : int
-        The same gives the same image, bit by bit, whatever the number of processor cores.
+        Row and column in the sensor's whole frame of the first pixel of an image.
     """
-    first = mosaic(mitsuba, scene, view, start, fine, marked, samples, (seed, 0))
-    missed = crossed(first, step=MISSED) & ~marked
-    return mosaic(mitsuba, scene, view, start, first, missed, samples, (seed, 1))
 
+    mitsuba: Any
+    scene: Any
+    view: dict
+    start: tuple[int, int]
 
-def mosaic(
-    mitsuba: Any,
-    scene: Any,
-    view: dict,
-    start: tuple[int, int],
-    fine: np.ndarray,
-    marked: np.ndarray,
-    samples: int,
-    seed: tuple[int, int],
-) -> np.ndarray:
-    """The image itself, its tiles that hold a marked fine pixel rendered again; parameters as of `refine_tiles`."""
-    lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
-    side = _side(marked, samples, _SENSOR[view["type"]], frame.min() if lens else max(_SIDES))
-    corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side
-    if lens:  # its crop must lie in the frame
-        corners = np.minimum(corners, frame - start - side)
-    parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
-    seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
-    for part, number in zip(parts, seeds, strict=True):
-        sensor = _side_by_side(mitsuba, view, [(y + start[0], x + start[1]) for y, x in part], side, samples)
-        strip = np.array(mitsuba.render(scene, sensor=sensor, seed=number), float)[:, :, 0]
-        for i, (y, x) in enumerate(part):
-            top, left = max(-y, 0), max(-x, 0)  # of the tile, outside the image
-            here = fine[y + top : y + side, x + left : x + side]
-            here[:] = strip[top : top + here.shape[0], i * side + left : i * side + left + here.shape[1]]
-    return fine
+    def refined(self, fine: np.ndarray, marked: np.ndarray, samples: int, seed: int) -> np.ndarray:
+        """As `rendered`, and then those pixels again that turn out to be crossed as well."""
+        first = self.rendered(fine, marked, samples, (seed, 0))
+        missed = crossed(first, step=MISSED) & ~marked
+        return self.rendered(first, missed, samples, (seed, 1))
+
+    def rendered(self, fine: np.ndarray, marked: np.ndarray, samples: int, seed: tuple[int, int]) -> np.ndarray:
+        """The image itself, its tiles that hold a marked fine pixel rendered again.
+
+        Parameters
+        ----------
+        fine : ndarray
+            The image as rendered so far, changed in place: that of a large camera is copied in a tenth of a second.
+        marked : ndarray of bool
+        samples : int
+            Rays a fine pixel, a square number.
+        seed : pair of int
+            The same gives the same image, bit by bit, whatever the number of processor cores.
+        """
+        view, (top, left) = self.view, self.start
+        lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
+        side = _side(marked, samples, _SENSOR[view["type"]], frame.min() if lens else max(_SIDES))
+        corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side
+        if lens:  # its crop must lie in the frame
+            corners = np.minimum(corners, frame - self.start - side)
+        parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
+        seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
+        for part, number in zip(parts, seeds, strict=True):
+            sensor = _side_by_side(self.mitsuba, view, [(y + top, x + left) for y, x in part], side, samples)
+            strip = np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float)[:, :, 0]
+            for i, (y, x) in enumerate(part):
+                above, before = max(-y, 0), max(-x, 0)  # of the tile, outside the image
+                here = fine[y + above : y + side, x + before : x + side]
+                here[:] = strip[above : above + here.shape[0], i * side + before : i * side + before + here.shape[1]]
+        return fine
 
 
 def _held(marked: np.ndarray, side: int) -> np.ndarray:

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-from render.phenomena import Tolerance
 from render.phenomena.pose import shaken
-from render.quality import Quality
 from render.renderer import image
 from render.sensor import expose
 from scenes import Pose, Scene
 
 
-def shots(
-    scene: Scene,
-    sensor: Pose,
-    light: Pose,
-    rng: np.random.Generator,
-    count: int,
-    quality: Quality = Quality(),
-    variant: str | None = None,
-    effects: str | Iterable[str] = "auto",
-    tolerance: Tolerance = Tolerance(),
-) -> np.ndarray:
+def shots(scene: Scene, sensor: Pose, light: Pose, rng: np.random.Generator, count: int, **how: Any) -> np.ndarray:
     """Take ``count`` pictures, sensor and light set anew for each, as exactly as `scenes.Jitter` says.
 
-    Parameters are those of `render.image` and `render.expose`.
+    Parameters are those of `render.image` (``how``: quality, variant, effects, tolerance) and `render.expose`.
 
     Returns
     -------
@@ -37,6 +25,5 @@ def shots(
     taken = []
     for _ in range(count):
         poses = shaken(scene, "sensor", sensor, rng), shaken(scene, "light", light, rng)
-        clean = image(scene, *poses, quality, variant, effects, tolerance)
-        taken.append(expose(clean, scene.noise, rng, 1)[0])
+        taken.append(expose(image(scene, *poses, **how), scene.noise, rng, 1)[0])
     return np.array(taken)

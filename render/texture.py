@@ -29,6 +29,7 @@ from imaging.pictures import Pictures
 from render.meshes import mesh
 from scenes import Brdf, Picture, Scene, Solid, as_point
 from scenes.lights import SMOOTH
+from scenes.materials.textures import Rectangle
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -89,14 +90,13 @@ def faces(
     if (above.any(0) & ~lit & seen).any() and not small:
         return None  # lit from the rim of a light whose middle is below the horizon
     for index in np.flatnonzero(lit & seen):
-        of_face = solid.triangle_faces == index
         material = picture.scene.material if materials is None else materials[index]
         under = smooth if above[:, index].all() else pictures
-        made = _face(solid.triangles[of_face], solid.normals[index], under, material, uneven.get(int(index)))
+        made = _face(solid, index, under, material, uneven.get(int(index)))
         if made is None:
             return None
         found.append(made)
-        dark &= ~of_face
+        dark &= solid.triangle_faces != index
     rest = solid.triangles[dark]
     return (*found, Face(rest, np.zeros((*rest.shape[:2], 2)), np.zeros((2, 2))))
 
@@ -109,12 +109,7 @@ def _over(solid: Solid, place: np.ndarray, sine: float = _GRAZING) -> np.ndarray
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
     """Mitsuba's meshes of the parts that `faces` gives."""
     return [
-        mesh(
-            mitsuba,
-            part.triangles,
-            {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)},
-            texels(part),
-        )
+        mesh(mitsuba, part.triangles, {"type": "diffuse", "reflectance": bitmap(mitsuba, part.values)}, texels(part))
         for part in parts
         if len(part.triangles)
     ]
@@ -138,25 +133,20 @@ def uneven_part(solid: Solid, face: int, sheet: Sheet) -> Face:
     return Face(triangles, sheet.places(triangles), sheet.values)
 
 
-def _face(
-    triangles: np.ndarray, normal: np.ndarray, pictures: Pictures, material: Brdf, sheet: Sheet | None
-) -> Face | None:
-    """A lit and seen plane face with its table on the smallest rectangle along its longest side that holds it."""
-    sides = (triangles - np.roll(triangles, 1, 1)).reshape(-1, 3)
-    first = sides[np.linalg.norm(sides, axis=1).argmax()]
-    axes = np.array([first / np.linalg.norm(first), np.cross(normal, first / np.linalg.norm(first))])
-    flat = triangles @ axes.T
-    low, high = flat.min((0, 1)), flat.max((0, 1))
-    origin = low @ axes + normal * (normal @ triangles[0, 0])
+def _face(solid: Solid, face: int, pictures: Pictures, material: Brdf, sheet: Sheet | None) -> Face | None:
+    """A lit and seen plane face with its table."""
+    rectangle, normal = Rectangle.of(solid, face), solid.normals[face]
+    triangles = solid.triangles[solid.triangle_faces == face]
+    flat = triangles @ rectangle.axes.T
 
     def at(across: np.ndarray, down: np.ndarray) -> np.ndarray:
         """Points of the plane at fractions of the rectangle's sides, shape (down, across, 3)."""
-        return origin + np.stack(np.meshgrid(across, down), -1) * (high - low) @ axes
+        return rectangle.corner + np.stack(np.meshgrid(across, down), -1) * rectangle.size @ rectangle.axes
 
     values = _table(at, normal, pictures, material)
     if values is not None and sheet is not None:
         values = _uneven(values, at, normal, pictures, material, sheet)
-    return None if values is None else Face(triangles, (flat - low) / (high - low), values)
+    return None if values is None else Face(triangles, (flat - flat.min((0, 1))) / rectangle.size, values)
 
 
 def _uneven(values, at: Points, normal: np.ndarray, pictures: Pictures, material: Brdf, sheet: Sheet):

@@ -100,13 +100,22 @@ def value(found: float, sigma: float | None, unit: str) -> str:
     return f"{found:.{digits}f} +- {sigma:.{digits}f} {unit}"
 
 
-def finite(number: float) -> float | None:
-    """The number as a plain one; None where it is not finite.
+def picked(record: Any, *names: str) -> dict[str, Any]:
+    """Some attributes of a record by their names.
 
-    >>> finite(math.inf), finite(1)
-    (None, 1.0)
+    >>> picked(1 + 2j, "real", "imag")
+    {'real': 1.0, 'imag': 2.0}
     """
-    return float(number) if math.isfinite(number) else None
+    return {name: getattr(record, name) for name in names}
+
+
+def finite(number: float | None) -> float | None:
+    """The number as a plain one; None where it is not finite, or there is none.
+
+    >>> finite(math.inf), finite(1), finite(None)
+    (None, 1.0, None)
+    """
+    return float(number) if number is not None and math.isfinite(number) else None
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -6,10 +6,13 @@ What is known of them (corners, faces, circles) comes from the numbers that they
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import trimesh
 from scipy.spatial import Delaunay
+
+from scenes import Scene
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,35 @@ def newcomers_plate() -> trimesh.Trimesh:
     bores = [Hole(x, y, radius, evenly(72), 0.0, 8.0) for x, y, radius in ((8, 8, 3), (8, 22, 3), (39, 15, 4))]
     profile = [(0.0, 0.0), (50.0, 0.0), (50.0, 6.0), (48.0, 6.0), (48.0, 8.0), (0.0, 8.0)]
     return prism(profile, 30.0, [*bores, Slot(23.0, 15.0, 2.0, 10.0, 24, 0.0, 8.0)])
+
+
+_ASKED = (
+    ("length", "width", ({"edge": "e4"}, {"edge": "e16"}), 0.1),
+    ("depth", "width", ({"edge": "e5"}, {"edge": "e8"}), 0.1),
+    ("step", "width", ({"edge": "e14"}, {"edge": "e21"}), 0.02),
+    ("slot", "width", ({"edge": "e10"}, {"edge": "e12"}), 0.03),
+    ("bore 1", "diameter", ({"circle": "c2"},), 0.05),
+    ("bore 2", "diameter", ({"circle": "c4"},), 0.05),
+    ("bore 3", "diameter", ({"circle": "c6"},), 0.05),
+    ("bore to bore", "distance", ({"circle": "c2"}, {"circle": "c4"}), 0.05),
+    ("along", "distance", ({"circle": "c2"}, {"circle": "c6"}), 0.05),
+    ("square", "angle", ({"edge": "e5"}, {"edge": "e16"}), 0.05),
+)
+
+
+def newcomers(folder: Path) -> Scene:
+    """The plate with ten requirements, seen by a small camera from 20 degrees beside the vertical."""
+    newcomers_plate().export(folder / "plate.stl")
+    asked = [dict(zip(("name", "kind", "features", "tolerance"), each, strict=True)) for each in _ASKED]
+    return Scene.model_validate({
+        "name": "newcomer", "title": "Plate of 50 x 30 x 8 mm with a step, three holes and a slot", "units": "mm",
+        "object": {"kind": "mesh", "units": "mm", "file": str(folder / "plate.stl")},
+        "material": {"diffuse_reflectance": 0.8}, "light": {"distance": 217.0}, "measurands": asked,
+        "camera": {"width": 640, "height": 512, "focal_px": 1250.0, "distance": 217.0, "look_at": [25.0, 15.0, 4.0],
+                   "blur_px": 0.5, "exposure": 180.0},
+        "noise": {"dark_level": 16.0, "sigma": 1.5, "bits": 8},
+        "settings": [{"sensor": [20, 0], "light": [20, 45]}],
+    })  # fmt: skip
 
 
 def arc(centre: tuple[float, float], radius: float, begin: float, stop: float, step: float = 3.75) -> np.ndarray:

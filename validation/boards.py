@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 import measure
 from measure.boards.camera import FEWEST_BOARDS, FEWEST_CORNERS
 from scenes import InvalidInput
@@ -62,11 +64,7 @@ def read_boards(
             continue
         size = size or image_file.Size(*image.shape, of=str(path))
         try:
-            board = measure.chessboard(image, shape, noise)
-            good = int(board.measured.sum())
-            if good < FEWEST_CORNERS:
-                raise InvalidInput(f"board must have {FEWEST_CORNERS} corners that can be measured, got {good}")
-            found[path] = board
+            found[path] = _board(image, shape, noise)
         except InvalidInput as error:
             left_out.append((path, f"{path}: {error}"))
         if progress:
@@ -78,3 +76,12 @@ def read_boards(
             f"got {len(found)} of {len(files)}{first}"
         )
     return Boards(tuple(found), tuple(found.values()), tuple(left_out), size[:2])
+
+
+def _board(image: np.ndarray, shape: tuple[int, int] | None, noise: float | None) -> measure.Board:
+    """That of one photograph, enough of whose corners can be measured."""
+    board = measure.chessboard(image, shape, noise)
+    good = int(board.measured.sum())
+    if good < FEWEST_CORNERS:
+        raise InvalidInput(f"board must have {FEWEST_CORNERS} corners that can be measured, got {good}")
+    return board

@@ -16,6 +16,7 @@ from planner.uncertainty.monte_carlo import monte_carlo as drawn_until_stable
 from planner.uncertainty.risks import Limits, global_risks, nonconforming_probability
 from planner.uncertainty.validation import validate
 from scenes import InvalidInput, Picture, Tolerance
+from scenes.results import picked
 from scenes.status import is_trusted
 from validation.chain import Chain
 
@@ -77,9 +78,8 @@ def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 
     rows = []
     for m, (each, stream) in enumerate(zip(found, streams[:-1], strict=True)):
         rng = np.random.default_rng(stream)
-        draws = drawn_until_stable(
-            chain.model(m), each.sources, rng, each.p, digits, _BLOCK, _MOST_DRAWS, margin, name=each.name
-        )
+        enough = {"digits": digits, "block": _BLOCK, "most": _MOST_DRAWS, "margin": margin}
+        draws = drawn_until_stable(chain.model(m), each.sources, rng, each.p, name=each.name, **enough)
         told = validate(each, draws, digits)
         rows.append({
             "name": each.name, "unit": each.unit, "value": draws.y, "u": draws.u, "draws": draws.draws,
@@ -161,7 +161,7 @@ def _measurand(found: SceneBudget, m: int, reach: float | None, seed: int) -> di
     from validation.report.budget_table import signed
 
     return {
-        "name": each.name, "kind": kind, "unit": each.unit, "value": each.value, "u": each.u, "U": each.U, "k": each.k,
+        "name": each.name, "kind": kind, **picked(each, "unit", "value", "u", "U", "k"),
         "u_bias": found.u_bias[m], "status": status, "signed": is_trusted(status),
         "dof": each.dof if np.isfinite(each.dof) else None, "repeatability": each.repeatability,
         "accuracy": each.accuracy, "contributions": each.as_rows(), "capability": capability(found, m, seed),

@@ -11,7 +11,7 @@ from scipy import stats
 
 import measure
 import render
-from render.phenomena import Choice, Influence, Tolerance
+from render.phenomena import Influence, Tolerance
 from scenes import Picture, Scene, Setting
 
 RENDERED = (
@@ -81,7 +81,8 @@ def check(
         for name in RENDERED:
             if name in only and name not in chosen.active:
                 runs = _Runs(scene, setting, chosen.active | {name}, quality)
-                rows.append(_row(setting, name, _estimate(chosen, name), base, runs))
+                estimated = next(each.influence for each in chosen.decisions if each.effect.name == name)
+                rows.append(_row(setting, name, estimated, base, runs))
         sampling = Influence(tolerance.bias_px, float(np.sqrt(2 / (_SAMPLING_N - 1))))
         if "all" not in only:
             continue
@@ -113,7 +114,3 @@ def _row(setting: Setting, name: str, estimated: Influence, base: _Runs, runs: _
     return Switched(
         setting, name, estimated, float(bias.mean()), float(change.mean()), *resolution, runs.seconds, base.seconds
     )
-
-
-def _estimate(chosen: Choice, name: str) -> Influence:
-    return next(decision.influence for decision in chosen.decisions if decision.effect.name == name)

@@ -29,7 +29,9 @@ def write(found: Fit, source: str, path: Path) -> Scene:
         If the file cannot be written, or what was fitted makes no scene: a sensor within the part, say.
     """
     origin = scenes.find(source)
-    document = _document(found, _plain(read_toml(origin)))
+    document = taken_out(read_toml(origin))  # what numbers were uncertain by, the photographs have told
+    document.pop("uncertain", None)
+    document = _document(found, document)
     _moved(document, origin.parent, path.parent)
     head = f"# {origin.name} as photographs show it: camera, noise and settings were fitted (status {found.status}).\n"
     try:
@@ -37,11 +39,6 @@ def write(found: Fit, source: str, path: Path) -> Scene:
     except OSError as error:
         raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None
     return scenes.load(path)
-
-
-def _plain(document: dict[str, Any]) -> dict[str, Any]:
-    """Numbers with an uncertainty as plain numbers: what they were uncertain by, the photographs have told."""
-    return {key: value for key, value in taken_out(document).items() if key != "uncertain"}
 
 
 def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:

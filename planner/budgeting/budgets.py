@@ -15,7 +15,7 @@ from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.budgeting.terms import BIAS, EXPANSION, MODEL, TEMPERATURE, Term, as_input, terms
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, TEMPERATURE, Term, terms
 from planner.prediction import Prediction, predict
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
@@ -208,8 +208,8 @@ def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:
 def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[EngineInput, ...]:
     """The sources as the engine's inputs: single ones first, then those of the calibration as a group."""
     names = () if scene.uncertainty.covariance is None else scene.uncertainty.covariance.names
-    single = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name not in names)
+    single = tuple(source.as_input for source in given if source.name not in names)
     if not names:
         return single
-    correlated = tuple(as_input(s.name, s.value, s.told, s.unit) for s in given if s.name in names)
+    correlated = tuple(source.as_input for source in given if source.name in names)
     return (*single, Group(correlated, scene.uncertainty.covariance.correlation, CALIBRATION))

@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from planner.budgeting.station import Station
+from planner.uncertainty.inputs import Input
 from scenes import Scene, Uncertain
 from scenes.numbers import number_at, with_number
 
@@ -21,19 +24,40 @@ _LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset
 
 
 @dataclass(frozen=True)
-class Source:
+class Believed:
+    """A number that a measured value depends on, as it is believed to be.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+        0 for a deviation.
+    told : Uncertain
+        How well it is known.
+    unit : str
+        Empty for a pure number.
+    """
+
+    name: str
+    value: float
+    told: Uncertain
+    unit: str
+
+    @property
+    def as_input(self) -> Input:
+        """The engine's."""
+        told = self.told
+        return Input(self.name, self.value, told.u, told.distribution_name, told.dof or np.inf, told.type, self.unit)
+
+
+@dataclass(frozen=True)
+class Source(Believed):
     """One uncertain input of a station.
 
     Attributes
     ----------
     name : str
         A key of the scene, or of its table ``uncertainty`` with the component: ``part_shift.x``.
-    value : float
-        What it is believed to be; 0 for a deviation.
-    told : Uncertain
-        How well it is known.
-    unit : str
-        Empty for a pure number.
     kind : {"geometry", "brightness"}
         Whether it moves places in the image, or levels alone.
     scale : float
@@ -42,10 +66,6 @@ class Source:
         The station with this input changed by a step.
     """
 
-    name: str
-    value: float
-    told: Uncertain
-    unit: str
     kind: Kind
     scale: float
     moved: Callable[[Station, float], Station]

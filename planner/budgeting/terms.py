@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from imaging.light.appearance import side_signals
 from imaging.models import variance_model
 from imaging.models.bias import MOST
 from imaging.pictures import Pictures
+from planner.budgeting.sources import Believed
 from planner.forecast import Forecast
 from planner.uncertainty.inputs import Input, Kind
 from scenes import Centre, Noise, Scene, Uncertain
@@ -24,39 +25,24 @@ _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
 
 @dataclass(frozen=True)
-class Term:
+class Term(Believed):
     """One addend of a measured value.
 
     Attributes
     ----------
-    name : str
-    value : float
-        What its input is believed to be.
-    told : Uncertain
-        How well that is known.
-    unit : str
     sensitivity : float
         Derivative of the value by the input.
     kind : {"noise", "systematic"}
         Whether it differs from picture to picture, or stays.
     """
 
-    name: str
-    value: float
-    told: Uncertain
-    unit: str
     sensitivity: float
     kind: Kind = "systematic"
 
     @property
     def as_input(self) -> Input:
         """The engine's."""
-        return as_input(self.name, self.value, self.told, self.unit, self.kind)
-
-
-def as_input(name: str, value: float, told: Uncertain, unit: str, kind: Kind = "systematic") -> Input:
-    """One input of the engine, from how well it is known."""
-    return Input(name, value, told.u, told.distribution_name, told.dof or np.inf, told.type, unit, kind)
+        return replace(super().as_input, kind=self.kind)
 
 
 def terms(

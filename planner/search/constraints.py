@@ -120,7 +120,7 @@ class Constraints:
 
     def _pairs(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray, which: int) -> np.ndarray:
         """The same of one of the lights."""
-        cosine = _cosines(direction(sensors), direction(lights))
+        cosine = np.einsum("...i,...i->...", direction(sensors), direction(lights))
         allowed = cosine <= self._most(scene, which)
         if self.same_mount:
             allowed = allowed & (cosine > 1 - 1e-12)
@@ -152,11 +152,6 @@ class Constraints:
 def _check(good: bool, name: str, must: str, got: object) -> None:
     if not good:
         raise InvalidInput(f"{name} must be {must}, got {got}")
-
-
-def _cosines(sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
-    """Cosines of the angles between directions (..., 3), broadcast."""
-    return np.einsum("...i,...i->...", sensors, lights)
 
 
 def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray:

@@ -205,9 +205,7 @@ def _at(wavelengths: np.ndarray, curve: tuple) -> np.ndarray:
 
 def _resampled(scene: Scene, wavelengths: np.ndarray) -> tuple:
     table = np.array(scene.material.dispersion)
-    return tuple(
-        map(tuple, np.column_stack([wavelengths, *(_at(wavelengths, table[:, [0, i]]) for i in (1, 2))]).tolist())
-    )
+    return _rows(wavelengths, *(_at(wavelengths, table[:, [0, i]]) for i in (1, 2)))
 
 
 def _rows(*columns: np.ndarray) -> tuple:

@@ -211,7 +211,8 @@ class _Contrasts:
             ratio = self.scene.noise.variance / np.maximum(*most) ** 2
             first = np.where(weights[1] > 0, weights[1] * ratio, 0.0).sum(-1)
             left = 1 - _UNEVEN * (1 - weights[0].sum(-1) / weights[1].sum(-1))
-            return _finite(self.aim(np.where(first > 0, np.clip(left, 0, _ENDS) * first, 0.0).sum(-1)))
+            least = float(self.aim(np.where(first > 0, np.clip(left, 0, _ENDS) * first, 0.0).sum(-1)))
+        return least if np.isfinite(least) else np.inf
 
     def best(self, known: tuple | None, share: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The least of what is minimised under mixtures with these shares, and the free lights' poses (2 F,).
@@ -269,10 +270,6 @@ def _mixtures(one: np.ndarray, two: np.ndarray, share: tuple[float, float]) -> I
         return
     for first in range(0, len(one), size):
         yield first, share[0] * one[first : first + size, None] + share[1] * two
-
-
-def _finite(value: np.ndarray) -> float:
-    return float(value) if np.isfinite(value) else np.inf
 
 
 def by_turns(problem: SearchProblem, sensors: np.ndarray, places: np.ndarray, shares: Shares, report: Report) -> Shared:

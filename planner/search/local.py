@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging.geometry.projection import direction
-from planner.search.constraints import Constraints
 from planner.search.grid import Directions
 from planner.search.objective import SearchProblem
-from scenes import InvalidInput, Pose, Scene
+from scenes import InvalidInput, Pose
 
 _MOST_TURNS = 100
 Value = Callable[[np.ndarray, np.ndarray], float]
@@ -189,26 +188,6 @@ class Partial:
     trace: tuple[Step, ...]
 
 
-def alternate(
-    scene: Scene, sensors: Directions, lights: Directions, start: np.ndarray, model: str, objective: str,
-    first_light: np.ndarray | None = None, constraints: Constraints | None = None,
-) -> Partial:  # fmt: skip
-    """The paper's procedure FindSensorLight for one set of required edges: `alternating`.
-
-    Parameters
-    ----------
-    sensors, lights : ViewingSpace
-    start : ndarray, shape (2,)
-        Where the sensor stands at first, degrees; the nearest direction is taken.
-    first_light : ndarray, shape (2,), optional
-        Where the search for the first light begins. Where nothing can be measured from there (or nothing is given),
-        it begins at the best of a coarse sample of the directions, for a plateau of infinities has no way down.
-    constraints : Constraints, optional
-        On pairs: others count as not measurable.
-    """
-    return alternating(SearchProblem.of(scene, model, objective, constraints), sensors, lights, start, first_light)
-
-
 def alternating(
     problem: SearchProblem,
     sensors: Directions,
@@ -216,7 +195,17 @@ def alternating(
     start: np.ndarray,
     first_light: np.ndarray | None = None,
 ) -> Partial:
-    """Sensor and light moved in turn, each from neighbour to neighbour, until one does not move."""
+    """The paper's procedure FindSensorLight for one set of required edges: sensor and light moved in turn, each from
+    neighbour to neighbour, until one does not move.
+
+    Parameters
+    ----------
+    start : ndarray, shape (2,)
+        Where the sensor stands at first, degrees; the nearest direction is taken.
+    first_light : ndarray, shape (2,), optional
+        Where the search for the first light begins. Where nothing can be measured from there (or nothing is given),
+        it begins at the best of a coarse sample of the directions, for a plateau of infinities has no way down.
+    """
     at = [sensors.nearest(start), 0 if first_light is None else lights.nearest(first_light)]
     spaces, roles = (sensors, lights), ("sensor", "light")
     trace: list[Step] = []

@@ -16,6 +16,7 @@ from planner.uncertainty.groups import Group, Source, draw, members
 from planner.uncertainty.improve import Improvement, Needed, improvements, needed, scaled
 from planner.uncertainty.inputs import Input
 from planner.uncertainty.monte_carlo import (
+    Enough,
     MonteCarlo,
     monte_carlo,
     monte_carlo_all,
@@ -27,9 +28,9 @@ from planner.uncertainty.ufloats import as_ufloats
 from planner.uncertainty.validation import Validation, validate
 
 __all__ = [
-    "Budget", "Contribution", "Gauge", "Group", "Improvement", "Input", "Limits", "MonteCarlo", "Needed", "Risks",
-    "Source", "Validation", "as_ufloats", "budget", "coverage_factor", "decide", "draw", "effective_dof", "gauge",
-    "global_risks", "improvements", "members", "monte_carlo", "monte_carlo_all", "needed",
+    "Budget", "Contribution", "Enough", "Gauge", "Group", "Improvement", "Input", "Limits", "MonteCarlo", "Needed",
+    "Risks", "Source", "Validation", "as_ufloats", "budget", "coverage_factor", "decide", "draw", "effective_dof",
+    "gauge", "global_risks", "improvements", "members", "monte_carlo", "monte_carlo_all", "needed",
     "nonconforming_probability", "numerical_tolerance", "posterior", "scaled", "shortest_interval", "tur",
     "uncertainty_ratio", "validate",
 ]  # fmt: skip

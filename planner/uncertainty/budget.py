@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from planner.uncertainty.checks import check_finite
 from planner.uncertainty.groups import Group, Source, members
 from scenes.arrays import number
 from scenes.errors import InvalidInput
@@ -144,12 +145,7 @@ class Budget(Shown):
 
 
 def budget(
-    name: str,
-    unit: str,
-    value: float,
-    inputs: Iterable[Source],
-    sensitivities: Mapping[str, float],
-    p: float = 0.95,
+    name: str, unit: str, value: float, inputs: Iterable[Source], sensitivities: Mapping[str, float], p: float = 0.95
 ) -> Budget:
     """The budget of a measurand from its inputs.
 
@@ -227,12 +223,10 @@ def _check(sources: tuple[Source, ...], sensitivities: dict[str, float], value: 
     for name in names:
         if name not in sensitivities:
             raise InvalidInput(f"sensitivity of {name} must be given, got nothing")
-        if not math.isfinite(sensitivities[name]):
-            raise InvalidInput(f"sensitivity of {name} must be a finite number, got {sensitivities[name]}")
+        check_finite(f"sensitivity of {name}", sensitivities[name])
     if unknown := sorted(set(sensitivities) - set(names)):
         raise InvalidInput(f"sensitivities must be of known inputs, got {unknown[0]}")
-    if not math.isfinite(value):
-        raise InvalidInput(f"value must be a finite number, got {value}")
+    check_finite("value", value)
     if not 0 < number(p, "p") < 1:
         raise InvalidInput(f"p must be between 0 and 1, got {p}")
 

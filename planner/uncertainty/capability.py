@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from planner.uncertainty.checks import check_finite, check_positive
 from scenes.errors import InvalidInput
 
 
@@ -44,8 +44,8 @@ def tur(width: float, U: float) -> float:
     >>> tur(0.04, 0.005)
     4.0
     """
-    _positive("width", width)
-    _positive("U", U)
+    check_positive("width", width)
+    check_positive("U", U)
     return width / (2 * U)
 
 
@@ -77,19 +77,13 @@ def gauge(repeats: Sequence[float] | np.ndarray, reference: float, width: float)
     (2.108, 1.897)
     """
     values = np.asarray(repeats, float)
-    _positive("width", width)
+    check_positive("width", width)
     if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
         raise InvalidInput(f"repeats must be at least 2 finite numbers in a row, got an array of shape {values.shape}")
-    if not math.isfinite(reference):
-        raise InvalidInput(f"reference must be a finite number, got {reference}")
+    check_finite("reference", reference)
     if np.ptp(values) == 0:
         raise InvalidInput(f"repeats must be different from each other, got {values[0]} every time")
     mean, s = float(values.mean()), float(values.std(ddof=1))
     bias = mean - reference
     cg, cgk = 0.2 * width / (6 * s), (0.1 * width - abs(bias)) / (3 * s)
     return Gauge(cg, cgk, mean, s, bias, len(values), reference, width)
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < math.inf:
-        raise InvalidInput(f"{name} must be a finite number greater than 0, got {value}")

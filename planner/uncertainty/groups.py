@@ -61,12 +61,7 @@ class Group:
 
     @classmethod
     def from_covariance(
-        cls,
-        names: Sequence[str],
-        values: Sequence[float],
-        covariance: np.ndarray,
-        name: str = "",
-        **kinds: object,
+        cls, names: Sequence[str], values: Sequence[float], covariance: np.ndarray, name: str = "", **kinds: object
     ) -> Group:
         """Normal inputs of a covariance matrix, shape (n, n), in the values' units squared; `kinds` as Input's."""
         covariance = np.asarray(covariance, float)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from scipy import stats
 
 from planner.uncertainty.budget import Budget, coverage_factor, effective_dof
+from planner.uncertainty.checks import check_not_negative, check_positive
 from planner.uncertainty.groups import Group, Source
-from scenes.errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,7 @@ class Needed:
 
 def scaled(budget: Budget, source: str, factor: float) -> Budget:
     """The budget with one source of `factor` times its standard uncertainty."""
-    if not 0 <= factor < math.inf:
-        raise InvalidInput(f"factor must be a finite number of at least 0, got {factor}")
+    check_not_negative("factor", factor)
     budget.of(source)
     return budget.remade(_scaled(each, factor) if each.name == source else each for each in budget.sources)
 
@@ -99,8 +98,7 @@ def needed(budget: Budget, U_wanted: float, source: str) -> Needed:
     >>> needed(found, 5.0, "scale").reason
     'not reachable: U is 5.88 um with scale exactly known'
     """
-    if not 0 < U_wanted < math.inf:
-        raise InvalidInput(f"U_wanted must be a finite number greater than 0, got {U_wanted}")
+    check_positive("U_wanted", U_wanted)
     row = budget.of(source)
     floor, unit = budget.without(source).U, f" {budget.unit}" if budget.unit else ""
     reachable = floor <= U_wanted

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy import special, stats
 
+from planner.uncertainty.checks import check_finite, check_not_negative
 from scenes.errors import InvalidInput
 
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine", "t"]
@@ -67,10 +68,8 @@ class Input:
             if getattr(self, what) not in get_args(allowed):
                 choices = ", ".join(get_args(allowed))
                 raise InvalidInput(f"{self.name}: {what} must be one of {choices}, got {getattr(self, what)}")
-        if not math.isfinite(self.value):
-            raise InvalidInput(f"{self.name}: value must be a finite number, got {self.value}")
-        if not 0 <= self.u < math.inf:
-            raise InvalidInput(f"{self.name}: u must be a finite number of at least 0, got {self.u}")
+        check_finite(f"{self.name}: value", self.value)
+        check_not_negative(f"{self.name}: u", self.u)
         if not self.dof >= 1:
             raise InvalidInput(f"{self.name}: dof must be at least 1, got {self.dof}")
         if self.distribution == "t" and math.isinf(self.dof):
@@ -78,23 +77,17 @@ class Input:
 
     @classmethod
     def from_half_width(
-        cls,
-        name: str,
-        value: float,
-        half_width: float,
-        distribution: Distribution = "rectangular",
-        dof: float = math.inf,
-        type: Type = "B",
-        unit: str = "",
-        kind: Kind = "systematic",
+        cls, name: str, value: float, half_width: float, distribution: Distribution = "rectangular", **about: Any
     ) -> Input:
-        """An input within value +- half_width: rectangular, triangular or arcsine (GUM 4.3.7, 4.3.9, H.1.3.4)."""
+        """An input within value +- half_width: rectangular, triangular or arcsine (GUM 4.3.7, 4.3.9, H.1.3.4).
+
+        ``about``: dof, type, unit and kind as of an Input.
+        """
         if distribution not in _HALF_WIDTHS:
             allowed = ", ".join(_HALF_WIDTHS)
             raise InvalidInput(f"{name}: distribution must be one of {allowed} with a half-width, got {distribution}")
-        if not 0 <= half_width < math.inf:
-            raise InvalidInput(f"{name}: half_width must be a finite number of at least 0, got {half_width}")
-        return cls(name, value, half_width / _HALF_WIDTHS[distribution], distribution, dof, type, unit, kind)
+        check_not_negative(f"{name}: half_width", half_width)
+        return cls(name, value, half_width / _HALF_WIDTHS[distribution], distribution, **about)
 
     @property
     def sd(self) -> float:

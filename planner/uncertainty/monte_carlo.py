@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from planner.uncertainty.checks import check_not_negative
 from planner.uncertainty.groups import Source, draw
 from scenes.errors import InvalidInput
 
@@ -51,16 +52,37 @@ class MonteCarlo:
     spread: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class Enough:
+    """When draws are enough (JCGM 101 7.9.4).
+
+    Attributes
+    ----------
+    digits : int
+        Significant digits of u that are meant: the tolerance is half of the last one.
+    block : int
+        Draws between two looks, at least 2 / (1 - p); 10,000 is the document's. The intervals' ends of each block
+        are found alone, so a block must be large enough to have tails.
+    most : int
+        Draws after which it ends with `converged` false.
+    margin : float
+        The tolerance is divided by it: 5 for results that others are validated with (JCGM 101 8.2).
+    """
+
+    digits: int = 2
+    block: int = 10_000
+    most: int = 1_000_000
+    margin: float = 1.0
+
+
 def monte_carlo(
     model: Model,
     inputs: Iterable[Source],
     rng: np.random.Generator | int,
     p: float = 0.95,
-    digits: int = 2,
-    block: int = 10_000,
-    most: int = 1_000_000,
-    margin: float = 1.0,
+    *,
     name: str = "",
+    **enough: float,
 ) -> MonteCarlo:
     """Draw inputs and evaluate the model until the results are stable (JCGM 101 7.9.4).
 
@@ -72,15 +94,10 @@ def monte_carlo(
     rng : Generator or int
     p : float
         Coverage probability.
-    digits : int
-        Significant digits of u that are meant: the tolerance is half of the last one.
-    block : int
-        Draws between two looks, at least 2 / (1 - p); 10,000 is the document's. The intervals' ends of each block
-        are found alone, so a block must be large enough to have tails.
-    most : int
-        Draws after which it ends with `converged` false.
-    margin : float
-        The tolerance is divided by it: 5 for results that others are validated with (JCGM 101 8.2).
+    name : str
+        Of the measurand.
+    **enough
+        Fields of `Enough`: digits, block, most, margin.
 
     Raises
     ------
@@ -103,7 +120,7 @@ def monte_carlo(
     def column(drawn: dict[str, np.ndarray]) -> np.ndarray:
         return np.asarray(model(drawn))[..., None]
 
-    return monte_carlo_all(column, (name,), inputs, rng, p, digits, block, most, margin)[0]
+    return monte_carlo_all(column, (name,), inputs, rng, p, Enough(**enough))[0]
 
 
 def monte_carlo_all(
@@ -112,28 +129,26 @@ def monte_carlo_all(
     inputs: Iterable[Source],
     rng: np.random.Generator | int,
     p: float = 0.95,
-    digits: int = 2,
-    block: int = 10_000,
-    most: int = 1_000_000,
-    margin: float = 1.0,
+    enough: Enough = Enough(),
 ) -> tuple[MonteCarlo, ...]:
     """As `monte_carlo`, of several measurands by the same draws: the model's values are of shape (n, len(names)).
 
     Draws go on until each measurand on its own is stable.
     """
     sources, rng = tuple(inputs), np.random.default_rng(rng)
-    _check(p, digits, block, most, margin)
+    _check(p, enough)
     values, looks = [], []
     while True:
-        values.append(_evaluate(model, sources, rng, block, len(names)))
+        values.append(_evaluate(model, sources, rng, enough.block, len(names)))
         looks.append([_summary(column[np.isfinite(column)], p) for column in values[-1].T])
         if len(looks) == 1:
             continue
         pooled, history = np.concatenate(values), np.array(looks)  # (n, measurands), (blocks, measurands, 4)
         spread = history.std(0, ddof=1) / math.sqrt(len(history))
-        tolerance = np.array([numerical_tolerance(s, digits) for s in np.nanstd(pooled, 0, ddof=1)]) / margin
+        scatter = np.nanstd(pooled, 0, ddof=1)
+        tolerance = np.array([numerical_tolerance(s, enough.digits) for s in scatter]) / enough.margin
         stable = (_factor(len(history)) * spread <= tolerance[:, None]).all(1)
-        if stable.all() or len(pooled) + block > most:
+        if stable.all() or len(pooled) + enough.block > enough.most:
             break
     return tuple(
         _result(name, column, p, bool(good), float(limit), scatter)
@@ -149,8 +164,7 @@ def numerical_tolerance(u: float, digits: int = 2) -> float:
     """
     if digits < 1:
         raise InvalidInput(f"digits must be at least 1, got {digits}")
-    if not 0 <= u < math.inf:
-        raise InvalidInput(f"u must be a finite number of at least 0, got {u}")
+    check_not_negative("u", u)
     if u == 0:
         return 0.0
     exponent = int(f"{u:.{digits - 1}e}".split("e")[1])  # of u rounded: 0.0996 is 1.0e-01
@@ -199,14 +213,15 @@ def _result(name: str, column: np.ndarray, p: float, stable: bool, limit: float,
     return MonteCarlo(name, y, u, (low, high), shortest, p, len(good), failed, stable, limit, tuple(scatter.tolist()))
 
 
-def _check(p: float, digits: int, block: int, most: int, margin: float) -> None:
+def _check(p: float, enough: Enough) -> None:
     if not 0 < p < 1:
         raise InvalidInput(f"p must be between 0 and 1, got {p}")
-    if digits < 1:
-        raise InvalidInput(f"digits must be at least 1, got {digits}")
-    if not block * (1 - p) >= 2 - 1e-9:
-        raise InvalidInput(f"block must be at least {math.ceil(2 / (1 - p) - 1e-9)} for p = {p}, got {block}")
-    if most < 2 * block:
-        raise InvalidInput(f"most must be at least two blocks, {2 * block}, got {most}")
-    if not margin >= 1:
-        raise InvalidInput(f"margin must be at least 1, got {margin}")
+    if enough.digits < 1:
+        raise InvalidInput(f"digits must be at least 1, got {enough.digits}")
+    if not enough.block * (1 - p) >= 2 - 1e-9:
+        least = math.ceil(2 / (1 - p) - 1e-9)
+        raise InvalidInput(f"block must be at least {least} for p = {p}, got {enough.block}")
+    if enough.most < 2 * enough.block:
+        raise InvalidInput(f"most must be at least two blocks, {2 * enough.block}, got {enough.most}")
+    if not enough.margin >= 1:
+        raise InvalidInput(f"margin must be at least 1, got {enough.margin}")

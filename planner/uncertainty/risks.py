@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from planner.uncertainty.checks import check_finite, check_not_negative, check_positive
 from scenes.errors import InvalidInput
 from scenes.measurands.measurands import Tolerance
 
@@ -45,8 +46,7 @@ class Limits:
         InvalidInput
             Where nothing is left between them.
         """
-        if not 0 <= U < math.inf:
-            raise InvalidInput(f"U must be a finite number of at least 0, got {U}")
+        check_not_negative("U", U)
         if not self.lower + g * U < self.upper - g * U:
             half = (self.upper - self.lower) / 2
             raise InvalidInput(f"guard band must be less than half of the tolerance, {half:.6g}, got {g * U:.6g}")
@@ -83,7 +83,7 @@ def nonconforming_probability(value: float, u: float, tolerance: Limits) -> floa
     >>> round(nonconforming_probability(10.02, 0.004, Limits(9.98, 10.02)), 3)
     0.5
     """
-    _positive("u", u)
+    check_positive("u", u)
     below, above = (tolerance.lower - value) / u, (value - tolerance.upper) / u
     return float(special.ndtr(below) + special.ndtr(above))
 
@@ -94,8 +94,8 @@ def posterior(value: float, u: float, mean: float, spread: float) -> tuple[float
     >>> [round(x, 6) for x in posterior(10.02, 0.01, 10.0, 0.01)]
     [10.01, 0.007071]
     """
-    _positive("u", u)
-    _positive("spread", spread)
+    check_positive("u", u)
+    check_positive("spread", spread)
     weight = 1 / (1 + (u / spread) ** 2)
     return mean + weight * (value - mean), u * math.sqrt(weight)
 
@@ -130,10 +130,9 @@ def global_risks(mean: float, spread: float, u: float, tolerance: Limits, accept
     >>> [round(100 * x, 2) for x in (guarded.wrong_acceptance, guarded.wrong_rejection)]
     [0.02, 10.03]
     """
-    _positive("u", u)
-    _positive("spread", spread)
-    if not math.isfinite(mean):
-        raise InvalidInput(f"mean must be a finite number, got {mean}")
+    check_positive("u", u)
+    check_positive("spread", spread)
+    check_finite("mean", mean)
     acceptance = acceptance or tolerance
     low, high = ((end - mean) / spread for end in (tolerance.lower, tolerance.upper))
     taken = ((acceptance.lower - mean) / spread, (acceptance.upper - mean) / spread)
@@ -169,8 +168,3 @@ def _between(low: np.ndarray | float, high: np.ndarray | float) -> np.ndarray:
     flip = np.where(np.add(low, high) > 0, -1.0, 1.0)
     a, b = np.where(flip > 0, low, np.negative(high)), np.where(flip > 0, high, np.negative(low))
     return special.ndtr(b) - special.ndtr(a)
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0 < value < math.inf:
-        raise InvalidInput(f"{name} must be a finite number greater than 0, got {value}")

@@ -51,7 +51,10 @@ def as_ufloats(budgets: Iterable[Budget]) -> dict[str, uncertainties.UFloat]:
     names = [each.name for each in budgets]
     if len(set(names)) < len(names):
         raise InvalidInput(f"budgets must be of different names, got {', '.join(names)}")
-    return {each.name: _number(each, variables) for each in budgets}
+    return {
+        each.name: each.value + sum((c * variables[name] for name, c in each.sensitivities.items()), start=0.0)
+        for each in budgets
+    }
 
 
 def _variables(source: Source) -> dict[str, uncertainties.UFloat]:
@@ -62,7 +65,3 @@ def _variables(source: Source) -> dict[str, uncertainties.UFloat]:
     pairs = [(0.0, each.u) for each in source.inputs]
     made = uncertainties.correlated_values_norm(pairs, source.correlation, tags=names)
     return dict(zip(names, made, strict=True))
-
-
-def _number(budget: Budget, variables: dict[str, uncertainties.UFloat]) -> uncertainties.UFloat:
-    return budget.value + sum((c * variables[name] for name, c in budget.sensitivities.items()), start=0.0)

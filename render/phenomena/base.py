@@ -73,9 +73,9 @@ class Effect(ABC):
     has_formula: ClassVar[bool] = True
     switch: ClassVar[str]
 
-    @abstractmethod
     def absent(self, pictures: Pictures) -> str | None:
-        """Why the effect is exactly zero; None where it can matter."""
+        """Why the effect is exactly zero; None where it can matter, as everywhere where nothing else is said."""
+        return None
 
     @abstractmethod
     def influence(self, pictures: Pictures) -> Influence:

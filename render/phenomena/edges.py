@@ -17,7 +17,7 @@ from imaging.features.projected_edges import circles, straight
 from imaging.geometry.projection import edge_points, facing, project_ideal
 from imaging.light.appearance import face_signal
 from imaging.pictures import Pictures
-from render.phenomena.base import Influence, largest
+from render.phenomena.base import Effect, Influence, largest
 from scenes import Curved, Scene
 
 NEAR_STEP = float(np.exp(-0.5))
@@ -101,6 +101,13 @@ def compare(pictures: Pictures, other: Scene) -> Influence:
     return largest((lever(pictures) * moved).sum(-1), ratio.max((-1, -2)))
 
 
+class Shading(Effect):
+    """An effect on what surfaces send: its influence is that of the same scene without it."""
+
+    def influence(self, pictures: Pictures) -> Influence:
+        return compare(pictures, self.without(pictures.scene))
+
+
 def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influence:
     """Bound of what light added smoothly to either side (grey levels, shape (S, E, n)) does to the distance.
 
@@ -108,7 +115,7 @@ def added_light(pictures: Pictures, levels: np.ndarray, near: float) -> Influenc
     """
     contrast = sides(pictures).contrast
     share = np.abs(levels / np.where(contrast == 0, np.nan, contrast))
-    slope = px_per_cm(pictures)[:, None, None] * near
+    slope = px_per_unit(pictures)[:, None, None] * near
     moved = (total_variance(pictures.scene) * share / slope).max(-1)
     return largest((lever(pictures) * moved).sum(-1), _loss(share).max((-1, -2)))
 
@@ -126,7 +133,7 @@ def total_variance(scene: Scene) -> float:
     return scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
 
 
-def px_per_cm(pictures: Pictures) -> np.ndarray:
+def px_per_unit(pictures: Pictures) -> np.ndarray:
     """Image scale at the reference point, shape (S,)."""
     return np.full(len(pictures.sensors), pictures.scene.camera.focal_px / pictures.scene.camera.distance)
 

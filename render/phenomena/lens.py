@@ -19,9 +19,6 @@ class LensBlur(Effect):
     name = "lens_blur"
     switch = "a Gaussian filter of the supersampled image, then averaging; costs nothing beside the rays"
 
-    def absent(self, pictures: Pictures) -> str | None:
-        return None
-
     def influence(self, pictures: Pictures) -> Influence:
         """A point's variance is as (s^2 + s_e^2)^3."""
         scene = pictures.scene
@@ -39,8 +36,7 @@ class LensDistortion(Effect):
     switch = "the supersampled image is resampled before it is blurred"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return None if scene.camera.lens.bends else "all coefficients are 0"
+        return None if pictures.scene.camera.lens.bends else "all coefficients are 0"
 
     def influence(self, pictures: Pictures) -> Influence:
         """How far the required edges' points move, and how much the image is stretched there."""
@@ -65,8 +61,7 @@ class DepthOfField(Effect):
     switch = "a thin lens instead of a pinhole; random, so edge pixels cannot be singled out"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "the aperture is a pinhole" if scene.camera.lens.aperture_radius == 0 else None
+        return "the aperture is a pinhole" if pictures.scene.camera.lens.aperture_radius == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """A disc of radius r adds r^2 / 4 to the blur; it is an even blur only as far as r is small beside it.

@@ -33,12 +33,10 @@ class ShotNoise(Effect):
     switch = "noise.gain in the exposure; costs nothing beside the rays"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "gain is 0" if scene.noise.gain == 0 else None
+        return "gain is 0" if pictures.scene.noise.gain == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return _relative(float(shot_noise(scene.noise, _brightest(pictures))), scene.noise.variance)
+        return _relative(float(shot_noise(pictures.scene.noise, _brightest(pictures))), pictures.scene.noise.variance)
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "noise", gain=0.0)
@@ -51,12 +49,10 @@ class ReadNoise(Effect):
     switch = "noise.sigma in the exposure; costs nothing beside the rays"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "sigma is 0" if scene.noise.sigma == 0 else None
+        return "sigma is 0" if pictures.scene.noise.sigma == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return _relative(scene.noise.sigma**2, scene.noise.variance - scene.noise.sigma**2)
+        return _relative(pictures.scene.noise.sigma**2, pictures.scene.noise.variance - pictures.scene.noise.sigma**2)
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "noise", sigma=0.0)
@@ -69,8 +65,7 @@ class FixedPattern(Effect):
     switch = "noise.prnu and noise.dsnu in the exposure; costs nothing beside the rays"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "prnu and dsnu are 0" if scene.noise.prnu == 0 and scene.noise.dsnu == 0 else None
+        return "prnu and dsnu are 0" if pictures.scene.noise.prnu == 0 and pictures.scene.noise.dsnu == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """One camera's pattern moves the mean, by less than 4 standard deviations of what cameras differ by."""
@@ -94,8 +89,7 @@ class Quantisation(Effect):
     switch = "noise.bits in the exposure; costs nothing beside the rays"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "noise.bits is not given" if scene.noise.bits is None else None
+        return "noise.bits is not given" if pictures.scene.noise.bits is None else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """1/12 beside the rest; below half a grey level of noise it is not noise any more."""
@@ -120,8 +114,7 @@ class Saturation(Effect):
         return f"levels reach {top:.0f} of {full}, {self._MARGIN:.0f} sigma included" if top < full else None
 
     def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return EVERYTHING if self._top(pictures) >= 2**scene.noise.bits - 1 else NOTHING
+        return EVERYTHING if self._top(pictures) >= 2**pictures.scene.noise.bits - 1 else NOTHING
 
     def _top(self, pictures: Pictures) -> float:
         noise, brightest = pictures.scene.noise, _brightest(pictures)

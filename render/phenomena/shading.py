@@ -11,7 +11,7 @@ from imaging.light.sheets import printed
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence, changed, largest, relit, with_materials
-from render.phenomena.edges import NEAR_STEP, compare, lever, sides, total_variance
+from render.phenomena.edges import NEAR_STEP, Shading, compare, lever, sides, total_variance
 from render.phenomena.transport import albedo
 from scenes import Luminaire, Scene, as_point
 
@@ -21,9 +21,6 @@ class AttachedShadow(Effect):
 
     name = "attached_shadow"
     switch = "part of every reflectance; costs nothing"
-
-    def absent(self, pictures: Pictures) -> str | None:
-        return None
 
     def influence(self, pictures: Pictures) -> Influence:
         """Without it a face would be lit through the object."""
@@ -40,9 +37,6 @@ class FallOff(Effect):
     name = "fall_off"
     switch = "a point light has it; costs nothing"
 
-    def absent(self, pictures: Pictures) -> str | None:
-        return None
-
     def influence(self, pictures: Pictures) -> Influence:
         scene = pictures.scene
         variance = total_variance(scene)
@@ -53,7 +47,7 @@ class FallOff(Effect):
         return largest((lever(pictures) * moved).sum(-1), ratio)
 
 
-class SpecularLobe(Effect):
+class SpecularLobe(Shading):
     """The Torrance-Sparrow term."""
 
     name = "specular_lobe"
@@ -64,15 +58,11 @@ class SpecularLobe(Effect):
         reasons = [material.dull for material in pictures.scene.surfaces.used]
         return None if None in reasons else "; ".join(sorted({str(each) for each in reasons}))
 
-    def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return compare(pictures, self.without(scene))
-
     def without(self, scene: Scene) -> Scene:
         return with_materials(scene, lambda each: each.matt())
 
 
-class Polarisation(Effect):
+class Polarisation(Shading):
     """Linearly polarised light: J_parallel and J_perpendicular instead of 1/2 each."""
 
     name = "polarisation"
@@ -85,15 +75,11 @@ class Polarisation(Effect):
             return "the light is unpolarised"
         return "diffuse reflection forgets polarisation" if scene.surfaces.is_diffuse else None
 
-    def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return compare(pictures, self.without(scene))
-
     def without(self, scene: Scene) -> Scene:
         return relit(scene, lambda light: _changed(light, polarisation_deg=None))
 
 
-class Analyser(Effect):
+class Analyser(Shading):
     """A linear polariser in front of the sensor."""
 
     name = "analyser"
@@ -101,18 +87,13 @@ class Analyser(Effect):
     switch = "both components, with their phase, in the BSDF"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "there is no analyser" if scene.camera.analyser_deg is None else None
-
-    def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return compare(pictures, self.without(scene))
+        return "there is no analyser" if pictures.scene.camera.analyser_deg is None else None
 
     def without(self, scene: Scene) -> Scene:
         return changed(scene, "camera", analyser_deg=None)
 
 
-class Wavelength(Effect):
+class Wavelength(Shading):
     """The refractive index changes with the wavelength."""
 
     name = "wavelength"
@@ -125,10 +106,6 @@ class Wavelength(Effect):
             return "the diffuse term does not depend on the index"
         known = any(material.dispersion for material in scene.surfaces.used)
         return None if known else "the material has no table of indices"
-
-    def influence(self, pictures: Pictures) -> Influence:
-        scene = pictures.scene
-        return compare(pictures, self.without(scene))
 
     def without(self, scene: Scene) -> Scene:
         return with_materials(scene, lambda each: each.with_dispersion(()))

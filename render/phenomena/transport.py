@@ -19,8 +19,7 @@ class CastShadow(Effect):
     switch = "obstacles in the scene; every hit is tested against the light anyway, so it costs nothing"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "one convex body before darkness: nothing to fall on" if _alone(scene) else None
+        return "one convex body before darkness: nothing to fall on" if _alone(pictures.scene) else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """Everything where a body hides a required edge from the light; the floor's own step otherwise."""
@@ -68,8 +67,7 @@ class Interreflection(Effect):
     switch = "the path integrator instead of the direct one; random, so edge pixels cannot be singled out"
 
     def absent(self, pictures: Pictures) -> str | None:
-        scene = pictures.scene
-        return "one convex body before darkness: no surface sees another" if _alone(scene) else None
+        return "one convex body before darkness: no surface sees another" if _alone(pictures.scene) else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """From form factors: F of a face to a floor is at most (1 - n_z) / 2, to an obstacle sin^2 of its height.

@@ -15,12 +15,7 @@ if TYPE_CHECKING:
     from scenes.measurands.measurands import Measurand, Quantity
 
 _ZERO = 1e-9  # of the object's size: an offset that is none, and has no side
-WORDS = {
-    "p": "a corner or a circle",
-    "r": "a circle or a curved surface",
-    "s": "a curved surface",
-    "e": "an edge",
-}
+WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "s": "a curved surface", "e": "an edge"}
 _FEATURES = {"p": (Corner, Centre), "r": (Centre, Wall), "s": (Wall,), "e": (Side,)}
 
 

@@ -91,8 +91,7 @@ def _hole_distances(solid: Solid) -> Iterator[_Row]:
     ]
     for apart, one, other in sorted(pairs, key=lambda pair: _largest(pair[0])):
         if apart > near:
-            features = Centre(circle=one.name), Centre(circle=other.name)
-            yield f"distance {one.name} {other.name}", "distance", features, apart
+            yield _distance(one, other, apart)
 
 
 def _arc_diameters(solid: Solid) -> Iterator[_Row]:
@@ -106,8 +105,12 @@ def _arc_diameters(solid: Solid) -> Iterator[_Row]:
 def _slot_lengths(solid: Solid) -> Iterator[_Row]:
     """Between the centres of the round ends of slots, the longest first."""
     for apart, one, other in sorted(_slots(solid), key=lambda slot: _largest(slot[0])):
-        features = Centre(circle=one.name), Centre(circle=other.name)
-        yield f"distance {one.name} {other.name}", "distance", features, apart
+        yield _distance(one, other, apart)
+
+
+def _distance(one: Circle, other: Circle, apart: float) -> _Row:
+    features = Centre(circle=one.name), Centre(circle=other.name)
+    return f"distance {one.name} {other.name}", "distance", features, apart
 
 
 def _round_ends(solid: Solid) -> list[Circle]:

@@ -12,6 +12,8 @@ import planner
 import scenes
 from planner.search.exhaustive import exhaustive
 from planner.search.grid import ViewingSpace
+from planner.search.local import alternating
+from planner.search.objective import SearchProblem
 from tests.pairs import evaluate_pairs
 
 PAPER_PAIR = np.array([[30.0, 135.0]]), np.array([[15.0, 315.0]])
@@ -102,7 +104,7 @@ def table_1(scene: scenes.Scene, part1: scenes.Scene) -> None:
         off = value / printed - 1
         print(f"  sensor {_pose(sensor)}, light {_pose(light)}: {printed:.4f}, ours {value:.4f} ({off:+.1%})")
     space = ViewingSpace(1.0, (0, 90))
-    found = planner.alternate(part1, space, space, np.array([40.0, 41.0]), "paper", "image")
+    found = alternating(SearchProblem.of(part1, "paper", "image"), space, space, np.array([40.0, 41.0]))
     print("Our alternating search from the same sensor")
     for step in found.trace:
         print(f"  {step.fixed} at {step.fixed_pose}: {step.found} to {step.found_pose}, {scale * step.variance:.4f}")

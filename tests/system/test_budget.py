@@ -17,7 +17,7 @@ from tests.commands import ice
 from tests.proofs.stations import coverage
 from validation import budgets
 from validation.chain import Chain
-from validation.report import budget_section
+from validation.report import budget_table
 
 
 @lru_cache
@@ -178,7 +178,7 @@ def test_bad_options(arguments, text) -> None:
 
 def test_the_page_has_the_budgets_rows() -> None:
     found = _found("calibrated_rig")
-    rows = budget_section.cells(found.measurands[0])
+    rows = budget_table.lines(found.measurands[0])
     assert rows[0][0] == "camera.focal_px"
     assert len(rows) == len(found.measurands[0].contributions)
-    assert "The distance 'diagonal' is 14.5774 cm +- 0.0062 cm, k = 2.0." in budget_section.note(found, 0)
+    assert "The distance 'diagonal' is 14.5774 cm +- 0.0062 cm, k = 2.0." in budget_table.note(found, 0)

@@ -157,7 +157,7 @@ def test_textures_are_used_where_they_can_be(monkeypatch):
 
 
 def macro(lens):
-    """What `refine_tiles` takes up to the image: scene, sensor, first pixel; an image of an odd number of pixels."""
+    """Tiles of a scene, and an image of an odd number of pixels."""
     scene, mitsuba = scenes.load("macro"), variant.use(variant.SCALAR)
     active, size = PLAIN | ({"depth_of_field"} if lens == "thinlens" else set()), (4 * 256, 4 * 240)
     crop = slice(161, 800), slice(121, 920)
@@ -166,19 +166,19 @@ def macro(lens):
     made = mitsuba.load_dict(made, parallel=False)
     view = build.view(mitsuba, picture, active, size, crop, 16)
     assert view["type"] == lens
-    return mitsuba, made, view, (161, 121), np.array(mitsuba.render(made, seed=1), float)[:, :, 0]
+    return mosaic.Tiles(mitsuba, made, view, (161, 121)), np.array(mitsuba.render(made, seed=1), float)[:, :, 0]
 
 
 @pytest.mark.parametrize("side", [1, 8])
 @pytest.mark.parametrize("lens", ["perspective", "thinlens"])
 def test_a_tile_shows_what_its_place_in_the_frame_shows(monkeypatch, lens, side):
     """Pixels in the middle of faces: 2e-5 of the level, where the next fine pixel is further off, either way."""
-    *arguments, whole = macro(lens)
+    tiles_of, whole = macro(lens)
     monkeypatch.setattr(mosaic, "_SIDES", (side,))
     flat = (maximum_filter(whole, 25) - minimum_filter(whole, 25) < 0.1 * whole.max()) & (whole > 0)
     marked = np.zeros(whole.shape, bool)
     marked[tuple(np.random.default_rng(1).permutation(np.argwhere(flat))[:60].T)] = True
-    found = mosaic.refine_tiles(*arguments, whole.copy(), marked, 256, 1)
+    found = tiles_of.refined(whole.copy(), marked, 256, 1)
     assert ((found != whole) & marked).sum() > 50
     tiles = mosaic._held(marked, side).repeat(side, 0).repeat(side, 1)[:639, :799]
     assert not ((found != whole) & flat & ~tiles).any()
@@ -190,12 +190,12 @@ def test_a_tile_shows_what_its_place_in_the_frame_shows(monkeypatch, lens, side)
 
 def test_crossed_pixels_that_were_not_marked_are_rendered_as_well():
     """Of an edge's pixels every third is left out: those far from their neighbours' level are found all the same."""
-    *arguments, fine = macro("perspective")
+    tiles, fine = macro("perspective")
     marked = crossed(fine)
     some = marked & (np.arange(marked.size).reshape(marked.shape) % 3 > 0)
     assert (some != marked).sum() > 1000
     corrupted = np.where(marked & ~some, 0.0, fine)  # as if their one ray had met the dark
-    found, full = (mosaic.refine_tiles(*arguments, corrupted.copy(), which, 64, 1) for which in (some, marked))
+    found, full = (tiles.refined(corrupted.copy(), which, 64, 1) for which in (some, marked))
     bright = full > 0.5 * full.max()
     assert (bright & (corrupted == 0)).sum() > 300
     # margin: 64 rays at an edge: what was dark came back to three quarters

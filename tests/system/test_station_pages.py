@@ -6,7 +6,7 @@ import scenes
 import validation
 from render import Quality
 from tests.looking import NOTHING, WIDTHS, against_wcag, looked_at, lowest, needs_a_browser
-from tests.parts import newcomers_plate
+from tests.parts import newcomers
 from tests.proofs.large import fabricate
 from validation.cli.main import app
 
@@ -15,33 +15,6 @@ pytestmark = [pytest.mark.render, needs_a_browser]
 _RENDERS = 60
 _QUICK = Quality(supersample=2, edge_samples=16, random_samples=16)
 _LARGEST = 3_000_000  # bytes of a page
-_ASKED = (
-    ("length", "width", ({"edge": "e4"}, {"edge": "e16"}), 0.1),
-    ("depth", "width", ({"edge": "e5"}, {"edge": "e8"}), 0.1),
-    ("step", "width", ({"edge": "e14"}, {"edge": "e21"}), 0.02),
-    ("slot", "width", ({"edge": "e10"}, {"edge": "e12"}), 0.03),
-    ("bore 1", "diameter", ({"circle": "c2"},), 0.05),
-    ("bore 2", "diameter", ({"circle": "c4"},), 0.05),
-    ("bore 3", "diameter", ({"circle": "c6"},), 0.05),
-    ("bore to bore", "distance", ({"circle": "c2"}, {"circle": "c4"}), 0.05),
-    ("along", "distance", ({"circle": "c2"}, {"circle": "c6"}), 0.05),
-    ("square", "angle", ({"edge": "e5"}, {"edge": "e16"}), 0.05),
-)
-
-
-def newcomers(folder):
-    """The plate with ten requirements, seen by a small camera from 20 degrees beside the vertical."""
-    newcomers_plate().export(folder / "plate.stl")
-    asked = [dict(zip(("name", "kind", "features", "tolerance"), each, strict=True)) for each in _ASKED]
-    return scenes.Scene.model_validate({
-        "name": "newcomer", "title": "Plate of 50 x 30 x 8 mm with a step, three holes and a slot", "units": "mm",
-        "object": {"kind": "mesh", "units": "mm", "file": str(folder / "plate.stl")},
-        "material": {"diffuse_reflectance": 0.8}, "light": {"distance": 217.0}, "measurands": asked,
-        "camera": {"width": 640, "height": 512, "focal_px": 1250.0, "distance": 217.0, "look_at": [25.0, 15.0, 4.0],
-                   "blur_px": 0.5, "exposure": 180.0},
-        "noise": {"dark_level": 16.0, "sigma": 1.5, "bits": 8},
-        "settings": [{"sensor": [20, 0], "light": [20, 45]}],
-    })  # fmt: skip
 
 
 def write(name, folder):

@@ -5,8 +5,8 @@ import pytest
 
 import scenes
 from imaging.features.projected_edges import circles
-from render.adaptive import crossed, near_edges
-from render.large import near_required
+from render.adaptive import crossed
+from render.surroundings import near_edges, near_required
 from scenes import Picture, Pose
 from tests.oracle import pinhole
 

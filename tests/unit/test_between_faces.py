@@ -10,7 +10,7 @@ from imaging.light.between import light_of_dimmed
 from imaging.pictures import Pictures
 from render.between import lent_to
 from scenes import Picture
-from tests.system.test_station_pages import newcomers
+from tests.parts import newcomers
 from validation.dimmed import of_one_surface
 
 

@@ -11,6 +11,7 @@ from scipy import stats
 
 import planner
 import scenes
+from planner.search import local
 from scenes import InvalidInput, Pose, Tolerance
 from validation.batch.work import Chunk, Clean, Packed, TaskResult
 from validation.explore import answers, best, preview, prove, sphere
@@ -166,18 +167,15 @@ def test_the_way_down_is_by_the_measurand_that_is_looked_at_each_thing_on_its_si
     """Of camera above and lights below; where a light would be above, nothing is to be found."""
     above, below = Pose(40.0, 300.0), (Pose(100.0, 290.0), Pose(110.0, 280.0))
     state = replace(State.first(scene), sensor=above, lights=below, measurand=measurand)
-    kept, variances = [], []
+    kept = []
 
-    def model(pictures):
-        variances.append(pictures)
-        return SimpleNamespace(variances_object=np.array([[3.0, 8.0]]))
+    def descend(start, value, **_):
+        kept.append(lambda *poses: value(*poses, start.angles))
+        return local.Refined(np.array([41.237, 301.0]), np.array([99.0, 291.111, 111.0, 279.0]), start.angles, 1.0)
 
-    def descend(start, value, sizes):
-        kept.append(value)
-        return np.array([41.237, 301.0]), np.array([99.0, 291.111, 111.0, 279.0]), None, None
-
-    monkeypatch.setattr(best, "variance_model", lambda name: model)
-    monkeypatch.setattr(best, "descend", descend)
+    told = SimpleNamespace(variances_object=np.array([[3.0, 8.0]]))
+    monkeypatch.setattr(best.SearchProblem, "errors", lambda *_: told)
+    monkeypatch.setattr(local, "descend", descend)
     found = best.best_from(scene, state)
     assert found == replace(state, sensor=Pose(41.24, 301.0), lights=(Pose(99.0, 291.11), Pose(111.0, 279.0)))
     (value,) = kept

@@ -59,8 +59,8 @@ def test_each_picture_has_poses_of_its_own(off, task1, monkeypatch):
     """Sensor and light are set anew for each picture; one picture's noise is not another's."""
     poses = []
 
-    def image(scene, sensor, light, *rest):
-        poses.append((sensor, light, rest))
+    def image(scene, sensor, light, **how):
+        poses.append((sensor, light, how))
         return np.full((4, 5), 10.0 * len(poses))
 
     monkeypatch.setattr(series, "image", image)
@@ -70,7 +70,7 @@ def test_each_picture_has_poses_of_its_own(off, task1, monkeypatch):
     assert found.shape == (3, 4, 5)
     assert found.mean((1, 2)) == pytest.approx([10.0, 20.0, 30.0], abs=0.6)  # margin: 5 standard errors of 20 pixels
     assert np.abs(found[0] - 10 - (found[1] - 20)).min() > 1e-6
-    assert all("all" in rest for _, _, rest in poses)
+    assert all(how == {"effects": "all"} for _, _, how in poses)
     if off:
         assert len({pose for pair in poses for pose in pair[:2]}) == 6
     else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from render import mosaic as module
-from render.mosaic import _held, _side, mosaic
+from render.mosaic import Tiles, _held, _side
 
 FRAME = (70, 90)  # fine pixels of the sensor's whole frame
 
@@ -42,7 +42,7 @@ def test_marked_pixels_are_rendered_again(kind, start, size, tiles, rng):
     marked = rng.random(size) < 0.01
     marked[-9:, -7:] = marked[0, 0] = True  # together, so that large tiles pay, up to the frame's border
     fine = np.full(size, -1.0)
-    found = mosaic(SimpleNamespace(render=render), None, view, np.array(start), fine, marked, 16, (5, 0))
+    found = Tiles(SimpleNamespace(render=render), None, view, start).rendered(fine, marked, 16, (5, 0))
     y, x = np.mgrid[: size[0], : size[1]]
     truth = value(y + start[0], x + start[1])
     assert found is fine

@@ -1,5 +1,6 @@
 """Noise, blur and sides of a photograph, each told from images made with known ones."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from measure.photo.profiles import edge_sigma, refined
 from scenes import InvalidInput
 from scenes.photograph import Photograph
 from tests.oracle import polygon_image
-from validation.cli.measure import _shapes_wanted
+from validation.cli.measure import Options, _shapes_wanted
 
 CORNERS = np.array([[40.0, 30.0], [150.0, 38.0], [141.0, 118.0], [33.0, 108.0]])
 SHAPE = (150, 190)
@@ -83,8 +84,7 @@ def test_found(background, rng):
 
 
 def _wanted(**given):
-    options = {f"--{name}": None for name in ("near", "box", "corners", "kind", "most", "mtf")} | {"--all": False}
-    return _shapes_wanted(options | {f"--{name}": value for name, value in given.items()})
+    return _shapes_wanted(Options(Path("photo.png"), **given))
 
 
 def test_shapes_are_asked_for_by_so_many_numbers_each():
@@ -92,14 +92,14 @@ def test_shapes_are_asked_for_by_so_many_numbers_each():
     assert _wanted() == {"near": None, "box": None, "corners": None, "kinds": None, "most": 5}
     found = _wanted(near="1,2.5", box="1,2,3,4", kind="circle,tag", most=3)
     assert found == {"near": (1, 2.5), "box": (1, 2, 3, 4), "corners": None, "kinds": ("circle", "tag"), "most": 3}
-    assert _wanted(all=True)["most"] == 1000
+    assert _wanted(every=True)["most"] == 1000
     assert _wanted(corners=("1,2", "3,4", "5,6", "7,8"))["corners"] == [(1, 2), (3, 4), (5, 6), (7, 8)]
     wrong = {"near": "1", "box": "1,2,3", "corners": ("1,2", "3,4", "5,6", "7,8,9")}
     for name, value in wrong.items():
         with pytest.raises(InvalidInput, match=f"--{name} must be {4 if name == 'box' else 2} numbers"):
             _wanted(**{name: value})
     with pytest.raises(InvalidInput, match="--most must be left out with --all, got 3"):
-        _wanted(all=True, most=3)
+        _wanted(every=True, most=3)
 
 
 @pytest.mark.parametrize("corner", range(4))

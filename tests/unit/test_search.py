@@ -8,7 +8,7 @@ import scenes
 from planner.search.bound import separable
 from planner.search.exhaustive import _blocks, exhaustive
 from planner.search.grid import ViewingSpace
-from planner.search.local import alternate
+from planner.search.local import alternating
 from planner.search.objective import SearchProblem
 from scenes import InvalidInput
 from tests.benchmarks.search import local_minima
@@ -80,7 +80,7 @@ def test_optima_of_the_paper(task1):
 def test_alternating_search_stops_where_no_neighbour_is_better():
     part1 = scenes.load("task1_part1")
     space = ViewingSpace(2, (0, 90))
-    found = alternate(part1, space, space, np.array([40.0, 41.0]), "paper", "image")
+    found = alternating(SearchProblem.of(part1, "paper", "image"), space, space, np.array([40.0, 41.0]))
     values = [step.variance for step in found.trace]
     assert values == sorted(values, reverse=True)
     assert found.trace[0].fixed == "sensor"

@@ -553,7 +553,7 @@ def test_one_thread_at_a_time_is_in_the_renderer(task1, monkeypatch, door):
     alone, nothing = Alone(), SimpleNamespace(image=SimpleNamespace(array=lambda: None))
     monkeypatch.setattr(work.variants, "use", alone if door == "variants.use" else lambda *_: None)
     monkeypatch.setattr(work, "render_setting", alone if door == "render_setting" else lambda *_: nothing)
-    monkeypatch.setattr(work.render, "shots", alone if door == "render.shots" else lambda *_: None)
+    monkeypatch.setattr(work.render, "shots", alone if door == "render.shots" else lambda *_, **__: None)
     monkeypatch.setattr(work, "measure_chunk", lambda *a: a[-1] and a[-1](None, 1))
     scene = changed(task1, jitter=scenes.Jitter(sensor_deg=0.1))
     case = SimpleNamespace(scene=scene, setting=scene.settings[0])

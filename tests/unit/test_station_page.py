@@ -293,7 +293,7 @@ def test_what_a_correction_is_not_sure_of_is_in_u(plate):
     """U = 1.96 sqrt(sigma^2 + u(bias)^2) where the bias is taken off; what is not known at all adds nothing but its
     status."""
     sigmas, doubts = [0.001, 0.002, 0.001, 0.02, 0.001], [0.0005, 0.002, 0.0, 0.01, math.inf]
-    found = requirements.measurable_budget(plate, [s * s for s in sigmas], doubts=doubts)
+    found = requirements.measurable_budget(plate, variances=[s * s for s in sigmas], doubts=doubts)
     wanted = [1.959964 * math.hypot(s, u if math.isfinite(u) else 0.0) for s, u in zip(sigmas, doubts, strict=True)]
     assert [each.U for each in found] == pytest.approx(wanted)
     made = requirements.requirements(plate, sigmas, [0.0] * 5, found, ["ok"] * 4 + ["clutter"], doubts)
@@ -740,9 +740,9 @@ def test_the_station_of_a_run_is_told_by_what_was_measured(plate, corrected, mon
     asked = []
     monkeypatch.setattr(station, "measurable_budget", lambda *given, **more: asked.append((given, more)))
     made = station.of_run(campaign, SimpleNamespace(rows=[row]), store)
-    ((picture, variances), more), states = asked[0], ["clutter", "ok", "ok", "ok", "ok"]
+    ((picture,), more), states = asked[0], ["clutter", "ok", "ok", "ok", "ok"]
     assert picture is plate
-    assert variances == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
+    assert more.pop("variances") == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05])
     expected = {"doubts": [0.001, math.inf, 0.003, math.inf, 0.005]} if corrected else {"biases": [10.0] * 5}
     assert more == {"statuses": states, **expected}
     assert [each.sigma for each in made.requirements] == pytest.approx([0.1 * math.sqrt(k) for k in range(1, 6)])

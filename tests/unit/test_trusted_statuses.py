@@ -13,7 +13,7 @@ from planner.uncertainty import decide
 from scenes import Tolerance, status
 from validation import budgets, vary_check, views_check
 from validation.cli import measurands, plan_capability
-from validation.report import budget_section, budget_table
+from validation.report import budget_table
 from validation.statistics import verdict
 
 DOUBTFUL = sorted(status.ALL - {status.OK})
@@ -83,7 +83,7 @@ def test_the_budgets_document_signs_and_rates_only_what_is_ok(budget):
         assert ("+-" in row["sentence"]) == ("not signed" not in row["sentence"]) == (state == "ok")
         assert f"{each.name} not signed: clutter, bias unknown" in repr(budget) or state == "ok"
     for m, state in enumerate(budget.statuses):
-        assert ("not signed" in budget_section.note(budget, m)) == (state != "ok")
+        assert ("not signed" in budget_table.note(budget, m)) == (state != "ok")
 
 
 def test_a_rendered_pictures_statuses_take_the_place_of_the_predicted_ones(doubtful):

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from planner.uncertainty import (
+    Enough,
     Group,
     Input,
     as_ufloats,
@@ -205,7 +206,9 @@ def test_several_measurands_share_their_draws():
 def test_all_measurands_have_to_be_stable():
     """A heavy tail needs more draws than the normal measurand beside it, and both get them."""
     inputs = [Input("x", 0, 1.0), Input("tail", 0, 1.0, "t", dof=5)]
-    both = monte_carlo_all(lambda d: np.stack([d["x"], d["tail"]], 1), ("x", "tail"), inputs, 2, block=2000)
+    both = monte_carlo_all(
+        lambda d: np.stack([d["x"], d["tail"]], 1), ("x", "tail"), inputs, 2, enough=Enough(block=2000)
+    )
     alone = monte_carlo(lambda d: d["x"], inputs, 2, block=2000)
     assert all(each.converged for each in both)
     assert both[0].draws == both[1].draws > alone.draws

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from scenes.results import picked
 from validation.batch.measurands import JudgedMeasurand
 from validation.batch.rows import Row
 from validation.strict_json import dumps, plain
@@ -48,11 +49,7 @@ def _lists(found: Validation) -> dict[str, Iterator[dict[str, Any]]]:
 def _frame(found: Validation) -> dict[str, Any]:
     """Everything else, with the lists empty."""
     return {
-        "scene": found.scene,
-        "seed": found.seed,
-        "variant": found.variant,
-        "machines": found.machines,
-        "paper_scale": found.paper_scale,
+        **picked(found, "scene", "seed", "variant", "machines", "paper_scale"),
         "settings": [],
         "refused": [],
         "paper_table_1": [
@@ -70,20 +67,8 @@ def _frame(found: Validation) -> dict[str, Any]:
 def _row(row: Row) -> dict[str, Any]:
     main, texture = asdict(row.main), {} if row.texture is None else {"texture": row.texture}
     return {
-        "index": row.index,
-        "scene": row.scene,
-        "parameters": row.parameters,
-        "sensor": row.sensor,
-        "light": row.light,
-        "value_px": row.value_px,
-        "paper_ice": row.paper_ice,
-        "paper_real": row.paper_real,
-        "predicted": {
-            "paper": row.paper,
-            "calibrated": row.calibrated,
-            "propagated": main.pop("propagated"),
-            **texture,
-        },
+        **picked(row, "index", "scene", "parameters", "sensor", "light", "value_px", "paper_ice", "paper_real"),
+        "predicted": {**picked(row, "paper", "calibrated"), "propagated": main.pop("propagated"), **texture},
         **main,
         "bound": row.bound,
         "classic": [asdict(judged) for judged in row.classic],

@@ -11,8 +11,7 @@ import numpy as np
 
 import planner
 from measure.propagation import PropagatedValues
-from validation import statistics
-from validation.batch.repeated import STATUSES, RepeatedValues, ratios, row_status
+from validation.batch.repeated import FOUND, STATUSES, RepeatedValues, judged, known, ratios, row_status
 
 FIELDS = ("paper", "calibrated", "bound")
 
@@ -103,26 +102,10 @@ class JudgedMeasurand:
         return facts | {"ratio_low": low, "ratio_high": high}
 
 
-_NUMBERS = (
-    "value",
-    *FIELDS,
-    "texture",
-    "predicted_bias",
-    "predicted",
-    "empirical",
-    "ratio",
-    "bias",
-    "independent",
-    "correction",
-    "u_bias",
-    "render_noise",
-)
+_NUMBERS = ("value", *FIELDS, "predicted", "independent")
 _RECORD = np.dtype(
-    [("about", "i4"), *((name, "f8") for name in _NUMBERS), ("n", "i4"), ("failed", "i4"), ("status", "u1")]
+    [("about", "i4"), *((name, "f8") for name in (*_NUMBERS, "texture", "ratio")), *FOUND, ("status", "u1")]
 )
-
-
-_PLAIN = ("value", *FIELDS, "predicted_bias", "predicted", "independent", "correction", "render_noise")
 
 
 class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
@@ -146,16 +129,11 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
             record = self._records[self._size]
             key = about["name"], about["kind"], about["unit"]
             record["about"] = self._about.setdefault(key, len(self._about))
-            for name in ("value", *FIELDS, "predicted_bias"):
+            for name in ("value", *FIELDS):
                 record[name] = about[name]
             record["texture"] = about.get("texture", np.nan)
             record["predicted"], record["independent"] = each.propagated, share
-            record["correction"], record["u_bias"] = each.correction, each.u_bias
-            record["render_noise"] = each.render_noise
-            if not np.isnan(each.u_bias):
-                record["predicted_bias"] = 0.0  # it has been taken off
-            for name, number in each.scatter(about["value"]).items():
-                record[name] = number
+            each.note(record, about["value"], about["predicted_bias"])
             record["status"] = STATUSES.index(row_status(each.clean, each.failures, each.distances.size))
             self._size += 1
         self._first.append(self._size)
@@ -189,18 +167,12 @@ class Measured(Sequence[tuple[JudgedMeasurand, ...]]):
 
 def _judged(record: np.void, texts: list[tuple[str, str, str]]) -> JudgedMeasurand:
     name, kind, unit = texts[record["about"]]
-    known = {
-        key: None if np.isnan(record[key]) else float(record[key])
-        for key in ("empirical", "ratio", "bias", "texture", "u_bias")
-    }
-    n, failed, ratio = int(record["n"]), int(record["failed"]), known["ratio"]
-    known["u"] = None if known["u_bias"] is None else float(np.hypot(np.sqrt(record["predicted"]), known["u_bias"]))
+    predicted = float(record["predicted"])
+    told = judged(record, predicted)
+    u = None if told["u_bias"] is None else float(np.hypot(np.sqrt(predicted), told["u_bias"]))
     return JudgedMeasurand(
-        name=name, kind=kind, unit=unit, n=n, failed=failed,
-        status=STATUSES[record["status"]],
-        ratio_interval=None if ratio is None else statistics.ratio_interval(ratio, n - failed),
-        **{key: float(record[key]) for key in _PLAIN},
-        **known,
+        name=name, kind=kind, unit=unit, status=STATUSES[record["status"]], texture=known(record["texture"]), u=u,
+        **{key: float(record[key]) for key in _NUMBERS}, **told,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from validation import statistics
 from validation.remeasured import Sample
 
 STATUSES = tuple(sorted(statuses.ALL))
+FOUND = [
+    *((name, "f8") for name in ("empirical", "bias", "correction", "u_bias", "render_noise", "predicted_bias")),
+    ("n", "i4"), ("failed", "i4"),
+]  # fmt: skip
+"""Columns of what one method found of one quantity: see `RepeatedValues.note`, `judged`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,30 @@ class RepeatedValues:
         sample = Sample.of(self.distances)
         left = sample.mean - self.correction - true
         return {"empirical": sample.variance, "bias": left, "n": sample.n, "failed": sample.failed}
+
+    def note(self, record: np.void, true: float, predicted_bias: float) -> None:
+        """Put it into a record that has the columns `FOUND`; of a bias that has been taken off none is expected."""
+        told = {name: getattr(self, name) for name in ("correction", "u_bias", "render_noise")}
+        told["predicted_bias"] = predicted_bias if math.isnan(self.u_bias) else 0.0
+        for name, number in (told | self.scatter(true)).items():
+            record[name] = number
+
+
+def judged(record: np.void, predicted: float) -> dict[str, Any]:
+    """What a record of `FOUND` says beside a predicted variance, as fields of `Judged`; None where nothing is known."""
+    n, failed, empirical = int(record["n"]), int(record["failed"]), known(record["empirical"])
+    ratio = empirical / predicted if empirical is not None and 0 < predicted < math.inf else None
+    return {
+        "n": n, "failed": failed, "ratio": ratio,
+        "ratio_interval": None if ratio is None else statistics.ratio_interval(ratio, n - failed),
+        "empirical": empirical, **{name: known(record[name]) for name in ("bias", "u_bias")},
+        **{name: float(record[name]) for name in ("correction", "render_noise", "predicted_bias")},
+    }  # fmt: skip
+
+
+def known(number: np.floating | np.ndarray) -> float | None:
+    """The number; None for NaN."""
+    return None if np.isnan(number) else float(number)
 
 
 def ratios(empirical: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from scenes.status import is_trusted
 from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.measurands import JudgedMeasurand, Measured
-from validation.batch.repeated import STATUSES, RepeatedValues, ratios, row_status
+from validation.batch.repeated import FOUND, STATUSES, RepeatedValues, judged, known, ratios, row_status
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,9 @@ MODEL = ("value_px", "paper", "calibrated", "bound", "predicted_bias", "texture"
 
 
 def _record(methods: int) -> np.dtype:
-    judged = [
-        ("propagated", "f8"), ("empirical", "f8"), ("bias", "f8"), ("n", "i4"),
-        ("correction", "f8"), ("u_bias", "f8"), ("render_noise", "f8"), ("predicted_bias", "f8"),
-        ("failed", "i4"), ("failures", "i4"), ("clean", "u1"),
-    ]  # fmt: skip
+    each = [("propagated", "f8"), *FOUND, ("failures", "i4"), ("clean", "u1")]
     return np.dtype([
-        ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", judged, (methods,)),
+        ("index", "i4"), ("kind", "i4"), *((name, "f8") for name in MODEL), ("judged", each, (methods,)),
     ])  # fmt: skip
 
 
@@ -135,11 +131,7 @@ class Rows(Sequence[Row]):
             record[name] = model.get(name, math.nan)
         for place, one in zip(record["judged"], found.values(), strict=False):
             place["propagated"], place["clean"] = one.propagated, STATUSES.index(one.clean)
-            place["correction"], place["u_bias"] = one.correction, one.u_bias
-            place["render_noise"] = one.render_noise
-            place["predicted_bias"] = record["predicted_bias"] if math.isnan(one.u_bias) else 0.0
-            for name, number in one.scatter(model["value_px"]).items():
-                place[name] = number
+            one.note(place, model["value_px"], record["predicted_bias"])
             place["failures"] = self._failure(one.failures)
         self.measured.add(model["measurands"], each)
         self._size += 1
@@ -228,42 +220,28 @@ class Rows(Sequence[Row]):
         index = int(record["index"])
         setting, parameters = self._campaign.at(index)
         scene, names = self._kinds[int(record["kind"])]
-        numbers = {name: float(record[name]) for name in MODEL} | {"texture": _known(record["texture"])}
+        numbers = {name: float(record[name]) for name in MODEL} | {"texture": known(record["texture"])}
         numbers.pop("predicted_bias")
-        judged = [
+        each = [
             _judged(name, place, self._failures[place["failures"]])
             for name, place in zip(names, record["judged"], strict=False)
         ]
         return Row(
             index=index, scene=scene, parameters=parameters, sensor=tuple(setting.sensor), light=pairs(setting.light),
-            paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=judged[0], classic=tuple(judged[1:]),
+            paper_ice=setting.paper_ice, paper_real=setting.paper_real, main=each[0], classic=tuple(each[1:]),
             measurands=self.measured[number], **numbers,
         )  # fmt: skip
 
 
 def _judged(method: str, place: np.void, failures: dict[str, int]) -> Judged:
-    n, failed, propagated = int(place["n"]), int(place["failed"]), float(place["propagated"])
-    empirical, bias = _known(place["empirical"]), _known(place["bias"])
-    judged = empirical is not None and math.isfinite(propagated) and propagated > 0
-    ratio = empirical / propagated if judged else None
+    propagated = float(place["propagated"])
+    told = judged(place, propagated)
+    unknown = told["empirical"] is None or told["bias"] is None
     return Judged(
         method=method,
         propagated=propagated,
-        empirical=empirical,
-        n=n,
-        failed=failed,
         failures=failures,
-        ratio=ratio,
-        ratio_interval=None if ratio is None else statistics.ratio_interval(ratio, n - failed),
-        bias=bias,
-        predicted_bias=float(place["predicted_bias"]),
-        rmse=None if empirical is None or bias is None else math.hypot(math.sqrt(empirical), bias),
-        status=row_status(STATUSES[place["clean"]], failures, n),
-        correction=float(place["correction"]),
-        u_bias=_known(place["u_bias"]),
-        render_noise=float(place["render_noise"]),
+        rmse=None if unknown else math.hypot(math.sqrt(told["empirical"]), told["bias"]),
+        status=row_status(STATUSES[place["clean"]], failures, told["n"]),
+        **told,
     )
-
-
-def _known(number: np.float64) -> float | None:
-    return None if math.isnan(number) else float(number)

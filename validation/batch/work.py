@@ -191,13 +191,13 @@ def _shots(task: Task, chunk: int) -> Shots | None:
     """Takes a chunk's photographs, or pictures from poses set anew each time; None where that does not matter."""
     if task.photos:
         return photographs.exposures(task.case.scene, task.photos[chunk * CHUNK :])
-    scene, (sensor, light), how = task.case.scene, (task.case.setting.sensor, task.case.setting.light), task.rendering
+    scene, setting, how = task.case.scene, task.case.setting, task.rendering
     if _jitter(task.case, how) == Jitter():
         return None
 
     def take(rng: np.random.Generator, count: int) -> np.ndarray:
         with _RENDERER:
-            return render.shots(scene, sensor, light, rng, count, how.quality, task.variant, how.effects, how.tolerance)
+            return render.shots(scene, setting.sensor, setting.light, rng, count, variant=task.variant, **vars(how))
 
     return take
 
@@ -226,9 +226,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     way = simulation.How(how.quality, variant, how.effects, how.tolerance).by(*used)
     photographed = image is not None
     if not photographed:
-        image = render.image(
-            picture, quality=how.quality, variant=variant, effects=how.effects, tolerance=how.tolerance
-        )
+        image = render.image(picture, variant=variant, **vars(how))
         renders = simulation.steadied(picture, image, used[0], way)
         image = simulation.mean_of(picture, renders)
         clock.lap("render")

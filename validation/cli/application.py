@@ -32,11 +32,7 @@ def _ice(
     ] = False,
     plugin: Annotated[
         list[str] | None,
-        typer.Option(
-            "--plugin",
-            metavar="MODULE",
-            help="Module that adds kinds of lights, estimators, effects.",
-        ),
+        typer.Option("--plugin", metavar="MODULE", help="Module that adds kinds of lights, estimators, effects."),
     ] = None,
 ) -> None:
     """Predict how precisely an image will let you measure, and prove it by rendering and re-measuring.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +25,7 @@ from validation.cli.common import (
     commands,
     continued,
     progress,
+    taking,
     tolerance,
 )
 from validation.cli.outputs import check_directory
@@ -33,6 +34,7 @@ from validation.report.terminal import console
 
 if TYPE_CHECKING:
     from validation.batch import photographs
+    from validation.batch.options import RunOptions
     from validation.batch.result import Validation
     from validation.cost.goal import Goal, Reached
     from validation.report.station import Station
@@ -41,59 +43,74 @@ commands = commands()
 _MOST_RENDERS = 10_000_000
 _MOST_TOLD = 20  # photographs that are left out
 
-Target = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")]
-Renders = Annotated[int, typer.Option(help="Noisy images a setting.")]
-Out = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there.")
-]
-Workers = Annotated[int | None, typer.Option(help="Processes; default: one a core.")]
-Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")]
-Accuracy = Annotated[
-    float | None,
-    typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
-]
-Budget = Annotated[str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")]
-Photos = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Measure these photographs instead of renders: a sub-folder a setting."),
-]
-ExactPoses = Annotated[
-    bool, typer.Option("--exact-poses", help="With --photos: poses are exactly those said, so judge mean errors, too.")
-]
-Estimators = Annotated[
-    str | None,
-    typer.Option(
-        "--estimators", metavar="LIST", help="By which is measured, with commas between; the first is judged."
-    ),
-]
-Strict = Annotated[bool, typer.Option("--strict", help="Exit status 1 also where a row is not proven or not measured.")]
-Explain = Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")]
-LogJson = Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")]
+
+@dataclass(frozen=True)
+class Options:
+    """What a validation is asked for."""
+
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, or a TOML file: scene or campaign.")]
+    renders: Annotated[int, typer.Option(help="Noisy images a setting.")] = 1000
+    seed: Seed = DEFAULT_SEED
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Run directory; default runs/SCENE. A killed run continues there."),
+    ] = None
+    workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None
+    dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")] = (
+        None
+    )
+    fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")] = False
+    accuracy: Annotated[
+        float | None,
+        typer.Option(help="Half-width of the 95 % interval on each variance ratio; chooses renders and rays itself."),
+    ] = None
+    budget: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Instead: the best accuracy for 60s, 2min, ...")
+    ] = None
+    effects: Effects = "auto"
+    bias_px: LeaveOutPx = None
+    variance: LeaveOutVariance = None
+    photos: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Measure these photographs instead of renders: a sub-folder a setting."),
+    ] = None
+    exact_poses: Annotated[
+        bool,
+        typer.Option("--exact-poses", help="With --photos: poses are exactly those said, so judge mean errors, too."),
+    ] = False
+    estimators: Annotated[
+        str | None, typer.Option(metavar="LIST", help="By which is measured, with commas between; the first is judged.")
+    ] = None
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit status 1 also where a row is not proven or not measured.")
+    ] = False
+    explain: Annotated[bool, typer.Option("--explain", help="Explain all terms of the tables at length.")] = False
+    log_json: Annotated[bool, typer.Option("--log-json", help="Events as JSON lines on standard error.")] = False
+    as_json: Json = False
+
+    def of_run(self, directory: Path) -> RunOptions:
+        """How the run works."""
+        from validation.batch.options import RunOptions
+        from validation.batch.work import Rendering
+
+        rendering = Rendering(effects=self.effects, tolerance=tolerance(self.bias_px, self.variance))
+        return RunOptions(self.seed, directory, self.workers, self.fresh, self.dask, rendering=rendering)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run's campaign, directory and outcome, the station that its page shows, and the goal that it has reached."""
+
+    campaign: campaign.Campaign
+    directory: Path
+    found: Validation
+    station: Station
+    reached: Reached | None
 
 
 @commands.command("validate")
-def validate_command(
-    scene: Target,
-    renders: Renders = 1000,
-    seed: Seed = DEFAULT_SEED,
-    out: Out = None,
-    workers: Workers = None,
-    dask: Dask = None,
-    fresh: Fresh = False,
-    accuracy: Accuracy = None,
-    budget: Budget = None,
-    effects: Effects = "auto",
-    bias_px: LeaveOutPx = None,
-    variance: LeaveOutVariance = None,
-    photos: Photos = None,
-    exact_poses: ExactPoses = False,
-    estimators: Estimators = None,
-    strict: Strict = False,
-    explain: Explain = False,
-    log_json: LogJson = False,
-    as_json: Json = False,
-) -> None:
+@taking(Options)
+def validate_command(given: Options) -> None:
     """Predict, render and measure every setting of a scene or a campaign and judge the predictions.
 
     With --photos nothing is rendered: repeated photographs are measured instead. Sub-folders of DIR are named as
@@ -104,38 +121,42 @@ def validate_command(
     proven or not measured.
     """
     started = time.perf_counter()
-    check_number("renders", renders, 2, _MOST_RENDERS)
-    check_number("workers", workers, 1, MOST_WORKERS)
-    check_seed(seed)
-    loaded = campaign.load(scene)
-    loaded = loaded if estimators is None else _measured_by(loaded, estimators)
-    out = out or Path("runs") / loaded.name
-    check_directory("--out", out)
+    check_number("renders", given.renders, 2, _MOST_RENDERS)
+    check_number("workers", given.workers, 1, MOST_WORKERS)
+    check_seed(given.seed)
+    loaded = campaign.load(given.scene)
+    loaded = loaded if given.estimators is None else _measured_by(loaded, given.estimators)
+    directory = given.out or Path("runs") / loaded.name
+    check_directory("--out", directory)
+    goal = _goal(given.accuracy, given.budget, started)
+    taken = _photographs(loaded, given.photos, given.exact_poses, goal is not None)
+    done = _run(given, taken.campaign if taken else loaded, directory, goal, taken)
+    if given.as_json:
+        _print_json(done, taken)
+    else:
+        _print_tables(done, given)
+    verdict = done.found.verdict
+    shown = verdict.agrees and not (given.strict and (verdict.not_proven or verdict.not_measured))
+    raise typer.Exit(0 if shown else 1)
+
+
+def _run(
+    given: Options, loaded: campaign.Campaign, directory: Path, goal: Goal | None, taken: photographs.Photographs | None
+) -> Finished:
+    """Work until all is done, and write all files."""
     from validation.batch.job import run_by
-    from validation.batch.options import RunOptions
-    from validation.batch.work import Rendering
     from validation.cost.goal import reach
 
-    goal = _goal(accuracy, budget, started)
-    taken = _photographs(loaded, photos, exact_poses, goal is not None)
-    loaded = taken.campaign if taken else loaded
-    rendering = Rendering(effects=effects, tolerance=tolerance(bias_px, variance))
-    options = RunOptions(seed, out, workers, fresh, dask, rendering=rendering)
-    with continued(log_json):
-        with nullcontext() if log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
+    options, reached = given.of_run(directory), None
+    with continued(given.log_json):
+        with nullcontext() if given.log_json else progress(f"{loaded.name}: {len(loaded)} settings") as shown:
             if goal is None:
-                found, reached = run_by(options, loaded, renders, shown, photos=taken), None
+                found = run_by(options, loaded, given.renders, shown, photos=taken)
             else:
                 found, reached = reach(loaded, goal, options, lambda line: print(line, file=sys.stderr), shown)
-        station = _write(loaded, found, out)
-    reached = reached and replace(reached, seconds=time.perf_counter() - started)
-    if as_json:
-        _print_json(found, reached, taken)
-    else:
-        one = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else scene
-        _print_tables(loaded, found, reached, station, out, one, explain)
-    shown = found.verdict.agrees and not (strict and (found.verdict.not_proven or found.verdict.not_measured))
-    raise typer.Exit(0 if shown else 1)
+        station = _write(loaded, found, directory)
+    reached = reached and replace(reached, seconds=time.perf_counter() - goal.started)
+    return Finished(loaded, directory, found, station, reached)
 
 
 def _measured_by(loaded: campaign.Campaign, estimators: str) -> campaign.Campaign:
@@ -169,30 +190,29 @@ def _photographs(
     return taken
 
 
-def _print_json(found: Validation, goal: Reached | None, taken: photographs.Photographs | None) -> None:
+def _print_json(done: Finished, taken: photographs.Photographs | None) -> None:
     from validation.batch.document import pieces
 
-    more = ({"goal": goal.to_json()} if goal else {}) | ({"left_out": list(taken.left_out)} if taken else {})
-    sys.stdout.writelines(pieces(found, more))
+    more = {"goal": done.reached.to_json()} if done.reached else {}
+    sys.stdout.writelines(pieces(done.found, more | ({"left_out": list(taken.left_out)} if taken else {})))
     print()
 
 
-def _print_tables(
-    loaded: campaign.Campaign, found: Validation, goal: Reached | None, station: Station, directory: Path,
-    scene: str | None, explain: bool,
-) -> None:  # fmt: skip
-    """The whole result as tables; ``scene`` as it was named, None of a campaign."""
+def _print_tables(done: Finished, given: Options) -> None:
+    """The whole result as tables."""
     from validation.report import guide, station_text
     from validation.report.run_cells import far
     from validation.report.station import reasons
     from validation.report.table import report
 
+    loaded, found, station = done.campaign, done.found, done.station
+    scene = None if loaded.grid or loaded.sweep or len(loaded.scenes) > 1 else given.scene
     shown_on = console()
-    shown_on.print(report(found, explain, reasons(loaded, far(found)[0])))
+    shown_on.print(report(found, given.explain, reasons(loaded, far(found)[0])))
     shown_on.print(station_text.report(station.requirements, guide.station_title(found, station)), highlight=False)
-    if goal:
-        shown_on.print(goal.text, highlight=False)
-    for line in (guide.directory_line(directory), guide.next_line(found, scene, directory)):
+    if done.reached:
+        shown_on.print(done.reached.text, highlight=False)
+    for line in (guide.directory_line(done.directory), guide.next_line(found, scene, done.directory)):
         shown_on.print(line, highlight=False, soft_wrap=True)
 
 

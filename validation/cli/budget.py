@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,7 @@ from validation.cli.common import (
     parse_poses,
     progress,
     say,
+    taking,
 )
 from validation.cli.outputs import check_directory, check_file
 from validation.defaults import DEFAULT_SEED
@@ -39,71 +41,77 @@ Pair = Annotated[
 ]
 
 
-@commands.command("budget")
-def budget_command(
-    scene: SceneName,
-    sensor: Pair = None,
-    light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None,
-    p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95,
-    render: Annotated[
-        bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")
-    ] = False,
+@dataclass(frozen=True)
+class Options:
+    """What a budget is asked for."""
+
+    scene: SceneName
+    sensor: Pair = None
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None
+    p: Annotated[float, typer.Option("--p", help="Coverage probability.")] = 0.95
+    render: Annotated[bool, typer.Option("--render", help="Noise and bias by simulation, also where formulas do.")] = (
+        False
+    )
     monte_carlo: Annotated[
         bool, typer.Option("--monte-carlo", help="Draw all inputs, and compare as JCGM 101 clause 8 asks.")
-    ] = False,
+    ] = False
     stations: Annotated[
         int, typer.Option(metavar="N", help="Measure pictures of N drawn stations, too; plain scenes only.")
-    ] = 0,
+    ] = 0
     reach: Annotated[
         float | None, typer.Option(metavar="U", help="Which input would have to be how well known for this U?")
-    ] = None,
-    csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None,
+    ] = None
+    csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="DIR", help="Write budget.html (one page that shows all), budget.json, budget.csv and budget.png."
         ),
-    ] = None,
-    seed: Seed = DEFAULT_SEED,
-    as_json: Json = False,
-) -> None:
+    ] = None
+    seed: Seed = DEFAULT_SEED
+    as_json: Json = False
+
+
+@commands.command("budget")
+@taking(Options)
+def budget_command(given: Options) -> None:
     """The uncertainty of every measurand: each source, its share, and the expanded uncertainty."""
-    check_number("--p", p, 0.5, 0.9999)
-    _check(stations, reach)
-    check_seed(seed)
-    check_file("--csv", csv_file, ".csv")
-    check_directory("--out", out)
-    poses = _poses(sensor, light)
-    loaded = scenes.load(scene)
+    _check(given)
+    poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
+    loaded = scenes.load(given.scene)
     from imaging.light.appearance import is_plain
     from validation import budgets
 
     picture = _picture(loaded, *poses)
-    if stations and not is_plain(loaded):
-        raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {stations}")
+    if given.stations and not is_plain(loaded):
+        raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {given.stations}")
     with progress("simulating the picture for its bias", "renders", at_once=True):
-        found = budgets.budget_of(picture, p, rendered=render)
-    drawn = budgets.monte_carlo(found, seed) if monte_carlo else []
-    shown = budgets.pictured(found, stations, seed) if stations else None
-    facts = budgets.facts(found, drawn, shown, reach)
-    if out:
-        _write(found, facts, out)
-    if csv_file:
-        write_csv(found, csv_file)
-    if as_json:
+        found = budgets.budget_of(picture, given.p, rendered=given.render)
+    drawn = budgets.monte_carlo(found, given.seed) if given.monte_carlo else []
+    shown = budgets.pictured(found, given.stations, given.seed) if given.stations else None
+    facts = budgets.facts(found, drawn, shown, given.reach)
+    if given.out:
+        _write(found, facts, given.out)
+    if given.csv_file:
+        write_csv(found, given.csv_file)
+    if given.as_json:
         say(facts, True, "")
         return
-    _show(found, drawn, shown, reach)
-    if out:
-        console().print(f"budget.html, budget.json, budget.csv and budget.png: {out}", highlight=False)
+    _show(found, drawn, shown, given.reach)
+    if given.out:
+        console().print(f"budget.html, budget.json, budget.csv and budget.png: {given.out}", highlight=False)
 
 
-def _check(stations: int, reach: float | None) -> None:
-    check_number("--stations", stations, 0, _MOST_PICTURES)
-    if 0 < stations < _FEWEST_PICTURES:
-        raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {stations}")
-    if reach is not None and not (reach > 0 and math.isfinite(reach)):
-        raise scenes.InvalidInput(f"--reach must be greater than 0, got {reach}")
+def _check(given: Options) -> None:
+    check_number("--p", given.p, 0.5, 0.9999)
+    check_number("--stations", given.stations, 0, _MOST_PICTURES)
+    if 0 < given.stations < _FEWEST_PICTURES:
+        raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {given.stations}")
+    if given.reach is not None and not (given.reach > 0 and math.isfinite(given.reach)):
+        raise scenes.InvalidInput(f"--reach must be greater than 0, got {given.reach}")
+    check_seed(given.seed)
+    check_file("--csv", given.csv_file, ".csv")
+    check_directory("--out", given.out)
 
 
 def _write(found: SceneBudget, facts: dict, out: Path) -> None:
@@ -116,10 +124,6 @@ def _write(found: SceneBudget, facts: dict, out: Path) -> None:
     write_csv(found, out / "budget.csv")
     budget_figure.draw(found, out / "budget.png")
     page.write_station(station.of_budget(found), scene.title or scene.name, out / "budget.html")
-
-
-def _poses(sensor: str | None, light: str | None) -> tuple[Any, Any]:
-    return None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
 
 
 def _picture(scene: scenes.Scene, sensor: Any, light: Any) -> scenes.Picture:

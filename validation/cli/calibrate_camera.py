@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 import scenes
 from scenes import InvalidInput
 from scenes.files.image import Size
-from validation.cli.common import Json, check_number, commands, progress, say
+from validation.cli.common import Json, check_number, commands, progress, say, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -19,68 +20,82 @@ commands = commands()
 _LONGEST = 1e9
 
 
-@commands.command("calibrate-camera")
-def calibrate_camera_command(
-    boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one chessboard, 3 or more.")],
-    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares.")],
-    square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0,
-    units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm",
+@dataclass(frozen=True)
+class Options:
+    """What a calibration is asked for."""
+
+    boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one chessboard, 3 or more.")]
+    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares.")]
+    square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0
+    units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm"
     shape: Annotated[
         str | None, typer.Option(metavar="9x6", help="Inner corners: columns x rows; counted when not given.")
-    ] = None,
+    ] = None
     model: Annotated[
         str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
-    ] = "k1,k2,p1,p2,k3",
+    ] = "k1,k2,p1,p2,k3"
     noise: Annotated[
         float | None, typer.Option(help="Standard deviation of the noise, grey levels; else from each image.")
-    ] = None,
+    ] = None
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="LENS.toml", help="For `ice measure --lens`.")
-    ] = None,
+    ] = None
     scene: Annotated[
         str | None, typer.Option(metavar="SCENE", help="Print its [camera] and [uncertainty] as they should read.")
-    ] = None,
-    residuals: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture of the residuals.")] = None,
-    as_json: Json = False,
-) -> None:
+    ] = None
+    residuals: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture of the residuals.")] = None
+    as_json: Json = False
+
+
+@commands.command("calibrate-camera")
+@taking(Options)
+def calibrate_camera_command(given: Options) -> None:
     """Calibrate a camera from photographs of a chessboard seen from different directions.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
     """
-    from scenes.units import UNITS
-
-    check_number("--square", square, 1e-9, _LONGEST)
-    check_number("--square-sd", square_sd, 0, square)
-    check_number("--noise", noise, 1e-6, 1e6)
-    if units not in UNITS:
-        raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {units!r}")
-    wanted = _shape(shape)
-    check_file("--output", output, ".toml")
-    check_file("--residuals", residuals, ".png")
+    wanted = _checked(given)
     import measure
     from measure.boards.parameters import read_model
     from scenes import status
     from validation.boards import read_boards
     from validation.report import camera_table
 
-    read_model(model)
+    read_model(given.model)
+    scene, beside = given.scene, given.output and _beside(given.output)
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
-        seen = read_boards(boards, wanted, noise, shown, camera and Size(camera.height, camera.width, scene))
+        size = camera and Size(camera.height, camera.width, scene)
+        seen = read_boards(given.boards, wanted, given.noise, shown, size)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
-    found = measure.calibrate_camera(seen.boards, square, seen.image_shape, model, square_sd)
-    lines = camera_table.scene_lines(found, scene, output and _beside(output)) if scene is not None else None
-    written = _write_files(found, seen, output, residuals)
-    if as_json:
-        told = camera_table.facts(found, seen, units)
+    found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
+    lines = camera_table.scene_lines(found, scene, beside) if scene is not None else None
+    written = _write_files(found, seen, given.output, given.residuals)
+    if given.as_json:
+        told = camera_table.facts(found, seen, given.units)
         say(told if lines is None else {**told, "scene": lines}, True, "")
     else:
-        _show(found, seen, units, lines)
+        _show(found, seen, given.units, lines)
         for path in written:
             console().print(f"written: {path}", highlight=False)
     raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
+
+
+def _checked(given: Options) -> tuple[int, int] | None:
+    """See that options are in their ranges; the board's inner corners, columns and rows, if they are given."""
+    from scenes.units import UNITS
+
+    check_number("--square", given.square, 1e-9, _LONGEST)
+    check_number("--square-sd", given.square_sd, 0, given.square)
+    check_number("--noise", given.noise, 1e-6, 1e6)
+    if given.units not in UNITS:
+        raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {given.units!r}")
+    wanted = _shape(given.shape)
+    check_file("--output", given.output, ".toml")
+    check_file("--residuals", given.residuals, ".png")
+    return wanted
 
 
 def _write_files(found, seen, output: Path | None, residuals: Path | None) -> list[Path]:

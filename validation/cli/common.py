@@ -8,7 +8,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from functools import wraps
+from inspect import signature
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from render import Tolerance
 
 Report = Callable[[str, int, int], None]
+Given = TypeVar("Given")
 
 MOST_SEED = 2**63 - 1
 MOST_WORKERS = 1024
@@ -50,6 +53,25 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and 
 def commands() -> typer.Typer:
     """What a module adds its commands to."""
     return typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+def taking(options: type[Given]) -> Callable[[Callable[[Given], None]], Callable[..., None]]:
+    """A command whose arguments and options are the fields of a dataclass, which the function is given."""
+    hints = get_type_hints(options, include_extras=True)
+
+    def made(function: Callable[[Given], None]) -> Callable[..., None]:
+        @wraps(function)
+        def command(*arguments: Any, **named: Any) -> None:
+            function(options(*arguments, **named))
+
+        told = signature(options)
+        parameters = [each.replace(annotation=hints[name]) for name, each in told.parameters.items()]
+        told = told.replace(parameters=parameters, return_annotation=None)
+        command.__signature__ = told  # ty: ignore[missing-attribute]
+        command.__annotations__ = hints | {"return": None}
+        return command
+
+    return made
 
 
 def tolerance(bias_px: float | None, variance: float | None) -> Tolerance:

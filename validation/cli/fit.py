@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,7 @@ from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import read
 from validation.cli import photograph, recorded
-from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -26,49 +27,55 @@ commands = commands()
 _MOST_PHOTOGRAPHS = 1000
 
 
-@commands.command("fit")
-def fit_command(
-    scene: SceneName,
-    photographs: Annotated[list[Path], typer.Argument(metavar="PHOTO...", help="PNG, TIFF, JPEG or .npy.")],
+@dataclass(frozen=True)
+class Options:
+    """What a fit is asked for."""
+
+    scene: SceneName
+    photographs: Annotated[list[Path], typer.Argument(metavar="PHOTO...", help="PNG, TIFF, JPEG or .npy.")]
     sensor: Annotated[
         str | None, typer.Option(metavar="P,A", help="Where the search begins; the nearest setting if left out.")
-    ] = None,
-    light: Annotated[str | None, typer.Option(metavar="P,A", help="The same of the free light, or of each.")] = None,
-    free: Annotated[str, typer.Option(metavar="LIST", help="Free besides: focal, k1, with commas between.")] = "",
-    noise: Annotated[str, typer.Option(help="estimated, or given by the scene.")] = "estimated",
-    gamma: recorded.Gamma = None,
-    channel: recorded.Channel = None,
+    ] = None
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="The same of the free light, or of each.")] = None
+    free: Annotated[str, typer.Option(metavar="LIST", help="Free besides: focal, k1, with commas between.")] = ""
+    noise: Annotated[str, typer.Option(help="estimated, or given by the scene.")] = "estimated"
+    gamma: recorded.Gamma = None
+    channel: recorded.Channel = None
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE.toml", help="Write the fitted scene.")
-    ] = None,
+    ] = None
     residuals: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw what the fit leaves of the photographs.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
+    ] = None
+    as_json: Json = False
+
+
+@commands.command("fit")
+@taking(Options)
+def fit_command(given: Options) -> None:
     """Fit a scene to photographs of its part, by maximum likelihood with the image model."""
-    poses = None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
-    if len(photographs) > _MOST_PHOTOGRAPHS:
-        raise InvalidInput(f"PHOTO... must be at most {_MOST_PHOTOGRAPHS} files, got {len(photographs)}")
-    check_file("--output", output, ".toml")
-    check_file("--residuals", residuals, ".png")
-    loaded = scenes.load(scene)
+    poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
+    if len(given.photographs) > _MOST_PHOTOGRAPHS:
+        raise InvalidInput(f"PHOTO... must be at most {_MOST_PHOTOGRAPHS} files, got {len(given.photographs)}")
+    check_file("--output", given.output, ".toml")
+    check_file("--residuals", given.residuals, ".png")
+    loaded = scenes.load(given.scene)
     size = Size.of_camera(loaded.camera)
-    images = [read(path, gamma, channel, size=size) for path in photographs]
+    images = [read(path, given.gamma, given.channel, size=size) for path in given.photographs]
     import measure
 
-    found = measure.fit(loaded, images, *poses, free=tuple(filter(None, free.split(","))), noise=noise)
-    levels = [image.levels for image in images]
-    if output:
+    found = measure.fit(loaded, images, *poses, free=tuple(filter(None, given.free.split(","))), noise=given.noise)
+    if given.output:
         from validation import fitted_scene
 
-        fitted_scene.write(found, scene, output)
-    if residuals:
-        from validation.report import residuals as picture
+        fitted_scene.write(found, given.scene, given.output)
+    if given.residuals:
+        from validation.report import residuals
 
-        picture.draw(found, levels, residuals)
-    if as_json:
-        say({"scene": loaded.name, **facts(found), "fitted": None if output is None else str(output)}, True, "")
+        residuals.draw(found, [image.levels for image in images], given.residuals)
+    if given.as_json:
+        fitted = None if given.output is None else str(given.output)
+        say({"scene": loaded.name, **facts(found), "fitted": fitted}, True, "")
     else:
         console().print(_table(loaded.name, found))
         console().print(_said(found), highlight=False)

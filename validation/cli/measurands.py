@@ -73,18 +73,8 @@ def covariance(found: measure.Measurements) -> list[list[float | None]]:
 def table(rows: list[dict[str, Any]]) -> Table:
     """The same for a terminal."""
     columns = (
-        "name",
-        "kind",
-        "value",
-        "u",
-        "unit",
-        "bias off",
-        "u(bias)",
-        "nominal",
-        "tolerance",
-        "decision",
-        "status",
-    )
+        "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision", "status",
+    )  # fmt: skip
     shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
     for row in rows:
         told = row["sigma"] if row["u"] is None else row["u"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -15,7 +16,7 @@ from scenes.files.image import Size
 from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
-from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say
+from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -28,42 +29,50 @@ commands = commands()
 _MOST, _ALL = 5, 1000  # shapes that are measured
 
 
-@commands.command("measure")
-def measure_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="PNG, TIFF, JPEG or .npy, 8 or 16 bit or float.")],
-    scene: Annotated[
-        str | None, typer.Argument(metavar="[SCENE]", help="Scene that the image shows, if known.")
-    ] = None,
-    sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None,
-    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; tells how bright each face is.")] = None,
-    estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None,
-    threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None,
-    lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None,
-    near: Annotated[
-        str | None, typer.Option(metavar="X,Y", help="The shape at this place of a photograph, px.")
-    ] = None,
-    box: Annotated[str | None, typer.Option(metavar="X0,Y0,X1,Y1", help="Shapes in this box, px.")] = None,
+@dataclass(frozen=True)
+class Options:
+    """What a measurement is asked for."""
+
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="PNG, TIFF, JPEG or .npy, 8 or 16 bit or float.")]
+    scene: Annotated[str | None, typer.Argument(metavar="[SCENE]", help="Scene that the image shows, if known.")] = None
+    sensor: Annotated[str | None, typer.Option(metavar="P,A", help="Sensor pose; needed with SCENE.")] = None
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Light pose; tells how bright each face is.")] = None
+    estimator: Annotated[str | None, typer.Option(help="How; a wrong name lists them all.")] = None
+    threshold: Annotated[float | None, typer.Option(help="Gradient threshold of canny, grey levels a px.")] = None
+    lens: Annotated[Path | None, typer.Option(metavar="TOML", help="Camera: fx, fy, cx, cy, distortion.")] = None
+    near: Annotated[str | None, typer.Option(metavar="X,Y", help="The shape at this place of a photograph, px.")] = None
+    box: Annotated[str | None, typer.Option(metavar="X0,Y0,X1,Y1", help="Shapes in this box, px.")] = None
     corners: Annotated[
         tuple[str, str, str, str] | None,
         typer.Option(metavar="X,Y X,Y X,Y X,Y", help="A quadrilateral whose corners are here, to some 5 px."),
-    ] = None,
+    ] = None
     kind: Annotated[
         str | None, typer.Option(help="quadrilateral, circle, ellipse, tag, chessboard; several with commas.")
-    ] = None,
-    most: Annotated[int | None, typer.Option(help="Shapes to measure, the most prominent first.")] = None,
-    every: Annotated[bool, typer.Option("--all", help="Measure all shapes that are found.")] = False,
+    ] = None
+    most: Annotated[int | None, typer.Option(help="Shapes to measure, the most prominent first.")] = None
+    every: Annotated[bool, typer.Option("--all", help="Measure all shapes that are found.")] = False
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="PNG", help="Draw the photograph with what was found.")
-    ] = None,
+    ] = None
     as_measured: Annotated[
         bool, typer.Option("--as-measured", help="With SCENE: take no bias off, simulate nothing.")
-    ] = False,
-    gamma: recorded.Gamma = None,
-    channel: recorded.Channel = None,
-    bayer: recorded.Bayer = None,
-    mtf: recorded.Mtf = None,
-    as_json: Json = False,
-) -> None:
+    ] = False
+    gamma: recorded.Gamma = None
+    channel: recorded.Channel = None
+    bayer: recorded.Bayer = None
+    mtf: recorded.Mtf = None
+    as_json: Json = False
+
+    @property
+    def of_photographs(self) -> dict[str, Any]:
+        """What is asked of a photograph without a scene alone, by option; None where it is not."""
+        names = ("near", "box", "corners", "kind", "most", "output", "all", "gamma", "channel", "bayer", "mtf")
+        return {f"--{name}": self.every or None if name == "all" else getattr(self, name) for name in names}
+
+
+@commands.command("measure")
+@taking(Options)
+def measure_command(given: Options) -> None:
     """Measure an image: the measurands of a known scene, or else the shapes that it shows.
 
     With a scene and its light the bias is simulated and taken off; what that is not sure of is u_bias. Of a photograph
@@ -72,41 +81,48 @@ def measure_command(
     """
     import measure
 
-    if estimator is not None and estimator not in measure.ESTIMATORS:
-        raise InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {estimator!r}")
-    check_file("--output", output, ".png", ".pdf", ".svg")
-    check_file("--mtf", mtf, ".png")
-    options = {
-        "--near": near, "--box": box, "--corners": corners, "--kind": kind, "--most": most, "--output": output,
-        "--all": every or None, "--gamma": gamma, "--channel": channel, "--bayer": bayer, "--mtf": mtf,
-    }  # fmt: skip
-    if scene is None:
-        if as_measured:
-            raise InvalidInput("--as-measured must be left out without a scene, got it")
-        wanted = _shapes_wanted(options)
-        photo = scenes.photograph.read(file, gamma, channel, bayer)
-        found = measure.photograph(
-            photo, **wanted, estimator=estimator or "arrangement", lens=lens and measure.load_lens(lens)
-        )
-        _say_shapes(file, photo, found, output, mtf, as_json)
-    for option, value in options.items():
+    if given.estimator is not None and given.estimator not in measure.ESTIMATORS:
+        raise InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {given.estimator!r}")
+    check_file("--output", given.output, ".png", ".pdf", ".svg")
+    check_file("--mtf", given.mtf, ".png")
+    if given.scene is None:
+        _measure_photograph(given)
+    _measure_scene(given)
+
+
+def _measure_photograph(given: Options) -> NoReturn:
+    import measure
+
+    if given.as_measured:
+        raise InvalidInput("--as-measured must be left out without a scene, got it")
+    wanted = _shapes_wanted(given)
+    photo = scenes.photograph.read(given.file, given.gamma, given.channel, given.bayer)
+    lens = given.lens and measure.load_lens(given.lens)
+    found = measure.photograph(photo, **wanted, estimator=given.estimator or "arrangement", lens=lens)
+    _say_shapes(given, photo, found)
+
+
+def _measure_scene(given: Options) -> NoReturn:
+    import measure
+
+    for option, value in given.of_photographs.items():
         if value is not None:
             raise InvalidInput(f"{option} must be left out with a scene, got {value}")
-    if sensor is None:
+    if given.sensor is None:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
-    if lens is not None:
-        raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {lens}")
-    poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
+    if given.lens is not None:
+        raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {given.lens}")
+    poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
     from validation import picture_file
 
-    known = scenes.load(scene)
-    picture = picture_file.read(file, Size.of_camera(known.camera))
+    known = scenes.load(given.scene)
+    image = picture_file.read(given.file, Size.of_camera(known.camera))
     shown = scenes.Picture.of(known, *poses)
-    if as_measured or not shown.lights:
-        found = measure.measure(picture, shown, estimator=estimator, threshold=threshold)
+    if given.as_measured or not shown.lights:
+        found = measure.measure(image, shown, estimator=given.estimator, threshold=given.threshold)
     else:
-        found = _corrected(picture, shown, estimator, threshold)
-    _say_measurands(file, found, found.first if known.task is not None else None, as_json)
+        found = _corrected(image, shown, given.estimator, given.threshold)
+    _say_measurands(given.file, found, found.first if known.task is not None else None, given.as_json)
 
 
 def _corrected(
@@ -126,28 +142,24 @@ def _corrected(
         return measure.corrected(plain, kept.correction(picture, method))
 
 
-def _shapes_wanted(options: dict[str, Any]) -> dict[str, Any]:
+def _shapes_wanted(given: Options) -> dict[str, Any]:
     """Which shapes of a photograph are measured, as `measure.photograph` takes it."""
-    corners, kind, most = options["--corners"], options["--kind"], options["--most"]
-    if options["--all"] and most is not None:
-        raise InvalidInput(f"--most must be left out with --all, got {most}")
+    if given.every and given.most is not None:
+        raise InvalidInput(f"--most must be left out with --all, got {given.most}")
     wanted = {
-        "near": photograph.numbers("--near", options["--near"], 2),
-        "box": photograph.numbers("--box", options["--box"], 4),
-        "corners": corners and [photograph.numbers("--corners", corner, 2) for corner in corners],
-        "kinds": None if kind is None else tuple(kind.split(",")),
-        "most": _ALL if options["--all"] else _MOST if most is None else most,
+        "near": photograph.numbers("--near", given.near, 2),
+        "box": photograph.numbers("--box", given.box, 4),
+        "corners": given.corners and [photograph.numbers("--corners", corner, 2) for corner in given.corners],
+        "kinds": None if given.kind is None else tuple(given.kind.split(",")),
+        "most": _ALL if given.every else _MOST if given.most is None else given.most,
     }
-    if options["--mtf"] is not None:
+    if given.mtf is not None:
         recorded.check_mtf(wanted["kinds"])
     return wanted
 
 
 def _say_measurands(
-    file: Path,
-    found: measure.Measurements,
-    distance: measure.Measurement | None,
-    as_json: bool,
+    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)
@@ -166,17 +178,15 @@ def _say_measurands(
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 
-def _say_shapes(
-    file: Path, photo: Photograph, found: measure.Shapes, output: Path | None, mtf: Path | None, as_json: bool
-) -> NoReturn:
+def _say_shapes(given: Options, photo: Photograph, found: measure.Shapes) -> NoReturn:
     """The shapes of a photograph, drawn if wanted; exit status 1 where nothing could be measured."""
-    sharp = recorded.sharpness(photo, found, mtf) if mtf is not None else {}
-    if output is not None:
+    sharp = recorded.sharpness(photo, found, given.mtf) if given.mtf is not None else {}
+    if given.output is not None:
         from validation.report import overlay
 
-        overlay.write(output, photo.levels, found)
-    if as_json:
-        say({"file": str(file), **recorded.facts(photo), **photograph.facts(found), **sharp}, True, "")
+        overlay.write(given.output, photo.levels, found)
+    if given.as_json:
+        say({"file": str(given.file), **recorded.facts(photo), **photograph.facts(found), **sharp}, True, "")
     else:
         if found.candidates:
             console().print(photograph.table(found), highlight=False)

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from scenes import InvalidInput
+from scenes.results import picked
 from scenes.status import legend
 from validation.cli import recorded
 from validation.cli.measurands import digits
@@ -17,6 +18,9 @@ from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
+
+
+_STANDING_OUT = ("score", "support", "contrast")
 
 
 def numbers(option: str, text: str | None, count: int) -> tuple[float, ...] | None:
@@ -43,7 +47,8 @@ def facts(found: measure.Shapes) -> dict[str, Any]:
     return plain({
         "found": [_facts(one) for one in found.found],
         "candidates": [
-            {"kind": one.kind, "outline": one.outline.tolist(), **_standing_out(one)} for one in found.candidates
+            {"kind": one.kind, "outline": one.outline.tolist(), **picked(one, *_STANDING_OUT)}
+            for one in found.candidates
         ],
     })  # fmt: skip
 
@@ -64,11 +69,9 @@ def _facts(one: measure.MeasuredShape) -> dict[str, Any]:
         "covariance": one.covariance,
         "quantities": [vars(quantity) for quantity in one.quantities],
         "residual_px": [side.rms for side in one.residuals],
-        "p_value": one.p_value,
-        "noise": one.noise,
-        "blur_px": one.blur_px,
+        **picked(one, "p_value", "noise", "blur_px"),
         **({} if one.quadrilateral is None else recorded.of_sides(one.quadrilateral)),
-        **({} if one.candidate is None else _standing_out(one.candidate)),
+        **({} if one.candidate is None else picked(one.candidate, *_STANDING_OUT)),
     }
 
 
@@ -76,10 +79,6 @@ def _sides(one: measure.MeasuredShape) -> list[dict[str, Any]]:
     sides = [quantity for quantity in one.quantities if quantity.name.startswith("side")]
     rms: list[float | None] = [side.rms for side in one.residuals] or [None] * len(sides)
     return [vars(side) | {"residual_px": each} for side, each in zip(sides, rms, strict=True)]
-
-
-def _standing_out(one: measure.Candidate) -> dict[str, float]:
-    return {"score": one.score, "support": one.support, "contrast": one.contrast}
 
 
 def text(found: measure.Shapes) -> str:

@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 import scenes
+from scenes.results import picked
 from scenes.status import is_trusted
 from validation.cli.common import progress, say
 from validation.report.terminal import console
@@ -72,12 +73,7 @@ def _rows(placed: Placed) -> list[dict]:
     rows = zip(found.measurands, found.prediction.measurands, found.statuses, strict=True)
     return [
         {
-            "name": each.name,
-            "unit": each.unit,
-            "repeatability": each.repeatability,
-            "u": each.u,
-            "U": each.U,
-            "k": each.k,
+            **picked(each, "name", "unit", "repeatability", "u", "U", "k"),
             "ratio": each.U / told.tolerance.half if told.tolerance is not None and is_trusted(status) else None,
             "status": status,
         }

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 import scenes
+from scenes.results import picked
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
@@ -16,35 +17,25 @@ if TYPE_CHECKING:
 
 def facts(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust | None, seconds: float) -> dict:
     """The plan for JSON."""
-
     p = found.prediction
     return plain({
         "scene": found.scene.name,
-        "objective": found.objective,
-        "model": found.model,
+        **picked(found, "objective", "model"),
         "sensor": list(found.sensor),
         "light": scenes.pairs(found.light),
-        "steady": found.steady,
-        "shares": found.shares,
-        "alone": found.alone,
+        **picked(found, "steady", "shares", "alone"),
         "edges": list(found.scene.required),
-        "over": found.over,
-        "variance": found.variance,
-        "limiting": found.limiting,
+        **picked(found, "over", "variance", "limiting"),
         "worst_ratio": p.worst_ratio,
         "measurands": [_measurand(each) for each in p.measurands],
-        "variance_object": p.variance_object,
-        "variance_image": p.variance_image,
-        "status": p.status,
+        **picked(p, "variance_object", "variance_image", "status"),
         "grid": {
             "sensor": list(found.grid_sensor),
             "light": scenes.pairs(found.grid_light),
             "variance": found.grid_variance,
         },
         "alternating": _alternating(found),
-        "guarantee": found.guarantee,
-        "pairs": found.pairs,
-        "evaluated": found.evaluated,
+        **picked(found, "guarantee", "pairs", "evaluated"),
         "candidates": [_with_poses(candidate) for candidate in found.candidates],
         "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
         **_checked(checked),
@@ -57,9 +48,7 @@ def _measurand(each: planner.Forecast) -> dict:
     zone = each.tolerance
     sigma, sigma_image = math.sqrt(each.variance_object), math.sqrt(each.variance_image)
     return {
-        "name": each.name,
-        "kind": each.kind,
-        "unit": each.unit,
+        **picked(each, "name", "kind", "unit"),
         "value": each.value_object,
         "nominal": each.nominal,
         "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
@@ -119,14 +108,8 @@ def _setting(row: CheckedSetting) -> dict:
     return {
         "sensor": list(row.sensor),
         "light": scenes.pairs(row.light),
-        "edges": row.edges,
-        "calibrated": row.calibrated,
-        "propagated": row.propagated,
-        "with_bias": row.with_bias,
-        "ratio": row.ratio,
-        "status": row.status,
+        **picked(row, "edges", "calibrated", "propagated", "with_bias", "ratio", "status"),
         "reason": row.reason or None,
         "without_formula": list(row.without_formula),
-        "rank_before": row.rank_before,
-        "rank_after": row.rank_after,
+        **picked(row, "rank_before", "rank_after"),
     }

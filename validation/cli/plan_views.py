@@ -11,12 +11,14 @@ import typer
 
 import scenes
 from planner.views import MOST_VIEWS
+from scenes.results import picked
 from validation.cli.common import check_left_out, progress, say
 from validation.report.terminal import console
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import planner
+    from validation.cli.plan import Options
     from validation.views_check import ViewsCheck
 
 
@@ -31,21 +33,19 @@ def check_options(context: typer.Context, views: int | None, share: str | None) 
     check_left_out(context, "--views", "--search", "--edges", "--start", "--tolerance", "--map", "--vary", "--hold")
 
 
-def run(
-    scene: scenes.Scene, count: int, objective: str, how: dict, checked: bool, out: Path | None, as_json: bool
-) -> None:
+def run(scene: scenes.Scene, given: Options, how: dict, *, checked: bool) -> None:
     """Plan, check by rendering, show; the command ends with 1 if the pictures contradict the plan."""
     import planner
 
-    began = time.perf_counter()
+    began, count = time.perf_counter(), given.views
     with progress(
         f"{scene.name}: searching 1 to {count} pictures that measure best together", "steps", at_once=True
     ) as shown:
-        found = planner.plan_views(scene, count, objective, **how, report=shown)
+        found = planner.plan_views(scene, count, given.objective, **how, share=given.views_share, report=shown)
     seconds = time.perf_counter() - began
     check = _check(found) if checked else None
-    pictures = _pictures(found, out) if out else []
-    if as_json:
+    pictures = _pictures(found, given.out) if given.out else []
+    if given.as_json:
         say(facts(found, check, pictures, seconds), True, "")
     else:
         from validation.report import views_table
@@ -81,14 +81,9 @@ def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], 
     return plain({
         "scene": found.scene.name,
         "objective": "object",
-        "over": found.over,
-        "model": found.model,
-        "share": found.share,
+        **picked(found, "over", "model", "share"),
         "views": [_set(each) for each in found.sets],
-        "most_over_repeats": found.most_over_repeats,
-        "pairs": found.pairs,
-        "looked": found.looked,
-        "guarantee": found.guarantee,
+        **picked(found, "most_over_repeats", "pairs", "looked", "guarantee"),
         "check": None if check is None else _checked(check),
         "pictures": pictures,
         "seconds": seconds,
@@ -100,41 +95,27 @@ def _set(each: planner.ViewSet) -> dict:
     return {
         "count": len(each.views),
         "poses": [{"sensor": list(view.sensor), "light": list(view.light)} for view in each.views],
-        "minimised": each.minimised,
-        "worst_ratio": each.worst_ratio,
-        "limiting": each.limiting,
+        **picked(each, "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),
-        "over_one": each.over_one,
-        "over_repeats": each.over_repeats,
-        "exhaustive": each.exhaustive,
-        "gap": each.gap,
-        "bound": each.bound,
+        **picked(each, "over_one", "over_repeats", "exhaustive", "gap", "bound"),
         "measurands": [_measurand(each, m) for m in range(len(first))],
-        "covariance": both.covariance,
-        "covariance_least_squares": both.covariance_least_squares,
+        **picked(both, "covariance", "covariance_least_squares"),
     }
 
 
 def _measurand(each: planner.ViewSet, m: int) -> dict:
-    both, forecast = each.combination, each.views[0].prediction.measurands[m]
+    both, alone = each.combination, [view.prediction.measurands[m] for view in each.views]
     return {
-        "name": forecast.name,
-        "kind": forecast.kind,
-        "unit": forecast.unit,
+        **picked(alone[0], "name", "kind", "unit"),
         "sigma": math.sqrt(both.covariance[m, m]),
         "sigma_least_squares": math.sqrt(both.covariance_least_squares[m, m]),
         "bias": both.bias[m],
         "status": both.status[m],
         "pictures": [v + 1 for v in range(len(each.views)) if both.used[v, m]],
         "weights": both.weights[:, m].tolist(),
-        "single": [_alone(view.prediction.measurands[m]) for view in each.views],
+        "single": [{"sigma": math.sqrt(one.variance_object), "status": one.status} for one in alone],
     }
-
-
-def _alone(forecast: planner.Forecast) -> dict:
-    """What one picture tells."""
-    return {"sigma": math.sqrt(forecast.variance_object), "status": forecast.status}
 
 
 def _checked(check: ViewsCheck) -> dict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -61,16 +62,21 @@ def predict_command(
         say({"scene": loaded.name, "model": model, "rendered": render, "settings": rows}, True, "")
     else:
         console().print(_table(loaded, model, rows, render))
-        console().print(f" {PLACES} {_SIMULATED if render else _TERMS}", highlight=False)
-        every = [each for row in rows for each in row["measurands"]]
-        for line in legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every]):
+        edges = [] if render else doubtful_edges(found)
+        for line in _below(rows, edges, _SIMULATED if render else _TERMS, offers=not render and model == "calibrated"):
             console().print(f" {line}", highlight=False)
-        for line in doubtful_edges(found) if not render else ():
-            console().print(f" {line}", highlight=False)
-        if not render and model == "calibrated" and any(each["status"] == CLUTTER for each in every):
-            console().print(f" {_RENDER}", highlight=False)
     good = all(each["variance"] is not None for row in rows for each in row["measurands"])
     raise typer.Exit(0 if good else 1)
+
+
+def _below(rows: list[dict[str, Any]], edges: list[str], terms: str, offers: bool) -> Iterator[str]:
+    """What stands below the table; ``offers`` to simulate, where that would tell more."""
+    every = [each for row in rows for each in row["measurands"]]
+    yield f"{PLACES} {terms}"
+    yield from legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every])
+    yield from edges
+    if offers and any(each["status"] == CLUTTER for each in every):
+        yield _RENDER
 
 
 def doubtful_edges(found: list[Prediction]) -> list[str]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -22,49 +23,46 @@ from validation.cli.common import (
     parse_pose,
     parse_poses,
     say,
+    taking,
     tolerance,
 )
 from validation.cli.outputs import check_file
 
-if TYPE_CHECKING:
-    pass
-
 commands = commands()
 
 
+@dataclass(frozen=True)
+class Options:
+    """What a render is asked for."""
+
+    scene: SceneName
+    sensor: Sensor
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")]
+    light: LightPose = None
+    noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None
+    effects: Effects = "auto"
+    bias_px: LeaveOutPx = None
+    variance: LeaveOutVariance = None
+    as_json: Json = False
+
+
 @commands.command("render")
-def render_command(
-    scene: SceneName,
-    sensor: Sensor,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help=".png, .tif (float) or .npy")],
-    light: LightPose = None,
-    noise_seed: Annotated[int | None, typer.Option(help="Add the sensor's noise, from this seed.")] = None,
-    effects: Effects = "auto",
-    bias_px: LeaveOutPx = None,
-    variance: LeaveOutVariance = None,
-    as_json: Json = False,
-) -> None:
+@taking(Options)
+def render_command(given: Options) -> None:
     """Render one image of a scene."""
-    poses = parse_pose("--sensor", sensor), parse_poses("--light", light)
-    check_seed(noise_seed, "--noise-seed")
-    check_file("--output", output, ".png", ".tif", ".tiff", ".npy")
-    loaded = scenes.load(scene)
+    poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
+    check_seed(given.noise_seed, "--noise-seed")
+    check_file("--output", given.output, ".png", ".tif", ".tiff", ".npy")
+    loaded = scenes.load(given.scene)
     import render
     from validation import picture_file
 
-    image = render.image(loaded, *poses, effects=effects, tolerance=tolerance(bias_px, variance))
-    if noise_seed is not None:
-        image = render.expose(image, loaded.noise, np.random.default_rng(noise_seed), 1)[0]
-    picture_file.write(output, image)
-    facts = {
-        "file": str(output),
-        "width": image.shape[1],
-        "height": image.shape[0],
-        "least": float(image.min()),
-        "greatest": float(image.max()),
-    }
-    say(
-        facts,
-        as_json,
-        f"{output}: {image.shape[1]} x {image.shape[0]} px, grey levels {image.min():.1f} to {image.max():.1f}",
-    )
+    limits = tolerance(given.bias_px, given.variance)
+    image = render.image(loaded, *poses, effects=given.effects, tolerance=limits)
+    if given.noise_seed is not None:
+        image = render.expose(image, loaded.noise, np.random.default_rng(given.noise_seed), 1)[0]
+    picture_file.write(given.output, image)
+    (height, width), least, greatest = image.shape, float(image.min()), float(image.max())
+    facts = {"file": str(given.output), "width": width, "height": height, "least": least, "greatest": greatest}
+    text = f"{given.output}: {width} x {height} px, grey levels {least:.1f} to {greatest:.1f}"
+    say(facts, given.as_json, text)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import scenes
+from scenes.results import picked
 from scenes.status import legend
 from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
 from validation.cli.outputs import check_file
@@ -131,13 +132,7 @@ def scenes_command(as_json: Json = False) -> None:
     """List the bundled scenes."""
     loaded = [scenes.load(name) for name in scenes.names()]
     facts = [
-        {
-            "name": s.name,
-            "title": s.title,
-            "units": s.units,
-            "settings": len(s.settings),
-            "file": str(scenes.find(s.name)),
-        }
+        {**picked(s, "name", "title", "units"), "settings": len(s.settings), "file": str(scenes.find(s.name))}
         for s in loaded
     ]
     lines = (f"{f['name']:<14} {f['settings']:>3} settings, {f['units']:<4} {f['title']}" for f in facts)

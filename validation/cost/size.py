@@ -31,20 +31,10 @@ def size_parameter(case: Case, variant: str, seed: int, watch: Watch = Watch()) 
     if len(usable) < 3:
         raise InvalidInput(f"size must be of an image below {_LARGEST / 4 / 1e6:.1f} megapixels, got a larger one")
     for number in watch.samples(len(usable), least=3):
-        factor = usable[number]
-        scene = _scaled(case.scene, factor)
-        sized = Case(case.index, scene, case.setting)
-        began = time.perf_counter()
-        image = render.image(scene, case.setting.sensor, case.setting.light, variant=variant)
-        rendered = time.perf_counter() - began
-        found = measure.propagate(image, scene, case.setting.sensor)
-        work.measure_chunk(sized, image, seed, 0, 2)
-        began = time.perf_counter()
-        work.measure_chunk(sized, image, seed, 0, _IMAGES)
-        seconds = (time.perf_counter() - began) / _IMAGES
+        scene = _scaled(case.scene, usable[number])
+        rendered, seconds, relative = _tried(Case(case.index, scene, case.setting), variant, seed)
         if not rows and 4 * (rendered + seconds * _IMAGES) > watch.left:  # of the next alone
             raise InvalidInput(f"size must leave time for a larger image, got {rendered:.0f} s for the smallest")
-        relative = float(np.sqrt(found.variance_px2)) / found.value_px
         rows.append((scene.camera.width, scene.camera.height, rendered, 1e3 * seconds, relative))
     width, height, rendered, image, error = np.array(rows).T
     fits = (
@@ -65,6 +55,19 @@ def size_parameter(case: Case, variant: str, seed: int, watch: Watch = Watch()) 
         "edges (1/2), but every image is copied whole (1). An edge has points in proportion to its length, hence -3/2 "
         "for the relative error; trimmed ends weigh more in small images.",
     )
+
+
+def _tried(case: Case, variant: str, seed: int) -> tuple[float, float, float]:
+    """Seconds of a render and of a noisy image, and relative error of the distance."""
+    began = time.perf_counter()
+    image = render.image(case.scene, case.setting.sensor, case.setting.light, variant=variant)
+    rendered = time.perf_counter() - began
+    found = measure.propagate(image, case.scene, case.setting.sensor)
+    work.measure_chunk(case, image, seed, 0, 2)
+    began = time.perf_counter()
+    work.measure_chunk(case, image, seed, 0, _IMAGES)
+    seconds = (time.perf_counter() - began) / _IMAGES
+    return rendered, seconds, float(np.sqrt(found.variance_px2)) / found.value_px
 
 
 def _scaled(scene: Scene, factor: float) -> Scene:

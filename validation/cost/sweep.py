@@ -83,25 +83,22 @@ def sweep(
     variant, spread = variants.choose(), spread_cases(campaign, 2 * _SETTINGS)
     cases = spread[1::2] or spread
     images = [render.image(c.scene, c.setting.sensor, c.setting.light, variant=variant) for c in cases]
-    makers: dict[str, Callable[[Watch], Parameter]] = {
-        "images": lambda watch: images_parameter(cases[0], images[0], seed, watch),
-        "estimators": lambda watch: estimators_parameter(cases, images, seed, watch),
-        "rays": lambda watch: rays_parameter(cases, variant, watch),
-        "size": lambda watch: size_parameter(cases[0], variant, seed, watch),
-        "effects": lambda watch: effects_parameter(cases[0], variant, watch),
-        "grid": lambda watch: grid_parameter(campaign.scenes[0], watch),
-    }
-    quick = {
+    wanted: dict[str, Callable[[], Parameter]] = {
         "scaling": lambda: scaling_parameter(model),
         "pareto": lambda: pareto_parameter(model),
         "points": lambda: points_parameter(cases[0]),
+        "images": lambda: images_parameter(cases[0], images[0], seed, share()),
+        "estimators": lambda: estimators_parameter(cases, images, seed, share()),
+        "rays": lambda: rays_parameter(cases, variant, share()),
+        "size": lambda: size_parameter(cases[0], variant, seed, share()),
+        "effects": lambda: effects_parameter(cases[0], variant, share()),
+        "grid": lambda: grid_parameter(campaign.scenes[0], share()),
     }
     parameters, omitted = [], {}
-    for done, name in enumerate((*quick, *makers), 1):
-        step = partial(tell, name, done, _STEPS)
+    for done, (name, make) in enumerate(wanted.items(), 1):
+        share = partial(_share, whole, _STEPS - done, partial(tell, name, done, _STEPS))
         try:
-            made = quick[name]() if name in quick else makers[name](_share(whole, _STEPS - done, step))
-            parameters.append(made)
+            parameters.append(make())
         except InvalidInput as error:
             omitted[name] = str(error)
     tell("done", _STEPS, _STEPS)

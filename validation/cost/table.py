@@ -33,7 +33,8 @@ def write_csv(found: Sweep, directory: Path) -> list[Path]:
 
 def _table(parameter: Parameter) -> Table:
     rows = [row for row in parameter.rows if "front" not in parameter.columns or row[-1]]  # the others are in the CSV
-    return table(f"\n{parameter.title}", *parameter.columns, rows=[map(_cell, row) for row in rows], wrap=True)
+    cells = [[f"{value:.3g}" if isinstance(value, float) else str(value) for value in row] for row in rows]
+    return table(f"\n{parameter.title}", *parameter.columns, rows=cells, wrap=True)
 
 
 def _below(parameter: Parameter) -> Text:
@@ -42,7 +43,3 @@ def _below(parameter: Parameter) -> Text:
         for fit in parameter.fits
     ]
     return Text("\n".join([*lines, *([f"  {parameter.note}"] if parameter.note else [])]))
-
-
-def _cell(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)

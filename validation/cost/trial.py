@@ -186,8 +186,8 @@ class _Tried:
 
     def _image(self, sensor: Pose, quality: Quality) -> np.ndarray:
         self.tell()
-        how, light = self.how, self.case.setting.light
-        return render.image(self.case.scene, sensor, light, quality, self.variant, how.effects, how.tolerance)
+        how = vars(self.how) | {"quality": quality}
+        return render.image(self.case.scene, sensor, self.case.setting.light, variant=self.variant, **how)
 
     def _propagate(self, image: np.ndarray, sensor: Pose) -> measure.Propagated:
         return measure.propagate(image, self.case.scene, sensor)

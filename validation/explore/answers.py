@@ -15,6 +15,7 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.prediction import feature_covariances, glanced
 from scenes import InvalidInput, Picture, Scene
+from scenes.results import finite, picked
 from scenes.status import GLANCED, MEANINGS, MEASURED, REMEDIES, is_trusted
 from validation.explore.state import MOST_VIEWS, State
 
@@ -121,9 +122,7 @@ def _forecast(each: planner.Forecast, together: planner.Combination | None, m: i
         sigma = finite(math.sqrt(together.variances[m]))
         more = {"together": {"sigma": sigma, "status": together.status[m], "views": int(together.used[:, m].sum())}}
     return more | {
-        "name": each.name,
-        "kind": each.kind,
-        "unit": each.unit,
+        **picked(each, "name", "kind", "unit"),
         "value": finite(each.value_object),
         "nominal": finite(each.nominal),
         "sigma": finite(math.sqrt(each.variance_object)),
@@ -148,8 +147,3 @@ def _doubt(status: str) -> str:
     if status not in MEASURED:
         return "not measured"
     return "" if is_trusted(status) or status == GLANCED else "not proven"
-
-
-def finite(value: float | None) -> float | None:
-    """The number, or None where it is not finite."""
-    return float(value) if value is not None and math.isfinite(value) else None

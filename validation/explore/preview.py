@@ -17,9 +17,10 @@ from imaging.light.appearance import face_signal, seen_by_rays
 from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced
-from scenes import Picture, Scene
+from scenes import Circle, Picture, Scene
+from scenes.results import finite
 from scenes.status import GLANCED, OK
-from validation.explore.answers import Answer, finite
+from validation.explore.answers import Answer
 
 WIDE = 420  # px, at most, of what is sent
 _MARGIN = 0.12  # of the object's image, around it
@@ -150,7 +151,7 @@ def overlay(scene: Scene, picture: Picture, told: Answer) -> dict[str, Any]:
         if np.isfinite(view.recorded[e]).all()
     ]
     for name in told.prediction.measurands and _circles(scene):
-        points = project(_rim(scene, name), pose, scene.camera)
+        points = project(ring(scene.solid.circle(name), _CHORDS), pose, scene.camera)
         if np.isfinite(points).all():
             lines.append({"name": name, "status": OK if told.closely else GLANCED, "points": points.round(2).tolist()})
     corners = [
@@ -166,13 +167,11 @@ def _circles(scene: Scene) -> list[str]:
     return [circle.name for circle in scene.solid.rims if circle.name in needed]
 
 
-def _rim(scene: Scene, name: str) -> np.ndarray:
-    """Points around a circle, shape (n, 3)."""
-    circle = scene.solid.circle(name)
+def ring(circle: Circle, chords: int) -> np.ndarray:
+    """The ends of so many chords of a circle or an arc, shape (chords + 1, 3)."""
     if circle.ends is not None:
-        return circle.around(_CHORDS + 1)
-    helper = np.eye(3)[np.argmin(np.abs(circle.axis))]
-    one = np.cross(circle.axis, helper)
+        return circle.around(chords + 1)
+    one = np.cross(circle.axis, np.eye(3)[np.argmin(np.abs(np.round(circle.axis, 9)))])
     one /= np.linalg.norm(one)
-    turn = np.linspace(0, 2 * np.pi, _CHORDS + 1)[:, None]
+    turn = np.linspace(0, 2 * np.pi, chords + 1)[:, None]
     return circle.centre + circle.radius * (np.cos(turn) * one + np.sin(turn) * np.cross(circle.axis, one))

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from scenes import Scene
+from scenes.results import finite
 from scenes.status import doubt
 from validation.batch.campaign import Case
 from validation.batch.measurands import column
 from validation.batch.work import Clean, Task, TaskResult, methods
 from validation.defaults import DEFAULT_SEED
-from validation.explore.answers import finite
 from validation.explore.state import State
 from validation.remeasured import Sample, batches
 

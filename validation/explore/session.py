@@ -17,6 +17,7 @@ import numpy as np
 
 from imaging.light.emitters import reach_of
 from scenes import InvalidInput, Scene
+from scenes.results import picked
 from validation.batch import pool
 from validation.batch.work import Task, TaskResult
 from validation.explore import answers, best, budgets, effects, preview, prove, save, sphere
@@ -258,7 +259,7 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
     size = reach_of(scene)
     needed = {name for quantity in scene.quantities for name in quantity.edges}
     edges = [
-        {"name": edge.name, "ends": _rounded((solid.vertices[list(edge.ends)] - middle) / size)}
+        {"name": edge.name, "ends": ((solid.vertices[list(edge.ends)] - middle) / size).round(4).tolist()}
         for edge in solid.edges
         if edge.name in needed
     ]
@@ -266,9 +267,7 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
     step = float(np.abs(corners).max()) / _MOST_STEPS
     return {
         "type": "scene",
-        "name": scene.name,
-        "title": scene.title,
-        "units": scene.units,
+        **picked(scene, "name", "title", "units"),
         "corners": _packed(corners / step, "<i2"),
         "step": step,
         "normals": _packed(127 * bodies.normals[bodies.triangle_faces], "i1"),
@@ -276,7 +275,7 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
         "lights": [scene.lights[i].kind for i in scene.free],
         "camera": [scene.camera.width, scene.camera.height],
         "measurands": [
-            {"name": quantity.name, "kind": quantity.kind, "tolerance": quantity.tolerance is not None}
+            {**picked(quantity, "name", "kind"), "tolerance": quantity.tolerance is not None}
             for quantity in scene.quantities
         ],
         "views": MOST_VIEWS,
@@ -289,7 +288,3 @@ def scene_message(scene: Scene, state: State) -> dict[str, Any]:
 def _packed(values: np.ndarray, kind: str) -> str:
     """Rounded to integers of that kind, base64."""
     return base64.b64encode(np.rint(values).astype(kind).tobytes()).decode()
-
-
-def _rounded(values: np.ndarray) -> list:
-    return np.round(values, 4).tolist()

@@ -52,7 +52,11 @@ def paper_in(kind: type, scene: Scene, sensors: np.ndarray, lights: np.ndarray) 
             for edge, other in zip(edges, normal[::-1], strict=True):
                 response = (pull[:, 0] * other[:, 1] - pull[:, 1] * other[:, 0]) / sine
                 step = np.abs(level[:, edge.faces[0]] - level[:, edge.faces[1]])
-                total = total + response**2 * _line(kind, scene, vertices, edge, lamp, step, image, at)
+                start, stop = vertices[list(edge.ends)]
+                points = start + np.linspace(0, 1, _POINTS, dtype=kind)[:, None] * (stop - start)
+                distance2 = ((lamp[:, None] - points) ** 2).sum(-1)
+                weights = step[:, None] ** 2 / distance2 / kind(8.697 * scene.noise.sigma**2)
+                total = total + response**2 * _line(weights, image(points), at)
         return np.where(np.isfinite(total), total, kind(np.inf)).astype(kind)
 
 
@@ -70,13 +74,9 @@ def _normal(along: np.ndarray) -> np.ndarray:
     return np.stack([-unit[:, 1], unit[:, 0]], -1)
 
 
-def _line(kind, scene, vertices, edge, lamp, step, image, at) -> np.ndarray:
-    """Variance of a line's offset at its corner, px^2, shape (n,)."""
-    start, stop = vertices[list(edge.ends)]
-    points = start + np.linspace(0, 1, _POINTS, dtype=kind)[:, None] * (stop - start)
-    distance2 = ((lamp[:, None] - points) ** 2).sum(-1)
-    weights = step[:, None] ** 2 / distance2 / kind(8.697 * scene.noise.sigma**2)
-    total, places = weights.sum(-1), image(points)
+def _line(weights: np.ndarray, places: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Variance of a line's offset at its corner, px^2, (n,), from its points' weights (n, p) and places (n, p, 2)."""
+    total, kind = weights.sum(-1), weights.dtype.type
     mean = (weights[..., None] * places).sum(1) / total[:, None]
     away = places - mean[:, None]
     spread = (weights * (away**2).sum(-1)).sum(-1) / total * kind(_POINTS / (_POINTS - 1))

@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 
@@ -16,7 +12,7 @@ from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.improve import improvements
 from scenes.status import is_trusted
-from validation.report.canvas import TEXT, WIDTH, inline, save
+from validation.report.canvas import TEXT, WIDTH, inline, plt, save
 from validation.report.cells import name as shown_name
 from validation.report.cells import percent
 from validation.report.requirements import HALF

@@ -1,4 +1,4 @@
-"""Uncertainty budgets for a terminal: one table a measurand, and the sentence that is signed."""
+"""Uncertainty budgets in words: one table a measurand, for terminal and page, and the sentence that is signed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from rich.table import Table
 
 from planner.budgeting.budgets import SceneBudget
-from planner.uncertainty.budget import Budget
+from planner.uncertainty.budget import Budget, Contribution
 from planner.uncertainty.conformity import COVERAGE
 from scenes.status import doubt, is_trusted
 from validation.report import cells
@@ -23,20 +23,33 @@ _LEAST = 5e-4  # of the variance: sources below are one row
 
 
 def table(budget: Budget) -> Table:
-    """All contributions to one measurand, the largest first."""
+    """All contributions to one measurand, the largest first; the small ones together."""
     shown = cells.table(f"{budget.name} [{budget.unit}]", *COLUMNS, words=("source", "type"))
     rows = sorted(budget.contributions, key=lambda row: -row.share)
-    for row in rows:
-        if row.share < _LEAST:
-            break
-        dof = "-" if math.isinf(row.dof) else f"{row.dof:.0f}"
-        numbers = f"{row.u:.3g}", cells.number(row.sensitivity), f"{row.contribution:.3g}", f"{100 * row.share:.1f} %"
-        shown.add_row(row.source, *numbers, row.type, dof)
-    if rest := [row for row in rows if row.share < _LEAST]:
+    rest = [row for row in rows if row.share < _LEAST]
+    for row in rows[: len(rows) - len(rest)]:
+        shown.add_row(*_row(row, cells.number(row.sensitivity), "-"))
+    if rest:
         together = math.hypot(*(row.contribution for row in rest))
         share = sum(row.share for row in rest)
         shown.add_row(f"others ({len(rest)})", "", "", f"{together:.3g}", f"{100 * share:.2f} %", "", "")
     return shown
+
+
+def lines(budget: Budget) -> list[list[str]]:
+    """The same for a page, where nothing is left out."""
+    return [_row(row, f"{row.sensitivity:.3g}", "") for row in sorted(budget.contributions, key=lambda row: -row.share)]
+
+
+def _row(row: Contribution, sensitivity: str, infinite: str) -> list[str]:
+    dof = infinite if math.isinf(row.dof) else f"{row.dof:.0f}"
+    share = f"{100 * row.share:.1f} %"
+    return [row.source, f"{row.u:.3g}", sensitivity, f"{row.contribution:.3g}", share, row.type, dof]
+
+
+def note(found: SceneBudget, m: int) -> str:
+    """Sum and sentence of the m-th measurand."""
+    return f"{summary(found.measurands[m])}. {signed(found, m)}."
 
 
 def summary(budget: Budget) -> str:

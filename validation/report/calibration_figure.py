@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 
 from measure.calibration import Calibration
-from validation.report.canvas import WIDTH, legend_below, save
+from validation.report.canvas import WIDTH, legend_below, plt, save
 
 _MARKS = "os^vDP"  # told apart in grey as well
 

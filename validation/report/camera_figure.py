@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
+from validation.report.canvas import plt
 
 _LENGTH = 0.02  # of the image's width: the root mean square arrow
 _MOST_NAMED = 10  # boards in the legend

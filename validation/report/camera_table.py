@@ -13,6 +13,7 @@ import scenes
 from measure.boards.camera import CameraCalibration
 from measure.goodness import WORST
 from scenes import InvalidInput
+from scenes.results import picked
 from scenes.status import legend
 from validation.boards import Boards
 from validation.report import cells
@@ -112,7 +113,8 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
         )
     lens = found.lens
     off = lens.cx - (width - 1) / 2, lens.cy - (height - 1) / 2
-    given = json.dumps(beside.name) if beside else _inline(_covariance(found))
+    told = ", ".join(f"{key} = {json.dumps(value)}" for key, value in _covariance(found).items())
+    given = json.dumps(beside.name) if beside else f"{{ {told} }}"
     return "\n".join([
         "[camera]",
         f"focal_px = {float(np.sqrt(lens.fx * lens.fy))!r}  # fx {lens.fx:.3f}, fy {lens.fy:.3f}",
@@ -131,20 +133,13 @@ def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
         "status": found.status,
         "image": list(found.image_shape[::-1]),
         "units": units,
-        "lens": {
-            **{name: getattr(lens, name) for name in ("fx", "fy", "cx", "cy")},
-            "distortion": list(lens.distortion),
-        },
+        "lens": {**picked(lens, "fx", "fy", "cx", "cy"), "distortion": list(lens.distortion)},
         "names": list(found.names),
         "values": found.values.tolist(),
         "sd": found.sd.tolist(),
         "covariance": found.covariance.tolist(),
         "correlation": found.correlation.tolist(),
-        "rms_px": found.rms_px,
-        "chi_square": found.chi_square,
-        "freedom": found.freedom,
-        "p_value": found.p_value,
-        "dispersion": found.dispersion,
+        **picked(found, "rms_px", "chi_square", "freedom", "p_value", "dispersion"),
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }
@@ -181,7 +176,3 @@ def _covariance(found: CameraCalibration) -> dict[str, Any]:
         raise InvalidInput("BOARD must determine a camera, got boards that leave its covariance infinite")
     told = found.for_budget
     return {"names": list(told.names), "matrix": [list(row) for row in told.matrix]}
-
-
-def _inline(covariance: dict[str, Any]) -> str:
-    return f"{{ names = {json.dumps(covariance['names'])}, matrix = {json.dumps(covariance['matrix'])} }}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+import matplotlib.pyplot as plt  # what draws all of them: to files, without a display
 from markupsafe import Markup, escape
 from matplotlib.text import Text
 

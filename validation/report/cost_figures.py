@@ -5,15 +5,11 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 
 from validation.cost.parameter import Parameter
 from validation.cost.sweep import Sweep
-from validation.report.canvas import TEXT, WIDTH, legend_below, save
+from validation.report.canvas import TEXT, WIDTH, legend_below, plt, save
 
 
 def draw(found: Sweep, directory: Path) -> list[Path]:

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from render.phenomena import Decision, Effect
 from scenes import pairs
+from scenes.results import picked
 from validation.effects_check import RENDERED, Switched
 from validation.report import cells
 from validation.strict_json import plain
@@ -30,12 +31,10 @@ def fact(decision: Decision) -> dict:
     effect, (bias, change) = decision.effect, decision.influence
     return {
         "name": effect.name,
-        "on": decision.on,
-        "reason": decision.reason,
+        **picked(decision, "on", "reason"),
         "bias_px": plain(bias),
         "variance": plain(change),
-        "cost": effect.cost,
-        "switch": effect.switch,
+        **picked(effect, "cost", "switch"),
     }
 
 
@@ -47,9 +46,7 @@ def checked(row: Switched) -> dict:
         "estimated": plain(tuple(row.estimated)),
         "measured": [row.bias_px, row.variance],
         "resolution": [row.resolution_px, row.resolution_variance],
-        "seconds": row.seconds,
-        "seconds_auto": row.seconds_auto,
-        "holds": row.holds,
+        **picked(row, "seconds", "seconds_auto", "holds"),
     }
 
 

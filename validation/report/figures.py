@@ -6,11 +6,7 @@ import itertools
 import re
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 
 import render
 from measure.features.layout import layout_of
@@ -20,7 +16,7 @@ from scenes import Picture, Pose, Scene, pairs, shown
 from validation.batch.campaign import Campaign, Case
 from validation.batch.result import Validation
 from validation.batch.store import RunFile
-from validation.report.canvas import TEXT, WIDTH, legend_below, save
+from validation.report.canvas import TEXT, WIDTH, legend_below, plt, save
 
 _SHOWN = 16  # settings whose images are drawn
 _POINTS = 5000  # of a plot of settings

@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize

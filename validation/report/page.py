@@ -17,7 +17,6 @@ from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.report import (
     budget_figure,
-    budget_section,
     budget_table,
     camera_words,
     cells,
@@ -31,6 +30,7 @@ from validation.report import (
 )
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
+from validation.report.requirements import Requirement
 from validation.report.run_cells import far
 from validation.report.station import Station, halves_of, reasons
 from validation.report.wording import Need, need, next_step, nothing_wrong, sentence, what, wrong
@@ -71,7 +71,8 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     if found.refused:
         sections.append(Section("Settings without a result", tables=[page_tables.refused(found)]))
     sections.append(_done(found, store))
-    context = _context(station, first, _title(found, station), sections) | {"agrees": found.verdict.agrees}
+    name, title = station.picture.scene.name, _title(found, station)
+    context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
     paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
@@ -98,15 +99,6 @@ def _environment(escaped: bool) -> jinja2.Environment:
     return made
 
 
-def _context(station: Station, first: dict[str, Any], title: str, sections: list[Section]) -> dict[str, Any]:
-    return {
-        "name": station.picture.scene.name,
-        "title": title,
-        "sections": sections,
-        "station": first,
-    }
-
-
 def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     """What the template of a page's first screen takes; of photographs nothing is simulated."""
     found, picture = station.requirements, station.picture
@@ -114,29 +106,37 @@ def first_screen(station: Station, is_simulated: bool = True) -> dict[str, Any]:
     placed = f"Setting {station.number}: " if station.number else ""
     how = f"{_shown(station, is_simulated)}{station_view.enlarged(picture)}"
     named = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in found)
-    grades = dict.fromkeys(each.grade for each in found)
     table = station_table.table(found)
     return {
         "what": f"{what(found)}, numbered in the picture, from one picture of one camera",
+        **said(found),
         "simulated": SIMULATED if is_simulated else "",
-        "sentence": sentence(found),
-        "wrong": wrong(found),
-        "nothing": nothing_wrong(found),
-        "next": next_step(found),
-        "need": need(found),
-        "checked": "",
         "is_sky": False,
         "sketch": station_sketch.draw(picture),
         "view": station_view.draw(picture, found, station.image, f"What is measured{how} {named}."),
         "places": f"{camera}. {told[0].upper()}{told[1:]}. {station_sketch.AZIMUTH}",
         "sketched": "",
         "caption": f"What is measured{how}",
-        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": station_table.COLUMNS,
-        "lines": station_table.lines(found),
         "above": station_table.ABOVE,
         "note": station_table.note(found),
         "section": Section("Requirements", answer=f"{placed}{told}. Camera: {camera}.", tables=[table]),
+    }
+
+
+def said(found: Sequence[Requirement]) -> dict[str, Any]:
+    """What a first screen says of requirements, wherever they are measured from."""
+    grades = dict.fromkeys(each.grade for each in found)
+    return {
+        "simulated": SIMULATED,
+        "sentence": sentence(found),
+        "wrong": wrong(found),
+        "nothing": nothing_wrong(found),
+        "next": next_step(found),
+        "need": need(found),
+        "checked": "",
+        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
+        "lines": station_table.lines(found),
     }
 
 
@@ -254,8 +254,8 @@ def _budget(found: SceneBudget | None) -> list[Section]:
         "to improve. `ice budget SCENE --reach U` says how well a source must be known for a wanted U."
     )
     folded = [
-        Table(f"{cells.name(each.name)} [{each.unit}]", budget_table.COLUMNS, budget_section.cells(each),
-              budget_section.note(found, m))
+        Table(f"{cells.name(each.name)} [{each.unit}]", budget_table.COLUMNS, budget_table.lines(each),
+              budget_table.note(found, m))
         for m, each in enumerate(found)
     ]  # fmt: skip
     plots = [Plot(budget_figure.drawn(found), caption)]

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 
 from imaging.features.projected_edges import circles, projected_edges
 from imaging.geometry.lens import recorded
@@ -18,7 +14,7 @@ from imaging.light.appearance import face_signal, is_separable
 from imaging.light.backlight import backlights
 from planner import Pictures, Plan, ViewingSpace, pose_map
 from scenes import Picture, Pose
-from validation.report.canvas import WIDTH, save
+from validation.report.canvas import WIDTH, plt, save
 from validation.report.map_figure import Chart, draw_map, draw_surface, short
 
 _STEP = 2.0  # degrees, where a map takes some seconds; where it takes longer:

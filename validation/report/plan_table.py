@@ -12,7 +12,6 @@ import planner
 from planner.search.candidates import Candidate
 from planner.search.setting_up import how_far
 from render import Tolerance
-from scenes import Scene
 from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
 from validation.report.cells import MODELS
@@ -79,11 +78,8 @@ def _head_of_several(found: planner.Plan, edges: str, seconds: float) -> str:
 
 def _textures(p: planner.Prediction) -> list[str]:
     """What textures add to each measurand; nothing without textures."""
-    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in p.measurands if _is_uneven(each)]
-
-
-def _is_uneven(each: planner.Forecast) -> bool:
-    return each.texture_variance_object is not None
+    uneven = (each for each in p.measurands if each.texture_variance_object is not None)
+    return [f"  Textures: {each.name} is off by {_over_parts(each)}" for each in uneven]
 
 
 def _over_parts(each: planner.Forecast) -> str:
@@ -101,26 +97,19 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         f"  Guarantee: {found.guarantee}.",
     ]
     if not found.steady:
-        lines.append(f"  Hard to set up: {_how_far(found.scene)} degrees off something cannot be measured any more.")
+        off = " or ".join(sorted({f"{how_far(found.scene, role):.2g}" for role in ("sensor", "light")}))
+        lines.append(f"  Hard to set up: {off} degrees off something cannot be measured any more.")
     if found.shares:
         lines.insert(
             0, "  Shares of the lights: " + ", ".join(f"{share:.2g}" for share in found.shares) + _alone(found)
         )
     if found.set_aside and found.set_aside[0].variance < found.variance:
-        many = len(found.set_aside)
+        many, part = len(found.set_aside), 100 * found.set_aside[0].variance / found.variance
         lines.append(
-            f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {_part(found)} of this one's"
+            f"  {many} place{'s' * (many > 1)} of the grid passed over (the first has {part:.0f} % of this one's"
             " variance): more of the values there would be biased by what lies around their edges (clutter)."
         )
     return "\n".join(lines)
-
-
-def _how_far(scene: Scene) -> str:
-    return " or ".join(sorted({f"{how_far(scene, role):.2g}" for role in ("sensor", "light")}))
-
-
-def _part(found: planner.Plan) -> str:
-    return f"{100 * found.set_aside[0].variance / found.variance:.0f} %"
 
 
 def _ruled_out(found: planner.Plan) -> str:
@@ -185,20 +174,12 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     first = found.candidates[0]
     itself = [*map(_pose, (first.sensor, first.light))] == [*map(_pose, (best.sensor, best.light))]
     for c in (best, *found.candidates[itself:]):
-        mark, ratio = "best" if c is best else "", c.variance / best.variance
         if several:
-            table.add_row(
-                mark,
-                _pose(c.sensor),
-                _pose(c.light),
-                " ".join(c.edges),
-                c.limiting,
-                f"{c.variance:.4g}",
-                f"{ratio:.3f}",
-            )
-            continue
-        values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}", f"{ratio:.3f}"
-        table.add_row(mark, _pose(c.sensor), _pose(c.light), " ".join(c.edges), *values)
+            values = c.limiting, f"{c.variance:.4g}"
+        else:
+            values = f"{1e6 * c.variance_object:.4g}", f"{1e6 * c.variance_image:.4g}"
+        row = "best" if c is best else "", _pose(c.sensor), _pose(c.light), " ".join(c.edges)
+        table.add_row(*row, *values, f"{c.variance / best.variance:.3f}")
     return table
 
 
@@ -243,17 +224,9 @@ def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
     several = len(found.prediction.measurands) > 1
     unit = "1e-6" if several else f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
     columns = (
-        "place",
-        "now",
-        "sensor",
-        "light",
-        f"calibrated, {unit}",
-        "propagated",
-        "with u(bias)",
-        "ratio",
-        "status",
+        "place", "now", "sensor", "light", f"calibrated, {unit}", "propagated", "with u(bias)", "ratio", "status",
         "not in formulas",
-    )
+    )  # fmt: skip
     table = _table(f"\nThe best settings rendered, and measured by {ESTIMATOR}", *columns)
     for row in checked.settings:
         values = (

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 from scipy import stats
@@ -21,7 +17,7 @@ from validation.batch.result import Validation
 from validation.batch.rows import Row
 from validation.batch.store import RunFile
 from validation.report import cells
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.requirements import HALF
 
 MOST = 5000  # settings that are looked at, evenly spaced
@@ -85,14 +81,9 @@ def lines_of(found: Validation, halves: dict[str, float]) -> list[Line]:
 def forest(lines: Sequence[Line], key: str = "forest") -> Markup:
     """Ratio of variances with its interval, a line each; of many the spread of each requirement, and the farthest."""
     known = [line for line in lines if line.ratio is not None]
-    grouped = len(known) > _SINGLE
-    shown = _farthest(known) if grouped else known
-    groups = _groups(known) if grouped else []
-    figure, axis = _rows(len(shown) + len(groups))
-    for y, (name, some) in enumerate(groups):
-        _group(axis, y, np.array([line.ratio for line in some]))
-        _name(axis, y, f"{cells.name(name)}, {len(some)} settings")
-    for y, line in enumerate(shown, len(groups)):
+    shown = _farthest(known) if len(known) > _SINGLE else known
+    figure, axis, first = _grouped(known, shown, lambda line: line.ratio)
+    for y, line in enumerate(shown, first):
         colour, fill = {"inside": (_GOOD, _GOOD), "outside": (_BAD, "white"), "open": (_OPEN, "white")}[line.grade]
         axis.plot([line.low, line.high], [y, y], color=colour, lw=1.6, ls=":" if line.grade == "open" else "-")
         axis.plot(line.ratio, y, {"inside": "o", "outside": "D", "open": "X"}[line.grade], color=colour, mfc=fill, ms=6)
@@ -150,15 +141,10 @@ def bias(lines: Sequence[Line]) -> Markup:
     known = [line for line in lines if line.bias is not None and math.isfinite(line.error)]
     toleranced = any(line.half for line in known)
     known = [line for line in known if line.half] if toleranced else known
-    grouped = len(known) > _SINGLE
     key = {id(line): round(abs(_biased(line, toleranced)[0]), 9) for line in known}
-    shown = sorted(known, key=lambda line: -key[id(line)])[:_FAR] if grouped else known
-    groups = _groups(known) if grouped else []
-    figure, axis = _rows(len(shown) + len(groups))
-    for y, (name, some) in enumerate(groups):
-        _group(axis, y, np.array([_biased(line, toleranced)[0] for line in some]))
-        _name(axis, y, f"{cells.name(name)}, {len(some)} settings")
-    for y, line in enumerate(shown, len(groups)):
+    shown = sorted(known, key=lambda line: -key[id(line)])[:_FAR] if len(known) > _SINGLE else known
+    figure, axis, first = _grouped(known, shown, lambda line: _biased(line, toleranced)[0])
+    for y, line in enumerate(shown, first):
         value, spread = _biased(line, toleranced)
         trusted = is_trusted(line.status)
         colour = _GOOD if trusted else _BAD
@@ -238,6 +224,16 @@ def _some(found: Validation) -> Iterator[Row]:
     """All rows, or of very many `MOST`."""
     every = np.unique(np.linspace(0, len(found.rows) - 1, min(MOST, len(found.rows))).astype(int))
     return (found.rows[int(i)] for i in every)
+
+
+def _grouped(known: Sequence[Line], shown: Sequence[Line], number: Callable[[Line], float]):
+    """A figure for the lines shown, below the spread of each requirement if there are many; the first line's place."""
+    groups = _groups(known) if len(known) > _SINGLE else []
+    figure, axis = _rows(len(shown) + len(groups))
+    for y, (name, some) in enumerate(groups):
+        _group(axis, y, np.array([number(line) for line in some]))
+        _name(axis, y, f"{cells.name(name)}, {len(some)} settings")
+    return figure, axis, len(groups)
 
 
 def _rows(count: int):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -153,41 +154,36 @@ def requirements(
 
 def measurable_budget(
     picture: Picture,
-    variances: Sequence[float] | None = None,
-    biases: Sequence[float] | None = None,
+    *,
     statuses: Sequence[str] | None = None,
-    doubts: Sequence[float] | None = None,
     p: float = 0.95,
     biased: bool | None = None,
+    **of_values: Sequence[float],
 ) -> SceneBudget | None:
     """The budget of those measurands that can be measured in a picture; None where there are none.
 
-    ``variances``, ``biases``, ``statuses`` and ``biased`` of all M as of `planner.budgeting.budgets.budget`; ``doubts``
-    standard uncertainties of the biases where they are taken off.
+    ``statuses``, ``biased`` and, of the values, ``variances`` and ``biases`` of all M as of
+    `planner.budgeting.budgets.budget`; ``doubts`` standard uncertainties of the biases where they are taken off.
     """
-    forecasts, scene = planner.predict(picture).measurands, picture.scene
-    good = [math.isfinite(each.variance_object) for each in forecasts]
-    for given in (variances, biases):
-        good = [fine and (given is None or math.isfinite(given[m])) for m, fine in enumerate(good)]
-    if not all(good):
-        kept, places = [], []
-        for each in scene.measurands:
-            own = [[q.name for q in scene.quantities].index(quantity.name) for quantity in each.quantities]
-            if all(good[m] for m in own):
-                kept.append(each)
-                places += own
+    scene, told = picture.scene, {name: np.array(values, float) for name, values in of_values.items()}
+    good = np.isfinite([each.variance_object for each in planner.predict(picture).measurands])
+    for name in told.keys() & {"variances", "biases"}:
+        good &= np.isfinite(told[name])
+    places = list(range(len(good)))
+    if not good.all():
+        names = [quantity.name for quantity in scene.quantities]
+        own = [[names.index(quantity.name) for quantity in each.quantities] for each in scene.measurands]
+        kept = [each for each, some in zip(scene.measurands, own, strict=True) if good[some].all()]
         if scene.task is not None or not kept:
             return None
+        places = [m for some in own if good[some].all() for m in some]
         picture = picture.with_scene(scene.model_copy(update={"measurands": tuple(kept)}))
-    else:
-        places = list(range(len(good)))
-    told = {"variances": variances, "biases": biases, "doubts": doubts}
-    known = {name: np.array([each[m] for m in places], float) for name, each in told.items() if each is not None}
-    known["biased"] = biased
-    if doubts is not None:
+    known: dict[str, Any] = {name: values[places] for name, values in told.items()}
+    if "doubts" in known:
         known["doubts"] = {source_words.ALL: known["doubts"]}
     try:
-        return budget(picture, **known, statuses=statuses and tuple(statuses[m] for m in places), p=p)
+        states = statuses and tuple(statuses[m] for m in places)
+        return budget(picture, **known, biased=biased, statuses=states, p=p)
     except InvalidInput:
         return None
 

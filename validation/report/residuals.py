@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 
 from measure.fitting.result import Fit
+from validation.report.canvas import plt
 
 _MOST = 4  # poses that are drawn
 _RANGE = 5.0  # standard deviations

@@ -7,10 +7,6 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import PolyCollection
 
@@ -18,7 +14,7 @@ from imaging.geometry.projection import facing, project
 from imaging.geometry.visibility import visible_spans
 from planner import Pictures
 from scenes import Circle, Edge, Pose, Scene
-from validation.report.canvas import WIDTH, save
+from validation.report.canvas import WIDTH, plt, save
 
 _PIECES = 9  # of an edge that a lens may bend
 _HEIGHTS, _AROUND = (2.5, 8.0), 1.0  # inches: of the object, and of title and label around it

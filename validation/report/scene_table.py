@@ -10,11 +10,12 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from scenes import AnyLight, Curved, Mesh, Scene
+from scenes import Curved, Mesh, Scene
 from scenes.measurands.features import place_of
 from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
 from scenes.parts.solid import Circle, Edge, Solid
+from scenes.results import picked
 from validation.report.cells import table, zone
 from validation.strict_json import plain
 
@@ -33,7 +34,10 @@ def facts(scene: Scene) -> dict[str, Any]:
         "cylinders": list(map(_cylinder, facets.values())),
         "surfaces": [_surface(wall, facets.get(wall.name)) for wall in scene.all_walls.curved],
         "mended": solid.mended,
-        "lights": [light.model_dump(mode="json", exclude_defaults=True) | _kind(light) for light in scene.lights],
+        "lights": [
+            light.model_dump(mode="json", exclude_defaults=True) | picked(light, "kind", "mount")
+            for light in scene.lights
+        ],
     })  # fmt: skip
 
 
@@ -163,10 +167,6 @@ def _surface(wall: Curved, recognised: Recognised | None) -> dict[str, Any]:
         "length": None if ends is None else ends[1] - ends[0],
         "residual": recognised and recognised.residual,
     }
-
-
-def _kind(light: AnyLight) -> dict[str, str]:
-    return {"kind": light.kind, "mount": light.mount}
 
 
 def _material(scene: Scene, face: int) -> str | None:

@@ -43,7 +43,7 @@ def of_picture(picture: Picture, p: float = 0.95, *, simulated: bool = False) ->
     if not simulated or budgets.formulas_do(picture, tuple(each.status for each in told)):
         return Station(picture, predicted(picture, p), measurable_budget(picture, p=p, biased=True))
     off = budgets.simulated(picture)
-    known = measurable_budget(picture, off.sigma**2, statuses=off.status, doubts=off.u_bias, p=p)
+    known = measurable_budget(picture, variances=off.sigma**2, statuses=off.status, doubts=off.u_bias, p=p)
     made = requirements(
         picture,
         sigmas=off.sigma.tolist(),
@@ -78,7 +78,7 @@ def of_run(campaign: Campaign, found: Validation, store: RunFile) -> Station:
         about = {"doubts": [math.inf if each.u_bias is None else each.u_bias for each in rows]}
     elif not store.identity().get("photos"):
         about = {"biases": _biases(row, store)}
-    known = measurable_budget(picture, [each.predicted for each in rows], statuses=statuses, **about)
+    known = measurable_budget(picture, variances=[each.predicted for each in rows], statuses=statuses, **about)
     made = requirements(
         picture,
         sigmas=[math.sqrt(each.predicted) for each in rows],

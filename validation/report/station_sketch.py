@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 from scipy.spatial import ConvexHull, QhullError
@@ -13,7 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
 from scenes import Picture
-from validation.report.canvas import TEXT, inline
+from validation.report.canvas import TEXT, inline, plt
 
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten

@@ -6,10 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from markupsafe import Markup
 from scipy.optimize import linear_sum_assignment
@@ -20,7 +16,7 @@ from scenes.measurands.features import point_of
 from scenes.measurands.measurands import Quantity
 from scenes.parts.surfaces import Sphere
 from validation.explore import preview
-from validation.report.canvas import TEXT, WIDTH, inline
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.grades import LOOKS
 from validation.report.requirements import Grade, Requirement
 
@@ -93,10 +89,7 @@ def _outline(picture: Picture, feature) -> list[np.ndarray]:
     if isinstance(feature, Side):
         return [_seen(picture, solid.vertices[list(solid.edge(feature.edge).ends)])]
     if isinstance(feature, Centre):
-        circle = solid.circle(feature.circle)
-        if circle.ends is not None:
-            return [_seen(picture, circle.around(_CHORDS + 1))]
-        return [_seen(picture, _round(circle.centre, circle.axis, circle.radius))]
+        return [_seen(picture, preview.ring(solid.circle(feature.circle), _CHORDS))]
     if isinstance(feature, Wall):
         eye = sensor_position(picture.scene.camera, np.array(list(picture.sensor)))
         return [_seen(picture, line) for line in _limb(solid.round(feature.surface), eye)]
@@ -114,14 +107,6 @@ def _limb(wall: Curved, eye: np.ndarray) -> list[np.ndarray]:
     radii = wall.radius + getattr(wall.surface, "slope", 0.0) * along
     sides = [wall.centre + along * wall.surface.axis + side * radii * one for side in (-1, 1)]
     return [*sides, wall.centre + np.array([[-1], [1]]) * wall.radius * one]
-
-
-def _round(centre: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
-    """Points around a circle, shape (n, 3)."""
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(np.round(axis, 9)))])
-    one /= np.linalg.norm(one)
-    turn = np.linspace(0, 2 * np.pi, _CHORDS + 1)[:, None]
-    return centre + radius * (np.cos(turn) * one + np.sin(turn) * np.cross(axis, one))
 
 
 def _seen(picture: Picture, points: np.ndarray) -> np.ndarray:

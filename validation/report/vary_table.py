@@ -9,10 +9,11 @@ from rich.table import Table
 from rich.text import Text
 
 from planner import Chosen, Plan, Varied
+from scenes.results import picked
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
 from validation.strict_json import plain
-from validation.vary_check import Scatter, VaryCheck
+from validation.vary_check import VaryCheck
 
 HELD = {
     "time": "exposure time: a polariser before the lamp and one before the lens each pass half of unpolarised light,"
@@ -39,14 +40,11 @@ def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
         f" {varied.gain_same_poses:.3f} at its poses.",
         f"  Guarantee: {varied.guarantee}.",
     ]
-    parts = [Text("\n".join(lines)), _choices(varied), Text(TERMS)]
+    table = _table("\nFixed and best choice", *COLUMNS, rows=choices(varied))
+    parts = [Text("\n".join(lines)), table, Text(TERMS)]
     if checked:
         parts += [_scatters(checked), Text(_judgement(checked))]
     return Group(*parts)
-
-
-def _choices(varied: Varied) -> Table:
-    return _table("\nFixed and best choice", *COLUMNS, rows=choices(varied))
 
 
 def choices(varied: Varied) -> list[list[str]]:
@@ -92,20 +90,17 @@ def _judgement(checked: VaryCheck) -> str:
     )
 
 
+_SCATTER = ("measurand", "predicted", "propagated", "measured", "interval", "n", "failed", "status")
+
+
 def facts(varied: Varied | None, checked: VaryCheck | None) -> dict | None:
     """For JSON; None without."""
     if varied is None:
         return None
     return plain({
-        "vary": varied.vary,
-        "hold": varied.hold,
-        "gain": varied.gain,
-        "gain_same_poses": varied.gain_same_poses,
-        "fixed": _fact(varied.fixed),
-        "same_poses": _fact(varied.same_poses),
-        "best": _fact(varied.best),
-        "evaluated": varied.evaluated,
-        "guarantee": varied.guarantee,
+        **picked(varied, "vary", "hold", "gain", "gain_same_poses"),
+        **{name: _fact(getattr(varied, name)) for name in ("fixed", "same_poses", "best")},
+        **picked(varied, "evaluated", "guarantee"),
         "check": None if checked is None else _check(checked),
     })  # fmt: skip
 
@@ -116,27 +111,18 @@ def _fact(chosen: Chosen) -> dict:
         "band": chosen.choice.band,
         "sensor": list(chosen.sensor),
         "light": list(chosen.light),
-        "variance": chosen.variance,
-        "status": chosen.status,
-        "exposure_time": chosen.exposure_time,
+        **picked(chosen, "variance", "status", "exposure_time"),
     }
 
 
 def _check(checked: VaryCheck) -> dict:
     return {
-        "fixed": _row(checked.fixed),
-        "best": _row(checked.best),
-        "predicted_gain": checked.predicted_gain,
-        "gain": checked.gain,
+        "fixed": picked(checked.fixed, *_SCATTER),
+        "best": picked(checked.best, *_SCATTER),
+        **picked(checked, "predicted_gain", "gain"),
         "gain_interval": checked.interval,
-        "p_value": checked.p_value,
-        "verdict": checked.verdict,
+        **picked(checked, "p_value", "verdict"),
     }
-
-
-def _row(row: Scatter) -> dict:
-    names = ("measurand", "predicted", "propagated", "measured", "interval", "n", "failed", "status")
-    return {name: getattr(row, name) for name in names}
 
 
 def _angle(value: float | None) -> str:

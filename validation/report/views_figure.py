@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
 from planner import Views
-from validation.report.canvas import TEXT, WIDTH, save
+from validation.report.canvas import TEXT, WIDTH, plt, save
 from validation.report.plan_figures import draw_seen
 
 

@@ -6,10 +6,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 from markupsafe import Markup
 from scipy.stats import norm
 
@@ -17,11 +13,10 @@ import planner
 from scenes import Picture
 from scenes.results import finite
 from validation.report import camera_words, cells, map_figure, page, station_table, station_view
-from validation.report.canvas import TEXT, WIDTH, inline
-from validation.report.grades import LOOKS, MEANS
+from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.page_tables import Table
 from validation.report.requirements import Requirement
-from validation.report.wording import need, next_step, nothing_wrong, sentence, what, wrong
+from validation.report.wording import what
 
 _P = 0.95
 _LAMP, _CAMERA = "#b35900", "#0b3c5d"
@@ -38,16 +33,14 @@ def write(found: planner.Views, path: Path) -> Path:
     asked = requirements(last)
     first = {
         "what": f"{what(asked)}, numbered in the pictures, from {_pictures(len(last.views))} together",
-        "simulated": page.SIMULATED,
-        "sentence": sentence(asked), "wrong": wrong(asked), "nothing": nothing_wrong(asked), "next": next_step(asked),
-        "need": need(asked), "checked": "", "is_sky": True,
+        **page.said(asked),
+        "is_sky": True,
         "places": f"{camera_words.told(scene)}.",
         "sketch": sky(last),
         "sketched": f"Seen from above, distance from the middle: angle from the vertical. {_told(last)}.",
         "view": Markup("").join(_view(found, number, asked) for number in range(len(last.views))),
         "caption": "What is taken from each picture. Drawn from the model: no shadows.",
-        "key": [(MEANS[grade], LOOKS[grade]) for grade in dict.fromkeys(each.grade for each in asked)],
-        "columns": (*station_table.COLUMNS[:-1], "taken from"), "lines": station_table.lines(asked),
+        "columns": (*station_table.COLUMNS[:-1], "taken from"),
         "above": _ABOVE, "note": station_table.note(asked, _NOTE),
     }  # fmt: skip
     sections = [

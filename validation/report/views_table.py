@@ -114,7 +114,8 @@ def _searched(found: planner.Views, seconds: float) -> str:
             "  By a glance at the grid, were nothing clutter: no pictures, however many, are more than"
             f" {most:.2f} times as good as the best one repeated."
         )
-    if any(row.status == "clutter" for row in _all_told(found)):
+    told = (each for one in found.sets for view in one.views for each in view.prediction.measurands)
+    if any(each.status == "clutter" for each in told):
         lines.append(
             "  What is clutter counts as 4 times its variance in what is minimised, and only where no picture is ok."
         )
@@ -127,10 +128,6 @@ def _repeated(found: planner.Views) -> list[str]:
     for number, view in enumerate(found.sets[-1].views, 1):
         places.setdefault((view.sensor, view.light), []).append(str(number))
     return [f"No. {' and '.join(each)} are taken from one place" for each in places.values() if len(each) > 1]
-
-
-def _all_told(found: planner.Views):
-    return (told for each in found.sets for view in each.views for told in view.prediction.measurands)
 
 
 def _checked(check: ViewsCheck) -> Table:

@@ -11,6 +11,8 @@ from imaging.models.bias import bias, cluttered
 from imaging.pictures import Pictures
 from planner.budgeting.sensitivities import sensitivities
 from planner.search.grid import ViewingSpace
+from planner.search.local import alternating
+from planner.search.objective import SearchProblem
 from planner.uncertainty import improve, risks
 from scenes import Pose
 from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
@@ -149,7 +151,7 @@ def _with_choices():
 
 def _alternated():
     spaces = ViewingSpace(15, (0, 90)), ViewingSpace(20, (10, 80))
-    return planner.alternate(load("task1"), *spaces, np.array([40.7, 41.3]), "calibrated", "object")
+    return alternating(SearchProblem.of(load("task1"), "calibrated", "object"), *spaces, np.array([40.7, 41.3]))
 
 
 _PLANS = {

@@ -1,0 +1,93 @@
+"""Surroundings of what is measured, as masks: which pixels edges, circles and limbs are located from."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from imaging.features.limb_outline import limb_outline
+from imaging.features.projected_edges import circles, projected_edges
+from imaging.features.rim_sides import RIM_POINTS
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import project, project_ideal
+from imaging.pictures import Pictures
+from scenes import Curved, Picture
+
+
+def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
+    """Fine pixels of the crop that edges and circles are located from, and their surroundings, as a mask."""
+    locator, shape = picture.scene.locator, [(part.stop - part.start) // supersample for part in crop]
+    rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
+    pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
+    found = np.zeros(shape, bool)
+    for start, stop in [*projected_edges(Pictures.of(picture)).recorded, *_around(picture)]:
+        along = stop - start
+        part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
+        away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)
+        found |= away <= locator.window_px + 4 * locator.scale_px + 1
+    return found.repeat(supersample, 0).repeat(supersample, 1)
+
+
+def _around(picture: Picture) -> list[np.ndarray]:
+    """Pieces of the images of the required circles and limbs, (2, 2) each, px."""
+    pieces = []
+    for name in circles(picture.scene):
+        circle = picture.scene.solid.round(name)
+        if isinstance(circle, Curved):
+            pieces += _limb(picture, circle)
+            continue
+        places = circle.at(circle.angles(RIM_POINTS))
+        rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
+        whole = np.stack([rim, np.roll(rim, -1, 0)], 1)
+        pieces += list(whole if circle.ends is None else whole[:-1])
+    return pieces
+
+
+def _limb(picture: Picture, curved: Curved) -> list[np.ndarray]:
+    """Pieces of a limb's image, (2, 2) each, px."""
+    outline = limb_outline(curved, np.array(list(picture.sensor)), picture.scene.camera)
+    at = outline.at + image_centre(picture.scene.camera)
+    pieces = np.stack([at, np.roll(at, -1, 0)], 1)
+    return list(pieces[np.isfinite(pieces).all((1, 2))])
+
+
+def near_required(
+    picture: Picture, crop: tuple[slice, slice], supersample: int, within: float | None = None
+) -> np.ndarray:
+    """Pixels of the crop that the task's edges and circles are measured from, and their surroundings, as a mask; or
+    those ``within`` so many standard deviations of scale and blur together of where they are. Not to be changed."""
+    corner = tuple(part.start // supersample for part in crop)
+    shape = tuple((part.stop - part.start) // supersample for part in crop)
+    return _near_required(picture.unlit(), corner, shape, within)
+
+
+@lru_cache(maxsize=4)
+def _near_required(
+    picture: Picture, corner: tuple[int, int], shape: tuple[int, int], within: float | None
+) -> np.ndarray:
+    """The same of a crop of whole pixels: all lights and rays share it."""
+    scene, (top, left) = picture.scene, corner
+    circles = {circle.name: circle.edges for circle in scene.solid.rims}
+    limbs = [each for each in scene.solid.curved if each.name in scene.required]
+    circles |= dict.fromkeys((each.name for each in limbs), ())
+    names = [piece for name in scene.required for piece in circles.get(name, (name,))]
+    ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
+    places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
+    sensor = np.array(list(picture.sensor))
+    seen = (project, project_ideal) if scene.camera.lens.bends else (project,)  # rendered by a pinhole, bent after
+    places = np.concatenate([made(places, sensor, scene.camera) for made in seen])
+    pieces = [np.linspace(*ends, 2 + max(shape)) for each in limbs for ends in _limb(picture, each)]
+    places = np.concatenate([places, *pieces])
+    x, y = places[np.isfinite(places).all(1)].T
+    column, row = np.rint(x - left).astype(int), np.rint(y - top).astype(int)
+    inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
+    found = np.zeros(shape, bool)
+    found[row[inside], column[inside]] = True
+    spread = math.hypot(scene.locator.scale_px, scene.camera.blur_px)
+    reach = 1 + (scene.locator.window_px + 4 * spread if within is None else within * spread)
+    near = maximum_filter(found, 2 * math.ceil(reach) + 1)
+    near.flags.writeable = False
+    return near
