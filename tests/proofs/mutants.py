@@ -145,8 +145,16 @@ def telling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: P
     own = [case for key, cases in stored.items() if key == name or key.startswith(f"{name}.") for case in cases]
     module = Counter(case for key, cases in stored.items() if key.startswith(f"{mutant.file}:") for case in cases)
     most = [case for case, _ in module.most_common(_OF_MODULE)]
-    asked = dict.fromkeys(f"{RETURNS}::test_functions_give_what_was_stored[{case}]" for case in (*own, *most))
-    return [test for test in asked if test in tests]
+    first, then = (
+        {f"{RETURNS}::test_functions_give_what_was_stored[{case}]" for case in some} & tests.keys()
+        for some in (own, most)
+    )
+    asked, spent = [], 0.0
+    for test in (*sorted(first, key=lambda test: tests[test]["seconds"]), *sorted(then - first)):
+        spent += tests[test]["seconds"]
+        if spent <= _CALLING_S or not asked:
+            asked.append(test)
+    return asked
 
 
 def nearest(file: str, root: Path = ROOT, folders: tuple[str, ...] = OTHERS) -> list[str]:

@@ -17,8 +17,8 @@ STORED = Path(__file__).with_name("returns.json")
 _TOLERANCES = CLOSED, SEARCHED, RENDERED  # of the number of a digest, about a relative change; the rest is not compared
 _PART = 0.2  # of a tolerance that runs may differ by which were made to store: others differ more
 _NO = "-"
-_WORTH = 4.0, 1.0, 0.5  # of the first case in which a function is seen, and of others in which it gave something else
-_CASES = len(_WORTH)  # that are kept of a function
+_WORTH = 4.0, 1.0, 0.5  # of the first case that shows a function, and of two others in which it gives something else
+_CASES = 8  # that are kept of a function
 _SECONDS = 38.0  # processor time of all cases
 _STEP = 0.03  # seconds of a test beside its case
 _WAYS = "what it was given or gave", "what it held on the way"
@@ -117,7 +117,7 @@ def kept(runs: list[dict[str, dict[str, list[Call]]]]) -> Kept:
 
 
 def chosen(seconds: dict[str, float], gave: dict[str, dict[str, Any]], limit: float = _SECONDS) -> list[str]:
-    """Cases that show the most functions in a time, each function giving something else in up to `_CASES` of them.
+    """Cases that show the most functions in a time, each function giving something else in up to three of them.
 
     Always the case that shows the most in a second; what it shows can only get less when others are taken.
     """
@@ -125,7 +125,7 @@ def chosen(seconds: dict[str, float], gave: dict[str, dict[str, Any]], limit: fl
 
     def news(case: str) -> dict[str, float]:
         seen = ((function, what, known.get(function, set())) for function, what in gave[case].items())
-        return {name: _WORTH[len(had)] for name, what, had in seen if len(had) < _CASES and what not in had}
+        return {name: _WORTH[len(had)] for name, what, had in seen if len(had) < len(_WORTH) and what not in had}
 
     def worth(case: str) -> float:
         return -sum(news(case).values()) / (seconds[case] + _STEP)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
+from unittest import mock
 
+from render import variant
 from tests.regression.digest import Digest, Digester, together
 
 ROOT = Path(__file__).parents[2]
@@ -19,7 +22,7 @@ CALLS = 1, 2, 4, 8  # of a function in a case
 _STEPWISE = 0x20 | 0x80 | 0x200  # flags of generators and coroutines, which return many times
 _CLEARED = (*(f"{name}." for name in PACKAGES), "tests.")  # beginnings of modules whose caches are
 _LEFT = "tests.regression.stored", "tests.regression.kept", "tests.regression.returns"  # these know no case
-_ONCE = {"render.bsdf._register", "render.variant.choose"}  # kept for as long as the process lives
+_ONCE = {"render.bsdf._register"}  # kept for as long as the process lives
 
 Call = tuple[Digest, Digest]  # of what a function was given and gave, and of what it held on the way
 
@@ -119,10 +122,11 @@ def forget() -> None:
 
 
 def recorded(make: Callable[[], Any]) -> dict[str, list[Call]]:
-    """Some calls of each function that a case calls."""
+    """Some calls of each function that a case calls, rendered as everywhere: not compiled."""
     _modules()
     forget()
     recorder = Recorder()
-    with recorder.recording():
+    with mock.patch.dict(os.environ, {variant.OVERRIDE: variant.SCALAR}), recorder.recording():
         make()
+    variant.choose.cache_clear()
     return recorder.calls

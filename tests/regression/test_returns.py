@@ -22,10 +22,13 @@ from tests.regression.test_numbers import CASES
 
 pytestmark = pytest.mark.render
 
+_SHOWN = 12  # functions
+
 
 @pytest.mark.parametrize("name", by_case(STORED))
 def test_functions_give_what_was_stored(name):
-    assert different(by_case(STORED)[name], recorded(CASES[name][1])) == []
+    found = different(by_case(STORED)[name], recorded(CASES[name][1]))
+    assert not found, "\n".join(found[:_SHOWN])
 
 
 if __name__ == "__main__":

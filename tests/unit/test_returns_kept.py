@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from render import variant
 from scenes import Pose
 from tests.regression import kept
 from tests.regression.digest import Digest, Digester
-from tests.regression.returns import Recorder, forget
+from tests.regression.returns import Recorder, forget, recorded
 from validation import statistics
 
 
@@ -149,6 +150,17 @@ def test_functions_that_are_gone_and_new_ones_and_numbers_of_calls():
     assert kept.different(before, now | {RATIO: now[RATIO] * 2})[0].startswith(f"{RATIO}: call 2, ")
     twice = stored(lambda: [interval(), interval()])
     assert kept.different(twice, now)[0].endswith("got no call")
+
+
+def test_cases_render_uncompiled_whatever_is_there(monkeypatch):
+    seen = []
+    monkeypatch.setenv(variant.OVERRIDE, variant.LLVM)
+    variant.choose.cache_clear()
+    assert variant.choose() == variant.LLVM
+    recorded(lambda: seen.append(variant.choose()))
+    assert seen == [variant.SCALAR]
+    assert variant.choose() == variant.LLVM
+    variant.choose.cache_clear()
 
 
 def test_who_listened_before_listens_on():
