@@ -1,7 +1,7 @@
 """Runs of the stored cases by which it is told what of functions agrees everywhere; by ``test_returns`` as a command.
 
 On Linux on x86_64, where other processors can be taken for this one (``tests.machines``).
-``python -m tests.regression.storing CASES OUT [--reversed] [--fast]`` is one run.
+``python -m tests.regression.storing CASES OUT [--reversed] [--fast] [--again]`` is one run.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ WAYS = (
     Way(machine=OLD),
     Way(("--reversed",), machine=HASWELL),
     Way(machine=SANDY),
+    Way(("--again",)),
 )
 
 
@@ -115,6 +116,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--reversed", action="store_true", help="the last case first, on one core")
     parser.add_argument("--fast", action="store_true", help="clocks are faster than time, and other files open")
+    parser.add_argument("--again", action="store_true", help="each was run before: what a process calls once is done")
     asked = parser.parse_args()
     clock = time.process_time
     if asked.fast:
@@ -130,6 +132,8 @@ def main() -> None:
     names = [name for name in json.loads(asked.cases.read_text(encoding="utf-8")) or CASES if name in CASES]
     with asked.out.open("w", encoding="utf-8") as file:
         for name in names[::-1] if asked.reversed else names:
+            if asked.again:
+                CASES[name][1]()
             began = clock()
             calls = recorded(CASES[name][1])
             file.write(json.dumps([name, clock() - began, calls]) + "\n")

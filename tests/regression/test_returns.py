@@ -6,8 +6,9 @@ at: what it was given and gave, and what its own names held when it ended, as di
 
 ``python -m tests.regression.test_returns`` stores them anew after a change that was wanted (`make reference`), a line a
 function, so that a reviewer sees which have changed; with ``--choose`` it first chooses anew which cases are run. What
-is stored is what agrees between runs: in another order, folder and home, with other hashes, clocks and cores, of an
-edited program, and on the processors of ``tests.machines``; what differs there is told less exactly, or left out.
+is stored is what agrees between runs: once more in a process, in another order, folder and home, with other hashes,
+clocks and cores, of an edited program, and on the processors of ``tests.machines``; what differs there is told less
+exactly, or left out.
 """
 
 from __future__ import annotations
