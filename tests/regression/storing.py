@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from tests.regression.kept import STORED, by_case, chosen, kept
 from tests.regression.returns import PACKAGES, ROOT, recorded
 
 _CLOCKS = "time", "perf_counter", "process_time", "monotonic"
+_WORKERS = 2  # runs at a time
 _FASTER, _FILES = 7, 20  # clocks of one of the runs, and how many files are open then
 
 
@@ -50,10 +52,11 @@ WAYS = (
 
 def store(choose: bool) -> None:
     """Store anew what functions give in the cases that are stored, or in those that are chosen anew."""
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(_WORKERS) as executor:
         folder = Path(name)
         cases = sorted(_choice(folder) if choose or not STORED.exists() else by_case(STORED))
-        found = kept([_run(way, cases, folder / str(number)) for number, way in enumerate(WAYS)])
+        folders = [folder / str(number) for number in range(len(WAYS))]
+        found = kept(list(executor.map(_run, WAYS, [cases] * len(WAYS), folders)))
     lines = [f"{json.dumps(function)}: {json.dumps(told)}" for function, told in found.items()]
     STORED.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     print(f"{len(found)} functions in {len(cases)} cases: {STORED}")
