@@ -70,6 +70,7 @@ reference: $(VENV)/.installed
 	cp runs/reference/result.json tests/regression/reference.json
 	$(BIN)/python -m tests.regression.test_documents $$(mktemp -d)
 	$(BIN)/python -m tests.regression.test_numbers
+	$(BIN)/python -m tests.regression.test_returns
 	$(BIN)/python -m tests.unit.test_fields
 	$(BIN)/python -m tests.unit.test_defaults
 

@@ -2,12 +2,13 @@
 
 A mutant is one place of the code changed by one of cosmic-ray's operators (a sign, a comparison, a number, a condition)
 or by one of the slips of ``tests.proofs.slips``. Each is made in a copy of the repository and tested there: first the
-examples of its own module, the tests that read the code and, where it may have records, those of their fields; then the
-tests and the stored numbers that call the changed function and others of the module, the quickest first
-(``tests.proofs.reach``), then those of the files of whole commands that speak most of the names that the module
-defines, and at last the slower tests that call the function. Killed is what makes one of them fail that passes on clean
-code, where it is run, too, after some of its file that came before it (stored numbers are each by itself). What
-survives is printed with its line: a test is missing, or the mutant is equivalent.
+examples of its own module, the tests that read the code and, where it may have records, those of their fields; then
+what the changed function and others of the module gave when it was stored (``tests.regression.test_returns``), the
+tests and the stored numbers that call these, the quickest first (``tests.proofs.reach``), then those of the files of
+whole commands that speak most of the names that the module defines, and at last the slower tests that call the
+function. Killed is what makes one of them fail that passes on clean code, where it is run, too, after some of its file
+that came before it (stored numbers are each by itself). What survives is printed with its line: a test is missing, or
+the mutant is equivalent.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -42,7 +44,8 @@ SOURCES = ("scenes", "imaging", "planner", "measure", "render", "validation")
 READERS = ["tests/unit/test_frozen.py", "tests/unit/test_defaults.py::test_no_default_changes_unnoticed"]
 NUMBERS, HELD = "tests/unit/test_defaults.py::test_no_number_changes_unnoticed", "tests/regression/constants.json"
 FIELDS = ["tests/unit/test_fields.py", "tests/unit/test_reference.py::test_page_and_schema_are_up_to_date"]
-STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py")  # what was said once
+RETURNS, GAVE = "tests/regression/test_returns.py", "tests/regression/returns.json"
+STORED = ("tests/regression/test_documents.py", "tests/regression/test_numbers.py", RETURNS)  # what was said once
 UNIT, OTHERS = "tests/unit", ("tests/hard", "tests/system")
 _BINARY = ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "Pow_Mul", "Add_Mul")
 _COMPARISON = ("Lt_GtE", "Gt_LtE", "LtE_Gt", "GtE_Lt", "Eq_NotEq", "NotEq_Eq")
@@ -61,6 +64,7 @@ OPERATORS = tuple(
 )
 _FILES = 3  # test files that a mutant meets after the unit tests
 _CALLING_S = 12  # processor seconds, on clean code, of the tests that call the changed function
+_OF_MODULE = 3  # stored cases that tell most of a module's functions
 _MODULE_S = 3  # of those that call others of the module
 _REST_S = 90  # of those that call the changed function and are asked last, of what survived until then
 _LIMIT_S = 45  # after which these do not end
@@ -113,11 +117,14 @@ def calling(
 ) -> list[str]:
     """The tests that call the function around a line, then those that call others of the module.
 
-    The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others.
+    The quickest first, so many as the time allows. Who takes a kept result calls nothing, hence the others. Not those
+    of `telling`.
     """
     name = f"{mutant.file}:{function((root / mutant.file).read_text(encoding='utf-8'), line)}"
     some = {
-        t: each["calls"] for t, each in tests.items() if any(c.startswith(f"{mutant.file}:") for c in each["calls"])
+        t: each["calls"]
+        for t, each in tests.items()
+        if _file(t) != RETURNS and any(c.startswith(f"{mutant.file}:") for c in each["calls"])
     }
     own = {t for t, calls in some.items() if any(c == name or c.startswith(f"{name}.") for c in calls)}
     chosen: list[str] = []
@@ -129,6 +136,25 @@ def calling(
                 break
             chosen.append(test)
     return chosen
+
+
+def telling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path = ROOT) -> list[str]:
+    """The stored cases in which it is told what the function around a line gave, then those of most of its module."""
+    stored = json.loads((root / GAVE).read_text("utf-8"))
+    name = f"{mutant.file}:{function((root / mutant.file).read_text(encoding='utf-8'), line)}"
+    own = [case for key, cases in stored.items() if key == name or key.startswith(f"{name}.") for case in cases]
+    module = Counter(case for key, cases in stored.items() if key.startswith(f"{mutant.file}:") for case in cases)
+    most = [case for case, _ in module.most_common(_OF_MODULE)]
+    first, then = (
+        {f"{RETURNS}::test_functions_give_what_was_stored[{case}]" for case in some} & tests.keys()
+        for some in (own, most)
+    )
+    asked, spent = [], 0.0
+    for test in (*sorted(first, key=lambda test: tests[test]["seconds"]), *sorted(then - first)):
+        spent += tests[test]["seconds"]
+        if spent <= _CALLING_S or not asked:
+            asked.append(test)
+    return asked
 
 
 def nearest(file: str, root: Path = ROOT, folders: tuple[str, ...] = OTHERS) -> list[str]:
@@ -198,7 +224,7 @@ def judged(
     fields = FIELDS if _RECORDS.search(before) else []
     number = int(line.split(":")[1])
     held = [f"{NUMBERS}[{mutant.file}]"] if mutant.file in json.loads((root / HELD).read_text("utf-8")) else []
-    near = together([*own, *READERS, *held, *fields, *calling(mutant, number, tests, root)])
+    near = together([*own, *READERS, *held, *fields, *_calling(mutant, number, tests, root)])
     others, rest = [], []
     path.write_text(after, encoding="utf-8")
     try:
@@ -223,6 +249,12 @@ def judged(
     again = [each for each in before_it if _file(each) == _file(by)] if by else asked[: 1 if code == _USAGE else None]
     clean, wrong = _tested(again, runner, 2 * _REST_S)
     return ("killed", by) if clean in _PASSED else ("no baseline", wrong)
+
+
+def _calling(mutant: Mutant, line: int, tests: dict[str, dict[str, Any]], root: Path) -> list[str]:
+    """Those that tell of the function first."""
+    told = telling(mutant, line, tests, root)
+    return [*told, *(each for each in calling(mutant, line, tests, root) if each not in told)]
 
 
 def together(tests: list[str]) -> list[str]:

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.distance import cdist
 from scipy.stats import chi2
 
+from imaging.blurred.arrangement import near_vertices
 from imaging.sensor import Levels, squared_errors
 from measure.estimators.arrangement import ArrangementEstimator, _chi_square
 from measure.estimators.ellipse import _Linear, _with_axes, free_parameters
@@ -275,3 +276,13 @@ def test_products_of_columns_are_those_of_the_whole_matrix(rng):
     for n, (here, own) in enumerate(zip(pixels, rows, strict=True)):
         whole[here, 3 + n * ROWS : 3 + (n + 1) * ROWS] = own
     assert _gram(linear, pixels, rows) == pytest.approx(whole.T @ whole, abs=1e-12)
+
+
+def test_pieces_near_a_required_edge_are_those_between_their_own_ends():
+    """Within 2 px of (0, 0) to (10, 0): itself and what crosses it, not what only would if it went on."""
+    crossing, before, beside = ((5, -9), (5, 9)), ((5, 3), (5, 20)), ((30, 0), (13, 0))
+    vertices = np.array([(0, 0), (10, 0), *crossing, *before, *beside], float)
+    pieces = np.arange(8).reshape(-1, 2)
+    made = SimpleNamespace(vertices=vertices, pieces=pieces, required=np.array([[0, 1], [-1, -1]]))
+    assert near_vertices(made, 2.0).tolist() == [0, 1, 2, 3]
+    assert near_vertices(made, 3.01).tolist() == list(range(8))

@@ -13,7 +13,7 @@ from measure.boards.adjustment import _inverse, _object
 from measure.boards.camera import CameraCalibration, _calibration, _check
 from measure.boards.chessboard import _board, _clipped, _least_noise, _nothing, _start, check_shape
 from measure.boards.fitting import Crossings
-from measure.boards.growing import _alternates, _alternation, grown, trimmed
+from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
 from measure.boards.parameters import read_model
 from measure.boards.windows import steps, windows
 from measure.photo import board_noise
@@ -389,3 +389,13 @@ def test_larger_pixels_are_mean_levels():
     assert found.levels == pytest.approx(levels[:6, :9].reshape(2, 3, 3, 3).mean((1, 3)))
     assert (found.full, found.compressed) == (None, True)
     assert binned(Photograph(levels), 2, False).levels.shape == (3, 5)
+
+
+@pytest.mark.parametrize(("height", "there"), [(84, False), (85, True)])
+def test_a_line_needs_room_to_the_image_s_rim(board, height, there):
+    """Half a step (6 px) and 2 px, from corners at 75.5 px: to the last row but one of 84 there are 7.5."""
+    grey, places = board
+    found = _next(grey[:height], places[:3])
+    assert (found is not None) is there
+    if there:
+        assert found == pytest.approx(places[3], abs=0.2)

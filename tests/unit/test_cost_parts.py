@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import planner
+from validation.batch.campaign import Campaign
 from validation.batch.options import RunOptions
-from validation.cost import sampling, trial
+from validation.cost import locators, sampling, trial
 from validation.cost.model import Rendered
 from validation.cost.watch import AT_ONCE, Watch, at_once
 
@@ -134,3 +136,18 @@ def test_how_the_variance_of_n_images_scatters(monkeypatch, rng):
 def test_pictures_in_memory():
     assert [at_once(AT_ONCE // 7, 50), at_once(AT_ONCE // 7, 5), at_once(2 * AT_ONCE, 5)] == [7, 5, 1]
     assert list(Watch(math.inf).samples(3, least=1)) == [0, 1, 2]
+
+
+def test_settings_share_the_time_of_the_estimators_table(monkeypatch, task1):
+    """60 s of two settings are 30 s each, which stand for none here."""
+    rng, told = np.random.default_rng(4), []
+    made = SimpleNamespace(left=60.0, tell=lambda: None)
+    monkeypatch.setattr(locators, "Watch", lambda seconds, tell: told.append(seconds) or Watch(0.0, tell))
+    monkeypatch.setattr(
+        locators.measure, "distance", lambda images, *_: SimpleNamespace(value_px=rng.normal(size=len(images)))
+    )
+    case = Campaign.of(task1).case(0)
+    image = planner.image(task1, case.setting.sensor, case.setting.light)
+    found = locators.estimators_parameter([case, case], [image, image], 1, made)
+    assert told == [30.0, 30.0]
+    assert found.note.startswith("100 images of 2 settings")

@@ -1,6 +1,7 @@
 """Curved surfaces as the renderer has them: discs at their ends, and what lies between a circle and its polygon."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -122,3 +123,9 @@ def test_a_pin_is_one_in_any_unit(unit):
     assert [(e.name, e.kind, e.convex) for e in other.edges] == [(e.name, e.kind, e.convex) for e in one.edges]
     assert [wall.faces for wall in other.curved] == [wall.faces for wall in one.curved]
     assert [len(wall.faces) for wall in one.curved] == [48, 48, 48]
+
+
+def test_faces_without_a_record_of_holes_have_one_loop():
+    """Then both ends are discs, the shoulder, with two circles, is not."""
+    ends = sorted((round(c.radius, 6), round(float(c.centre[1]), 6)) for c in curved._ends(replace(STEP, holes=())))
+    assert ends == [(6.0, 0.0), (9.0, 30.0)]

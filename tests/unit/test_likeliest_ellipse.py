@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from measure.estimators import ellipse
 from measure.estimators.ellipse import LEAST_BLUR, Seen, _near, likeliest_ellipse
 from measure.features.blurred_ellipse import ellipse_image, outline, to_symmetric
 from measure.features.optics import Optics
@@ -100,3 +101,13 @@ def test_pixels_near_the_outline():
         assert 5 * np.sqrt(BLUR**2 + 1 / 12) < band < 15
     _, derivatives = ellipse_image(to_symmetric(ROUND), np.arange(70), np.arange(60), LEAST_BLUR)
     assert np.isfinite(derivatives).all()
+
+
+@pytest.mark.parametrize("expected", [0.5, 0.6])
+def test_the_blur_stays_within_four_times_what_is_expected(monkeypatch, expected):
+    """An image that is blurred more: the first step goes to the end of the range, no step beyond it."""
+    blurs, at = [], ellipse._Linear.at
+    monkeypatch.setattr(ellipse._Linear, "at", lambda *how: blurs.append(how[2]) or at(*how))
+    likeliest_ellipse(exact(TRUE, 6.0), to_symmetric(TRUE), Optics(SHAPE, expected, 4.0, 1.0, 3.0), False, ALL)
+    assert blurs[0] == pytest.approx(expected)
+    assert max(blurs) == pytest.approx(4 * expected)

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 import scenes
+from scenes.parts import recognised
 from scenes.parts.mesh import solid
 from scenes.parts.recognised import _turn, cylinders
 from tests.parts import bracket, prism, unevenly
@@ -180,3 +181,11 @@ def test_how_far_round_facets_go(rng):
     assert turn([160.0, 170.0, 185.0, 190.0, 210.0]) == pytest.approx(50 + 12.5)  # across the half turn
     assert turn([10.0, 100.0, 190.0, 250.0]) == pytest.approx(360)  # steps of 90, 90, 60 and 120
     assert turn([10.0, 100.0, 180.0, 230.0]) == pytest.approx(360 - 140 + 220 / 3)
+
+
+@pytest.mark.parametrize(("radius", "is_one"), [(2.0, True), (0.0, False), (1e8, False)])
+def test_a_cylinder_has_a_radius(monkeypatch, radius, is_one):
+    """Where the fit ends at none, or at a plane's, its facets are no cylinder's."""
+    fitted = recognised._least_squares
+    monkeypatch.setattr(recognised, "_least_squares", lambda *how: (*fitted(*how)[:2], radius, np.zeros(48)))
+    assert bool(cylinders(solid(trimesh.creation.cylinder(2.0, 5.0, sections=24)))) is is_one

@@ -1,5 +1,6 @@
 """What commands say of rare things: pictures of drawn stations, a distance, a board, wrapped names, a log's line."""
 
+import contextlib
 import logging
 import math
 import statistics
@@ -13,7 +14,7 @@ import scenes
 from render.phenomena.base import Influence
 from scenes import Pose
 from tests.commands import ice
-from validation import budgets, effects_check
+from validation import budgets, effects_check, plan_check, vary_check
 from validation.cli import measure as measure_cli
 from validation.cli import photograph, plan, verbosity
 from validation.cli import predict as predict_cli
@@ -320,3 +321,22 @@ def test_of_many_shapes_the_others_are_counted(count):
     assert len(found.columns) == 7
     cells = list(found.columns[0].cells)
     assert cells[30:] == (["and 3 more"] if count > 30 else [])
+
+
+def test_what_takes_long_in_a_plan_says_at_once_that_it_works(monkeypatch, task1):
+    """The search, the check of the best and the check of what was varied."""
+    said = []
+
+    @contextlib.contextmanager
+    def shown(title, unit, at_once=False):
+        said.append((unit, at_once))
+        yield None
+
+    monkeypatch.setattr(plan, "progress", shown)
+    monkeypatch.setattr(planner, "plan", lambda *_, **__: "plan")
+    monkeypatch.setattr(plan_check, "check_plan", lambda *_, **__: "checked")
+    monkeypatch.setattr(vary_check, "check_varied", lambda *_, **__: "varied")
+    assert plan._plan(task1, "distance", {})[0] == "plan"
+    found = SimpleNamespace(scene=task1)
+    assert (plan._check(found, 3), plan._check_varied(found)) == ("checked", "varied")
+    assert said == [("steps", True), ("settings", True), ("plans", True)]

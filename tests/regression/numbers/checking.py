@@ -1,5 +1,7 @@
 """Verdicts, comparisons, costs, budgets in words, what the explorer answers, and what commands print in words."""
 
+import atexit
+import contextlib
 import copy
 import json
 import re
@@ -130,21 +132,25 @@ def _asked():
     return [without_error(partial(Message.of, text)) for text in texts]
 
 
+_LASTING = contextlib.ExitStack()
+atexit.register(_LASTING.close)
+
+
 @cache
 def _folder():
     """A folder of runs, kept to the end of the process."""
-    folder = tempfile.TemporaryDirectory()
+    folder = Path(_LASTING.enter_context(tempfile.TemporaryDirectory()))
     scene = scenes.load(_UNEVEN)
     pose = scene.settings[0].sensor, scene.settings[0].light
     clean = planner.image(scene, *pose)
-    np.save(Path(folder.name) / "shot.npy", clean + np.random.default_rng(7).normal(0, 3, clean.shape))
-    ice("validate", _UNEVEN, "--renders", "12", "--workers", "1", "--seed", "3", "--out", "run", cwd=Path(folder.name))
+    np.save(folder / "shot.npy", clean + np.random.default_rng(7).normal(0, 3, clean.shape))
+    ice("validate", _UNEVEN, "--renders", "12", "--workers", "1", "--seed", "3", "--out", "run", cwd=folder)
     return folder
 
 
 def run_folder():
     """Where the run lies, as ``run``, and a picture, as ``shot.npy``."""
-    return Path(_folder().name)
+    return _folder()
 
 
 def printed(*arguments):
