@@ -11,7 +11,7 @@ from imaging.light import exchange as exchange_module
 from imaging.light.between import _of_faces, _plain, light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged, room
+from imaging.light.exchange import Hits, _arriving, _frame, _nodes, _onto, _rim, exchange_of, exchanged, room
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -171,10 +171,10 @@ def test_a_round_wall_is_told_as_many_rays_tell_it(slot_end):
 def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     """The control of the test above: an eighth of the rays are off by more than it allows."""
     monkeypatch.setattr(exchange_module, "_FROM_NODE", 128)
-    for kept in (exchange_module._sheet, exchange_module._told):
+    for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     told, expected = _told_beside_many_rays(slot_end)
-    for kept in (exchange_module._sheet, exchange_module._told):
+    for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03
 
@@ -269,13 +269,13 @@ def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
 def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
     """Of the rectangle's nodes all that lie in a hole or on the rim, too: light comes to the rim from both sides."""
     solid, face = pierced
-    exchange = SimpleNamespace(solid=solid, cell=4.0, met=lambda nodes, *_: nodes)
-    sheet = _sheet.__wrapped__(exchange, face)
+    exchange = SimpleNamespace(solid=solid, cell=4.0)
+    sheet, nodes, *_ = _nodes(exchange, face)
     first = min(sheet.u[1], sheet.v[1])
     loops = [solid.faces[face], *solid.holes[face]]
-    near = np.min([_apart(sheet.met, solid.vertices[list(loop)]) for loop in loops], axis=0)
+    near = np.min([_apart(nodes, solid.vertices[list(loop)]) for loop in loops], axis=0)
     assert near.min() == pytest.approx(0.01 * first, rel=0.02)
-    assert len(sheet.met) == sheet.u.size * sheet.v.size
+    assert len(nodes) == sheet.u.size * sheet.v.size
     assert np.ptp(sheet.u) == pytest.approx(sheet.frame.size[0])
     assert np.ptp(sheet.v) == pytest.approx(sheet.frame.size[1])
 

@@ -215,7 +215,7 @@ def test_ways_to_a_closed_surface(kernel):
 def test_faces_that_cannot_be_cut_are_refused(kernel):
     """By their number, what the first is, and where."""
     kernel.whole = body(plain("f"))
-    with pytest.raises(Unusable, match="of faces that can be cut into triangles, got 1 that cannot: a surface$"):
+    with pytest.raises(Unusable, match=r"of faces that can be cut into triangles, got 1 that cannot: a surface$"):
         step_kernel.record(b"data", 20, 2000)
     edge = Shape("e", kind="edge", curve=curve("Line"))
     kernel.whole = body(plain("f", [edge]), plain("g"))
