@@ -1,5 +1,6 @@
 """Light between surfaces against closed forms of form factors: a wall, a right angle, a blind hole, a cavity."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -177,6 +178,32 @@ def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03
+
+
+def test_faces_are_told_together_what_each_is_told_alone(slot_end, monkeypatch):
+    """Each facet by rays of its own; every other face by fewer, as small ones are."""
+    nodes = exchange_module._nodes
+
+    def fewer(exchange, face):
+        sheet, *rest = nodes(exchange, face)
+        return replace(sheet, rays=256 if face % 2 else 1024), *rest
+
+    monkeypatch.setattr(exchange_module, "_nodes", fewer)
+    light, facets, _ = slot_end
+    exchange, faces = light.exchange, [*facets[:3], *np.flatnonzero(light.exchange.solid.plane)]
+    faces = [int(face) for face in faces if exchange.has[face]]
+    together = list(exchange_module._sheets.__wrapped__(exchange, faces))
+    assert len({sheet.rays for sheet in together}) == 2
+    for face, sheet in zip(faces, together, strict=True):
+        (alone,) = exchange_module._sheets.__wrapped__(exchange, [face])
+        assert all(np.array_equal(*both) for both in zip(sheet.met, alone.met, strict=True))
+        assert len(sheet.met.starts) > 0
+        assert sheet.met.starts.max() < sheet.u.size * sheet.v.size
+    told = list(exchange_module._told.__wrapped__(light, faces))
+    for face, each in zip(faces, told, strict=True):
+        (alone,) = exchange_module._told.__wrapped__(light, [face])
+        places = light.exchange.solid.triangles[light.exchange.solid.triangle_faces == face].mean(1)
+        assert np.array_equal(each.at(places), alone.at(places))
 
 
 def test_a_convex_body_has_none():
