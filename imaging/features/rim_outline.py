@@ -29,7 +29,7 @@ def facets(solid: Solid, circle: Circle, angle: np.ndarray) -> np.ndarray:
         share = (first[:, 0] * toward[:, None, 1] - first[:, 1] * toward[:, None, 0]) / turn
     hit = (share >= -1e-9) & (share <= 1 + 1e-9) & (far > 0)
     found = np.where(hit, far, np.nan)
-    return np.nan_to_num(np.nanmax(found, axis=1) / circle.radius, nan=1.0)
+    return np.nan_to_num(np.fmax.reduce(found, axis=1) / circle.radius, nan=1.0)
 
 
 def _pieces(solid: Solid, circle: Circle) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +12,7 @@ from imaging.geometry.projection import from_axis, jacobian_ideal
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, face_signal, of_sides
 from imaging.pictures import Pictures
-from scenes import Circle, Solid
+from scenes import Circle, Edge, Solid
 
 RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
@@ -167,8 +168,8 @@ def _straight_around(solid: Solid, circle: Circle) -> np.ndarray:
 
     Of an arc's also the other edges at its ends that are no facets'.
     """
-    own = {name for rim in (*solid.circles, circle) for name in rim.edges}
-    edges = [edge for edge in solid.edges if circle.face in edge.faces and edge.name not in own]
+    own = _round(solid).union(circle.edges)
+    edges = [edge for edge in _of_faces(solid).get(circle.face, ()) if edge.name not in own]
     if circle.ends is not None:
         last = {tuple(end) for end in circle.ends.tolist()}
         at = [v for v in dict.fromkeys(v for name in circle.edges for v in solid.edge(name).ends)
@@ -176,6 +177,22 @@ def _straight_around(solid: Solid, circle: Circle) -> np.ndarray:
         edges += [edge for v in at for edge in solid.meeting[v] if edge.name not in own and edge.kind != "smooth"]
     ends = [edge.ends for edge in dict.fromkeys(edges)]
     return solid.vertices[np.array(ends, int).ravel()].reshape(-1, 3)
+
+
+@lru_cache(maxsize=4)
+def _round(solid: Solid) -> frozenset[str]:
+    """Names of the pieces of all circles."""
+    return frozenset(name for circle in solid.circles for name in circle.edges)
+
+
+@lru_cache(maxsize=4)
+def _of_faces(solid: Solid) -> dict[int, list[Edge]]:
+    """The edges that meet in each face, in the solid's order."""
+    found: dict[int, list[Edge]] = defaultdict(list)
+    for edge in solid.edges:
+        for face in edge.faces:
+            found[face].append(edge)
+    return found
 
 
 def _image(pictures: Pictures, points: np.ndarray) -> np.ndarray:

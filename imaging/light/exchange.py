@@ -14,7 +14,7 @@ and all shares of a place add to 1.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +23,7 @@ import numpy as np
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
+from imaging.light.kept import kept
 from scenes import Floor, Scene, Solid
 from scenes.parts.solid import assembled
 
@@ -43,6 +44,7 @@ _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; b
 _FLOOR_PATCHES = 400  # of it, besides those of the bodies
 _UP = 1 - 1e-9  # cosine of a normal that sees no floor
 _AT_ONCE = 200_000  # rays
+_TOGETHER = 64  # faces
 _LIFT = 1e-6  # of the object's size: between a place and its own face
 _MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
 _PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
@@ -78,6 +80,9 @@ class Hits(NamedTuple):
     points: np.ndarray
     faces: np.ndarray
     patches: np.ndarray
+
+
+NOTHING_MET = Hits(*(np.zeros((0, 3) if name == "points" else 0) for name in Hits._fields))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,13 +213,13 @@ class Exchanged:
     def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What arrives at points (..., 3) on faces (...)."""
         found = np.zeros(faces.shape)
-        for face, here in _by_face(faces.ravel()):
-            if self.exchange.has[face]:
-                found.flat[here] = _told(self, face).at(points.reshape(-1, 3)[here])
+        places = {face: here for face, here in _by_face(faces.ravel()) if self.exchange.has[face]}
+        for told, here in zip(_told(self, list(places)), places.values(), strict=True):
+            found.flat[here] = told.at(points.reshape(-1, 3)[here])
         return found
 
-    def gathered(self, met: Hits, count: int, rays: int) -> np.ndarray:
-        """What arrives at ``count`` points from what so many rays from each of them met.
+    def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:
+        """What arrives at ``count`` points from what so many rays, int or (count,), from each of them met.
 
         Of several emitters each is asked for every so manieth ray.
         """
@@ -248,15 +253,25 @@ class Told:
         return self.values.ev(*np.clip((points - self.frame.corner) @ self.frame.sides.T, 0, self.frame.size).T)
 
 
-@lru_cache(maxsize=2048)
-def _told(light: Exchanged, face: int) -> Told:
+@kept(most=2048)
+def _told(light: Exchanged, faces: list[int]) -> Iterator[Told]:
+    """What arrives on faces."""
+    for at in range(0, len(faces), _TOGETHER):
+        sheets = _sheets(light.exchange, faces[at : at + _TOGETHER])
+        counts = np.array([sheet.u.size * sheet.v.size for sheet in sheets])
+        met = Hits(*map(np.concatenate, zip(*(sheet.met for sheet in sheets), strict=True)))
+        first = np.repeat(np.cumsum(counts) - counts, [len(sheet.met.starts) for sheet in sheets])
+        rays = np.repeat([sheet.rays for sheet in sheets], counts)
+        values = light.gathered(met._replace(starts=met.starts + first), counts.sum(), rays)
+        yield from map(_spline, sheets, np.split(values, np.cumsum(counts)[:-1]))
+
+
+def _spline(sheet: Sheet, values: np.ndarray) -> Told:
+    """Of values (n,) at the nodes of a face."""
     from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
 
-    sheet = _sheet(light.exchange, face)
-    shape = sheet.u.size, sheet.v.size
-    values = light.gathered(sheet.met, shape[0] * shape[1], sheet.rays).reshape(shape)
-    places = [sheet.u, sheet.v]
-    for axis, (size, count) in enumerate(zip(sheet.frame.size, shape, strict=True)):
+    places, values = [sheet.u, sheet.v], values.reshape(sheet.u.size, sheet.v.size)
+    for axis, (size, count) in enumerate(zip(sheet.frame.size, values.shape, strict=True)):
         if count == 1:
             places[axis], values = np.array([0.0, size]), np.repeat(values, 2, axis)
     along, across = (min(3, n - 1) for n in values.shape)
@@ -314,7 +329,12 @@ def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
 
 def _square(count: int) -> np.ndarray:
     """So many points that fill the unit square evenly, (n, 2)."""
-    return np.arange(1, count + 1)[:, None] / _PLASTIC ** np.arange(1, 3) % 1.0
+    return _of_square(np.arange(1, count + 1)[:, None])
+
+
+def _of_square(number: int | np.ndarray) -> np.ndarray:
+    """Points of that sequence by their numbers, from 1, one more axis of 2."""
+    return number / _PLASTIC ** np.arange(1, 3) % 1.0
 
 
 def _ways(normals: np.ndarray, square: np.ndarray) -> np.ndarray:
@@ -331,9 +351,25 @@ def _areas(triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
 
-@lru_cache(maxsize=2048)
-def _sheet(exchange: Exchange, face: int) -> Sheet:
-    """The rectangle along a face's longest edge; nodes that are not on the face see what the nearest place of it does.
+@kept(most=2048)
+def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
+    """Of faces, those of as many rays a node looked at together."""
+    bare = [_nodes(exchange, face) for face in faces]
+    found: dict[int, Hits] = {}
+    for many in dict.fromkeys(sheet.rays for sheet, *_ in bare):
+        which = [k for k, (sheet, *_) in enumerate(bare) if sheet.rays == many]
+        counts = [len(bare[k][1]) for k in which]
+        nodes, normals, shifts = (np.concatenate([bare[k][i] for k in which]) for i in (1, 2, 3))
+        met = exchange.met(nodes, normals, many, shifts)
+        for k, start, count in zip(which, np.cumsum(counts) - counts, counts, strict=True):
+            part = slice(*np.searchsorted(met.starts, [start, start + count]))
+            found[k] = Hits(*(each[part].copy() for each in met._replace(starts=met.starts - start)))
+    return (replace(sheet, met=found[k]) for k, (sheet, *_) in enumerate(bare))
+
+
+def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
+    """The rectangle along a face's longest edge with nothing met yet, its nodes, their normals (n, 3) and their rays'
+    shifts (n, 2); nodes that are not on the face see what the nearest place of it does.
 
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
@@ -345,9 +381,9 @@ def _sheet(exchange: Exchange, face: int) -> Sheet:
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
     nodes = _onto(solid, face, nodes, min(within))
     rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
-    shift = _square(face + 1)[-1] if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
-    normals = np.broadcast_to(solid.normals[face], nodes.shape)
-    return Sheet(frame, u, v, exchange.met(nodes, normals, rays, shift), rays)
+    shift = _of_square(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    sheet = Sheet(frame, u, v, NOTHING_MET, rays)
+    return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
 
 
 def _along(size: float, goes_on: bool, cell: float) -> np.ndarray:

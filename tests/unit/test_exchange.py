@@ -1,5 +1,6 @@
 """Light between surfaces against closed forms of form factors: a wall, a right angle, a blind hole, a cavity."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from imaging.light import exchange as exchange_module
 from imaging.light.between import _of_faces, _plain, light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, _frame, _onto, _rim, _sheet, exchange_of, exchanged, room
+from imaging.light.exchange import Hits, _arriving, _frame, _nodes, _onto, _rim, exchange_of, exchanged, room
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -171,12 +172,38 @@ def test_a_round_wall_is_told_as_many_rays_tell_it(slot_end):
 def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     """The control of the test above: an eighth of the rays are off by more than it allows."""
     monkeypatch.setattr(exchange_module, "_FROM_NODE", 128)
-    for kept in (exchange_module._sheet, exchange_module._told):
+    for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     told, expected = _told_beside_many_rays(slot_end)
-    for kept in (exchange_module._sheet, exchange_module._told):
+    for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03
+
+
+def test_faces_are_told_together_what_each_is_told_alone(slot_end, monkeypatch):
+    """Each facet by rays of its own; every other face by fewer, as small ones are."""
+    nodes = exchange_module._nodes
+
+    def fewer(exchange, face):
+        sheet, *rest = nodes(exchange, face)
+        return replace(sheet, rays=256 if face % 2 else 1024), *rest
+
+    monkeypatch.setattr(exchange_module, "_nodes", fewer)
+    light, facets, _ = slot_end
+    exchange, faces = light.exchange, [*facets[:3], *np.flatnonzero(light.exchange.solid.plane)]
+    faces = [int(face) for face in faces if exchange.has[face]]
+    together = list(exchange_module._sheets.__wrapped__(exchange, faces))
+    assert len({sheet.rays for sheet in together}) == 2
+    for face, sheet in zip(faces, together, strict=True):
+        (alone,) = exchange_module._sheets.__wrapped__(exchange, [face])
+        assert all(np.array_equal(*both) for both in zip(sheet.met, alone.met, strict=True))
+        assert len(sheet.met.starts) > 0
+        assert sheet.met.starts.max() < sheet.u.size * sheet.v.size
+    told = list(exchange_module._told.__wrapped__(light, faces))
+    for face, each in zip(faces, told, strict=True):
+        (alone,) = exchange_module._told.__wrapped__(light, [face])
+        places = light.exchange.solid.triangles[light.exchange.solid.triangle_faces == face].mean(1)
+        assert np.array_equal(each.at(places), alone.at(places))
 
 
 def test_a_convex_body_has_none():
@@ -269,13 +296,13 @@ def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
 def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
     """Of the rectangle's nodes all that lie in a hole or on the rim, too: light comes to the rim from both sides."""
     solid, face = pierced
-    exchange = SimpleNamespace(solid=solid, cell=4.0, met=lambda nodes, *_: nodes)
-    sheet = _sheet.__wrapped__(exchange, face)
+    exchange = SimpleNamespace(solid=solid, cell=4.0)
+    sheet, nodes, *_ = _nodes(exchange, face)
     first = min(sheet.u[1], sheet.v[1])
     loops = [solid.faces[face], *solid.holes[face]]
-    near = np.min([_apart(sheet.met, solid.vertices[list(loop)]) for loop in loops], axis=0)
+    near = np.min([_apart(nodes, solid.vertices[list(loop)]) for loop in loops], axis=0)
     assert near.min() == pytest.approx(0.01 * first, rel=0.02)
-    assert len(sheet.met) == sheet.u.size * sheet.v.size
+    assert len(nodes) == sheet.u.size * sheet.v.size
     assert np.ptp(sheet.u) == pytest.approx(sheet.frame.size[0])
     assert np.ptp(sheet.v) == pytest.approx(sheet.frame.size[1])
 
