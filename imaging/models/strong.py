@@ -21,6 +21,7 @@ from imaging.pictures import Pictures
 from imaging.sensor import recorded
 
 ROUGH = 4.0  # ratio of squared contrasts along an edge beyond which points are dropped
+_LEAST = 1.25 * MIN_CONTRAST  # of such a piece: the model is up to a fifth off where light comes from other faces
 _PLACES = 128  # along the image of an edge
 
 
@@ -93,7 +94,7 @@ def strong_piece(contrast: np.ndarray, length: float, trims: np.ndarray, clear: 
     used = np.flatnonzero((place >= trims[0]) & (place <= length - trims[1]))
     if not used.size or not _is_rough(contrast[used]):
         return 0.0, 1.0
-    sign = np.where(np.abs(contrast) >= MIN_CONTRAST, np.sign(contrast), 0.0)[used]
+    sign = np.where(np.abs(contrast) >= _LEAST, np.sign(contrast), 0.0)[used]
     first, last = _longest(sign)
     start = 0.0 if first == 0 else float(used[first]) / count
     stop = 1.0 if last == len(used) else float(used[last]) / count

@@ -33,10 +33,11 @@ RISER = "e15"
         ([(5, 9.0), (5, 4.6)], (0.0, 1.0)),
         ([(5, 9.0), (5, 4.4)], (0.0, 0.5)),
         ([(3, 1.0), (5, -9.0), (2, -2.0)], (0.3, 0.8)),
-        ([(3, -20.0), (1, 0.0), (6, 7.0)], (0.4, 1.0)),
+        ([(3, -20.0), (1, 0.0), (6, 6.3)], (0.4, 1.0)),
+        ([(3, -20.0), (1, 0.0), (6, 6.2)], (0.0, 0.3)),
         ([(4, 20.0), (6, -20.0)], (0.44, 1.0)),  # a jump: 4 px beside it are left out
         ([(6, 20.0), (4, -20.0)], (0.0, 0.56)),
-        ([(4, 4.9), (6, 0.0)], (0.0, 1.0)),  # nothing stands out
+        ([(4, 6.2), (6, 0.0)], (0.0, 1.0)),  # nothing stands out
         ([(5, 20.0), (2, 0.0), (3, 20.0)], (0.0, 0.5)),
     ],
 )
@@ -103,7 +104,7 @@ def test_sigma_of_an_edge_whose_contrast_fades(rng):
     edge = 3  # from below upwards
     along = 116.0 - (np.arange(102) + 0.5)
     strong = strong_piece(45 * np.exp(-(along - 14.0) / 26) / noise, 102.0, NONE, 4.6)
-    assert strong[0] == pytest.approx(1 - 26 * np.log(6) / 102, abs=0.01)  # where it is 5 times the noise
+    assert strong[0] == pytest.approx(1 - 26 * np.log(4.8) / 102, abs=0.01)  # where it is 6.25 times the noise
     assert strong[1] == 1.0
     pieces = np.array([(0.0, 1.0)] * 3 + [strong])
     noisy = image + rng.normal(scale=noise, size=(count, *image.shape))
@@ -114,5 +115,5 @@ def test_sigma_of_an_edge_whose_contrast_fades(rng):
         told = np.sqrt(noise**2 * np.square(middle @ part.respond(image)).sum())
         found = part.estimate(noisy, noise**2)
         ratio.append(np.std(found.level[:, 0] + middle[1] * found.slope[:, 0]) / told)
-    assert 0.95 < ratio[0] < 1.12  # points of five times the noise scatter by a tenth more than to first order
+    assert 0.95 < ratio[0] < 1.05
     assert ratio[1] < 0.85  # in noise alone they scatter no farther than the locator looks, whatever the slope says
