@@ -93,7 +93,7 @@ def _magnified(camera, view: ProjectedEdges, fractions: np.ndarray) -> tuple[np.
 
 
 def used_trims(pictures: Pictures, view: ProjectedEdges, *, trimmed: bool) -> np.ndarray:
-    """Lengths left out at both ends of each edge, px, shape (..., E, 2): trims, and what is hidden, in shadow or does not
+    """Lengths left out at both ends of each edge, px, (..., E, 2): trims, and what is hidden, in shadow or does not
     stand out of the noise."""
     scene = pictures.scene
     trims = cut(view.framed, strong_pieces(pictures, view), view.lengths, 0.0) if trimmed else np.zeros_like(view.trims)

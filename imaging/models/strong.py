@@ -82,9 +82,9 @@ def strong_piece(contrast: np.ndarray, length: float, trims: np.ndarray, clear: 
 
     Examples
     --------
-    >>> strong_piece(np.array([20.0] * 6 + [1.0] * 4), 100.0, np.zeros(2), 5.0)
-    (0.0, 0.6)
-    >>> strong_piece(np.array([20.0] * 6 + [-30.0] * 4), 80.0, np.zeros(2), 8.0)
+    >>> strong_piece(12.5 - 10 * (np.arange(16) + 0.5) / 16, 100.0, np.zeros(2), 5.0)
+    (0.0, 0.625)
+    >>> strong_piece(np.array([20.0] * 6 + [-7.5] * 4), 80.0, np.zeros(2), 8.0)
     (0.0, 0.5)
     >>> strong_piece(np.array([6.0] * 6 + [4.0] * 4), 100.0, np.zeros(2), 5.0)
     (0.0, 1.0)
@@ -96,13 +96,22 @@ def strong_piece(contrast: np.ndarray, length: float, trims: np.ndarray, clear: 
         return 0.0, 1.0
     sign = np.where(np.abs(contrast) >= _LEAST, np.sign(contrast), 0.0)[used]
     first, last = _longest(sign)
-    start = 0.0 if first == 0 else float(used[first]) / count
-    stop = 1.0 if last == len(used) else float(used[last]) / count
-    if first < last:
-        start += clear / length if first and sign[first - 1] else 0.0
-        stop -= clear / length if last < len(used) and sign[last] else 0.0
+    if first == last:
+        return 0.0, 1.0
+    height, start, stop = contrast[used] * sign[first], 0.0, 1.0
+    if first > 0:
+        start = float(used[first] + 0.5 - _beyond(height[first], height[first - 1])) / count
+        start += clear / length if sign[first - 1] else 0.0
+    if last < len(used):
+        stop = float(used[last - 1] + 0.5 + _beyond(height[last - 1], height[last])) / count
+        stop -= clear / length if sign[last] else 0.0
     shown = min(stop * length, length - trims[1]) - max(start * length, trims[0])
-    return (start, stop) if first < last and shown >= MIN_USABLE else (0.0, 1.0)
+    return (start, stop) if shown >= MIN_USABLE else (0.0, 1.0)
+
+
+def _beyond(inner: float, outer: float) -> float:
+    """How far a piece goes on past its last part to the next one, which is not of it: a share, as if evenly between."""
+    return (inner - _LEAST) / (inner - outer)
 
 
 def _is_rough(contrast: np.ndarray) -> bool:

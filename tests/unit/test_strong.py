@@ -42,19 +42,29 @@ RISER = "e15"
     ],
 )
 def test_longest_piece_of_one_sign(parts, piece):
-    contrast = np.concatenate([np.full(count, value) for count, value in parts])
-    assert strong_piece(contrast, 100.0, NONE, 4.0) == pytest.approx(piece)
+    """Between two of a hundred parts it ends where the contrast would, changing evenly between their middles."""
+    contrast = np.concatenate([np.full(10 * count, value) for count, value in parts])
+    assert strong_piece(contrast, 100.0, NONE, 4.0) == pytest.approx(piece, abs=0.005)
     start, stop = strong_piece(-contrast[::-1], 100.0, NONE, 4.0)
-    assert (1 - stop, 1 - start) == pytest.approx(piece)
+    assert (1 - stop, 1 - start) == pytest.approx(piece, abs=0.005)
+
+
+@pytest.mark.parametrize("least", [2.0, -6.0])
+def test_ends_move_evenly_with_the_contrast(least):
+    """What is changed a little changes a piece a little: budgets take differences."""
+    place = (np.arange(16) + 0.5) / 16
+    ends = [strong_piece(least + 40 * place + more, 100.0, NONE, 4.0)[0] for more in (0.0, 1e-4)]
+    assert ends[0] == pytest.approx((6.25 - least) / 40)
+    assert ends[1] - ends[0] == pytest.approx(-1e-4 / 40)
 
 
 def test_what_is_trimmed_decides_nothing():
     """Neither of contrast that changes beside a corner, nor of a piece of which less than 2 px are left."""
-    contrast = np.array([1.0, -9.0] + [20.0] * 8)
+    contrast = np.array([1.0] * 10 + [-9.0] * 10 + [20.0] * 80)
     assert strong_piece(contrast, 100.0, np.array([20.0, 0.0]), 4.0) == (0.0, 1.0)
-    assert strong_piece(contrast, 100.0, np.array([10.0, 0.0]), 4.0) == pytest.approx((0.24, 1.0))
+    assert strong_piece(contrast, 100.0, np.array([10.0, 0.0]), 4.0) == pytest.approx((0.24, 1.0), abs=0.005)
     ending = np.array([20.0] * 20 + [1.0] * 80)
-    assert strong_piece(ending, 100.0, np.array([17.0, 0.0]), 4.0) == pytest.approx((0.0, 0.2))
+    assert strong_piece(ending, 100.0, np.array([17.0, 0.0]), 4.0) == pytest.approx((0.0, 0.2), abs=0.005)
     assert strong_piece(ending, 100.0, np.array([18.5, 0.0]), 4.0) == (0.0, 1.0)
 
 
