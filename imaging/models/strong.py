@@ -22,6 +22,7 @@ from imaging.sensor import recorded
 
 ROUGH = 4.0  # ratio of squared contrasts along an edge beyond which points are dropped
 _LEAST = 1.25 * MIN_CONTRAST  # of such a piece: the model is up to a fifth off where light comes from other faces
+_JUMP = 0.5  # of the contrast, from one place to the next: a shadow ends there
 _PLACES = 128  # along the image of an edge
 
 
@@ -30,7 +31,7 @@ def strong_pieces(pictures: Pictures, view: ProjectedEdges) -> np.ndarray:
 
     Where the contrast changes by no more than a factor 2, where no such piece is long enough, of edges beside prints,
     whose contrast changes in places, and of pictures that are glanced at, the whole edge. Beside a place where the
-    contrast jumps to one of the other sign, a shadow's edge, the locator's reach is left out, too.
+    contrast jumps to less than half, a shadow's edge, the locator's reach is left out, too.
 
     Returns
     -------
@@ -78,7 +79,7 @@ def strong_piece(contrast: np.ndarray, length: float, trims: np.ndarray, clear: 
     trims : ndarray, shape (2,)
         What is left out at the ends anyway, px: what is there decides nothing.
     clear : float
-        What is left out beside a jump to the other sign, px.
+        What is left out beside a jump, px.
 
     Examples
     --------
@@ -101,10 +102,10 @@ def strong_piece(contrast: np.ndarray, length: float, trims: np.ndarray, clear: 
     height, start, stop = contrast[used] * sign[first], 0.0, 1.0
     if first > 0:
         start = float(used[first] + 0.5 - _beyond(height[first], height[first - 1])) / count
-        start += clear / length if sign[first - 1] else 0.0
+        start += clear / length if height[first - 1] < _JUMP * height[first] else 0.0
     if last < len(used):
         stop = float(used[last - 1] + 0.5 + _beyond(height[last - 1], height[last])) / count
-        stop -= clear / length if sign[last] else 0.0
+        stop -= clear / length if height[last] < _JUMP * height[last - 1] else 0.0
     shown = min(stop * length, length - trims[1]) - max(start * length, trims[0])
     return (start, stop) if shown >= MIN_USABLE else (0.0, 1.0)
 
