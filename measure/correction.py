@@ -164,7 +164,7 @@ def correction(
     estimator, threshold
         As for `measure.distance`.
     propagated : PropagatedValues, optional
-        What `measure.propagate` says of a render by the same estimator, if it is known already.
+        What `measure.propagate` says of the renders' mean by the same estimator, if it is known already.
 
     Raises
     ------
@@ -175,7 +175,8 @@ def correction(
         raise InvalidInput("renders must be at least one noise-free image, got none")
     if not picture.lights:
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
-    told = propagated or propagate(images.renders[0], picture, estimator=estimator, threshold=threshold).measurands
+    clean = np.mean(images.renders, axis=0)  # noise of rays makes weak edges steeper where they cross zero, sigma less
+    told = propagated or propagate(clean, picture, estimator=estimator, threshold=threshold).measurands
     steps = [(name, image) for name, some in images.changed.items() for image in some]
     levels = _levels((*images.renders, *images.beside, *(image for _, image in steps)), picture)
     value, value_image, found = _measured(levels, picture, estimator, threshold)

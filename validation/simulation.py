@@ -221,7 +221,8 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
             return found
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
-    told = measure.propagate(renders[0], picture, estimator=method.locator, threshold=method.threshold).measurands
+    clean = np.mean(renders, axis=0)
+    told = measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))

@@ -1,8 +1,9 @@
 """The required edges as the sensor sees them: ends, lengths, and the part of each edge that can be measured.
 
 Near a corner another edge disturbs the locator, so an edge is trimmed until its neighbours are `locator.reach`
-away: reach / sin(angle) along the edge, or reach itself where the neighbour turns away. Where another part of the
-object hides a piece of an edge, its longest free piece is used.
+away: reach / sin(angle) along the edge where the neighbour is long, else until its far end is so far away, or reach
+itself where the neighbour turns away. Where another part of the object hides a piece of an edge, its longest free piece
+is used.
 """
 
 from __future__ import annotations
@@ -189,9 +190,32 @@ def _trim(solid: Solid, edge: Edge, end: int, corners: dict, seen: np.ndarray, c
         if other is edge:
             continue
         aside = corners[other.ends[1 - other.ends.index(here)]] - corners[here]
-        cosine = np.einsum("...i,...i->...", along, aside)
-        sine = np.abs(along[..., 0] * aside[..., 1] - along[..., 1] * aside[..., 0])
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            needed = np.where(cosine > 0, clear * np.hypot(cosine, sine) / sine, clear)
-        trim = np.where(boundaries(solid, (other,), seen)[..., 0], np.fmax(trim, needed), trim)
+        needed = np.fmax(trim, trim_beside(along, aside, clear))
+        trim = np.where(boundaries(solid, (other,), seen)[..., 0], needed, trim)
     return trim
+
+
+def trim_beside(along: np.ndarray, aside: np.ndarray, clear: float) -> np.ndarray:
+    """Length to leave out at the end of an edge so that another one that starts there is so far away, shape (...).
+
+    Parameters
+    ----------
+    along, aside : ndarray, shape (..., 2)
+        From the corner to the other ends of the edge and of its neighbour, px.
+    clear : float
+        px
+
+    Examples
+    --------
+    >>> long, short = np.array([60.0, 80.0]), np.array([0.6, 0.8])
+    >>> np.round([trim_beside(np.array([90.0, 0.0]), each, 4.0) for each in (long, short, -long)], 3).tolist()
+    [5.0, 4.519, 4.0]
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        unit = along / np.linalg.norm(along, axis=-1, keepdims=True)
+        ahead = np.einsum("...i,...i->...", unit, aside)
+        apart = np.abs(unit[..., 0] * aside[..., 1] - unit[..., 1] * aside[..., 0])
+        size = np.hypot(ahead, apart)
+        beside = clear * ahead <= size * apart  # it is nearest beside it, not at its far end
+        past = ahead + np.sqrt(np.maximum(clear**2 - apart**2, 0.0))
+        return np.where(ahead > 0, np.where(beside, clear * size / apart, past), clear)

@@ -13,6 +13,7 @@ from imaging.geometry.lens import blur_at, lens_jacobian
 from imaging.geometry.visibility import longest_span
 from imaging.light.appearance import edge_contrast
 from imaging.light.backlight import backlights
+from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
 from scenes import Edge
 
@@ -92,9 +93,10 @@ def _magnified(camera, view: ProjectedEdges, fractions: np.ndarray) -> tuple[np.
 
 
 def used_trims(pictures: Pictures, view: ProjectedEdges, *, trimmed: bool) -> np.ndarray:
-    """Lengths left out at both ends of each edge, px, shape (..., E, 2): trims, and what is hidden or in shadow."""
+    """Lengths left out at both ends of each edge, px, (..., E, 2): trims, and what is hidden, in shadow or does not
+    stand out of the noise."""
     scene = pictures.scene
-    trims = view.framed if trimmed else np.zeros_like(view.trims)
+    trims = cut(view.framed, strong_pieces(pictures, view), view.lengths, 0.0) if trimmed else np.zeros_like(view.trims)
     if scene.bodies.is_convex or not view.names:
         return trims
     spans = [_span(pictures, scene.solid.edge(name)) for name in view.names]

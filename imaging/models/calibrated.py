@@ -9,10 +9,10 @@ from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kapp
 from imaging.light.appearance import is_separable
 from imaging.models.along import NODE_WEIGHTS, Along, Nodes
 from imaging.models.errors import Errors, combined
+from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
 
 SHORT = 10.0  # smoothing scales: shorter edges take the double integral
-ROUGH = 4.0  # ratio of squared contrasts along an edge beyond which points are dropped
 
 
 def calibrated(pictures: Pictures) -> Errors:

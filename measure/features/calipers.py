@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imaging.features.locator import MIN_USABLE
+from imaging.features.projected_edges import trim_beside
 from imaging.geometry.segments import distance_to_segment
 from measure.features.layout import Layout
 from measure.features.optics import Optics
@@ -29,8 +30,8 @@ class Caliper:
     length : float
         Length of the edge's image, px.
     positions : ndarray, shape (m,)
-        Places along the edge, at most 1 px apart, where it can be measured: the trimmed corners and what lies outside
-        the image are left out.
+        Places along the edge, at most 1 px apart, where it can be measured: the trimmed corners, what lies outside the
+        image and what does not stand out of the noise are left out.
     status : str
         ``ok``, ``clutter``, ``short`` or ``not_visible``, as far as geometry alone tells.
     optics : Optics
@@ -105,6 +106,8 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float |
     last = length - max(
         trim(-along, layout.beside[i][1], clear), length - shown[1] + clear if shown[1] < length else 0.0
     )
+    if layout.strong is not None:
+        first, last = max(first, length * layout.strong[i, 0]), min(last, length * layout.strong[i, 1])
     positions = np.linspace(first, last, int(np.ceil(last - first)) + 1) if last >= first + MIN_USABLE else np.empty(0)
     places = start + positions[:, None] * along
     size = np.array(layout.optics.shape[::-1])
@@ -128,12 +131,5 @@ def _crowded(layout: Layout, i: int, places: np.ndarray, near: float) -> bool:
 
 
 def trim(along: np.ndarray, beside: np.ndarray, clear: float) -> float:
-    """Length to leave out at an edge's end so that every edge that starts there is ``clear`` px away.
-
-    clear / sin(angle) for an edge that turns towards this one, ``clear`` itself for one that turns away.
-    """
-    cosine, sine = beside @ along, np.abs(beside @ np.array([-along[1], along[0]]))
-    towards = cosine > 0
-    if not towards.any():
-        return clear
-    return float(np.max(clear / np.maximum(sine[towards], 1e-12)))
+    """Length to leave out at an edge's end so that every edge that starts there, (k, 2), is ``clear`` px away."""
+    return float(np.max(trim_beside(along, beside, clear), initial=clear))

@@ -15,6 +15,7 @@ from imaging.geometry.projection import depth, facing, project_ideal
 from imaging.geometry.visibility import boundaries
 from imaging.light.appearance import is_plain
 from imaging.models.bias import cluttered
+from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.optics import Optics
@@ -40,7 +41,8 @@ class Layout:
     joints : tuple of ((int, int), (int, int))
         (edge, end) pairs that meet in one vertex.
     beside : tuple
-        For each edge and each of its ends the unit directions (k, 2) of all other visible edges that start there.
+        For each edge and each of its ends the ways (k, 2), px, to the far ends of all other visible edges that start
+        there.
     apart : tuple
         For each edge the segments (k, 2, 2) of the visible edges that share no end with it.
     others : ndarray, shape (k, 2, 2)
@@ -58,6 +60,8 @@ class Layout:
         All that is seen around the edges; None where things hide or shade each other.
     clutter : ndarray of bool, shape (E,), optional
         Where the light is known, for which edges the planner predicts ``clutter`` of the classic locators.
+    strong : ndarray, shape (E, 2), optional
+        Where the light is known, the piece of each edge that stands out of the noise, as fractions of its length.
     """
 
     names: tuple[str, ...]
@@ -76,6 +80,7 @@ class Layout:
     defocus: np.ndarray
     arrangement: Arrangement | None = None
     clutter: np.ndarray | None = None
+    strong: np.ndarray | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -215,6 +220,7 @@ def layout_of(picture: Picture) -> Layout:
         defocus=_defocus(scene, pose, required),
         arrangement=arrangement_of(pictures) if is_plain(scene) else None,
         clutter=cluttered(pictures) if picture.lights else None,
+        strong=strong_pieces(pictures, view) if picture.lights else None,
     )
 
 
@@ -226,7 +232,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
     corners = np.asarray(corners, float)
     count = len(corners)
     ends = np.stack([corners, np.roll(corners, -1, 0)], 1)
-    unit = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1, keepdims=True)
+    along = ends[:, 1] - ends[:, 0]
     indices = [(i, (i + 1) % count) for i in range(count)]
     x, y = corners.T
     clockwise = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0  # as seen, with y down
@@ -237,7 +243,7 @@ def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:
         shown=np.tile([0.0, 1.0], (count, 1)),
         corners=tuple(((i - 1) % count, i) for i in range(count)),
         joints=_joints(indices),
-        beside=tuple((-unit[[(i - 1) % count]], unit[[(i + 1) % count]]) for i in range(count)),
+        beside=tuple((-along[[(i - 1) % count]], along[[(i + 1) % count]]) for i in range(count)),
         apart=tuple(ends[[j for j in range(count) if not set(indices[i]) & set(indices[j])]] for i in range(count)),
         others=np.empty((0, 2, 2)),
         faces=(corners,),
@@ -268,9 +274,7 @@ def _joints(ends: list[tuple[int, int]]) -> tuple:
 def _away(points: np.ndarray, edge, end: int, shown) -> np.ndarray:
     here = edge.ends[end]
     found = [points[e.ends[1 - e.ends.index(here)]] - points[here] for e in shown if e is not edge and here in e.ends]
-    found = np.array(found).reshape(-1, 2)
-    length = np.linalg.norm(found, axis=1, keepdims=True)
-    return found / np.where(length > 0, length, 1)
+    return np.array(found).reshape(-1, 2)
 
 
 def _segments(points: np.ndarray, edges) -> np.ndarray:

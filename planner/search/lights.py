@@ -21,7 +21,8 @@ from imaging.features.projected_edges import circles
 from imaging.geometry.projection import edge_points
 from imaging.light.appearance import of_sides, side_signals
 from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
-from imaging.models.calibrated import ROUGH, line_slope, line_weight, long_edge, point_variance
+from imaging.models.calibrated import line_slope, line_weight, long_edge, point_variance
+from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
 from planner.search.exhaustive import BestPair

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from imaging.geometry.segments import distance_to_segment
 from measure.features.calipers import Caliper, edge_calipers, trim
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
@@ -78,10 +79,30 @@ def test_not_visible():
 def test_trim(degrees, factor):
     """clear / sin(angle) for an edge that turns towards this one, the largest of several."""
     along, angle = np.array([0.6, 0.8]), np.arctan2(0.8, 0.6) + np.radians(degrees)
-    beside = np.array([[np.cos(angle), np.sin(angle)]])
+    beside = 20.0 * np.array([[np.cos(angle), np.sin(angle)]])
     assert trim(along, beside, 3.0) == pytest.approx(3.0 * factor)
-    assert trim(along, np.concatenate([beside, [[0.0, 1.0]]]), 3.0) == pytest.approx(max(3.0 * factor, 3.0 / 0.6))
+    assert trim(along, np.concatenate([beside, [[0.0, 9.0]]]), 3.0) == pytest.approx(max(3.0 * factor, 3.0 / 0.6))
     assert trim(along, np.empty((0, 2)), 3.0) == 3.0
+
+
+@pytest.mark.parametrize("degrees", [0.0, 2.0, 40.0, 89.0, 91.0, 180.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 4.0, 30.0])
+def test_trim_beside_a_neighbour_that_ends(degrees, size):
+    """The edge is as far from the neighbour, a piece of a line, as is asked, and nearer just before; never less than
+    that is left out. One that lies upon the edge in the image hides so much of it as it is long."""
+    angle, clear = np.radians(degrees), 3.0
+    end = size * np.array([np.cos(angle), np.sin(angle)])
+    found = trim(np.array([200.0, 0.0]), end[None], clear)
+
+    def away(place):
+        return distance_to_segment(np.array([[place, 0.0]]), np.zeros(2), end)[0]
+
+    assert found >= clear
+    assert away(found) >= clear - 1e-9
+    if degrees < 90:
+        assert away(found - 1e-3) < clear
+    if degrees == 0:
+        assert found == pytest.approx(size + clear)
 
 
 def test_frame(rng):

@@ -67,9 +67,8 @@ def test_polygon(order):
         before, here, after = corners[i - 1], corners[i], corners[(i + 1) % 4]
         assert layout.ends[i].tolist() == [here.tolist(), after.tolist()]
         assert layout.corners[i] == ((i - 1) % 4, i)
-        assert layout.beside[i][0][0] == pytest.approx((before - here) / np.hypot(*(before - here)))
-        onward = corners[(i + 2) % 4] - after
-        assert layout.beside[i][1][0] == pytest.approx(onward / np.hypot(*onward))
+        assert layout.beside[i][0][0] == pytest.approx(before - here)
+        assert layout.beside[i][1][0] == pytest.approx(corners[(i + 2) % 4] - after)
         assert layout.apart[i].tolist() == [[corners[(i + 2) % 4].tolist(), corners[(i + 3) % 4].tolist()]]
         inside = (corners.mean(0) - here) @ layout.normals[i] > 0
         assert layout.sides[i].tolist() == ([0, BACKGROUND] if inside else [BACKGROUND, 0])

@@ -63,7 +63,10 @@ def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small_task1, pict
     assert abs(both.bias_image[0] - alone.bias_image[0]) > 1e-4
     assert np.isfinite(beside.u_bias).all()
     assert np.isinf(alone.u_bias).all()
-    assert beside.sources["rendering"] == pytest.approx(both.sources["rendering"] * math.sqrt(2))
+    same_but_for_the_response = 1e-3  # which is that of one image, and of the mean of two
+    assert beside.sources["rendering"] == pytest.approx(
+        both.sources["rendering"] * math.sqrt(2), rel=same_but_for_the_response
+    )
 
 
 def test_few_renders_scatter_by_no_less_than_all_features_tell():

@@ -183,7 +183,9 @@ def _trim(scene, view: View, images, edge, end: int, clear):
         if other is edge or edge.ends[end] not in other.ends or not any(view.seen[f] for f in other.faces):
             continue
         aside = minus(images[other.ends[1 - other.ends.index(edge.ends[end])]], here)
-        cosine, sine = dot(along, aside), abs(along[0] * aside[1] - along[1] * aside[0])
-        if cosine > 0:
-            found = max(found, clear * mp.sqrt(cosine**2 + sine**2) / sine if sine else mp.inf)
+        length, size = (mp.sqrt(dot(way, way)) for way in (along, aside))
+        ahead, apart = dot(along, aside) / length, abs(along[0] * aside[1] - along[1] * aside[0]) / length
+        if ahead > 0:
+            past = clear * ahead > size * apart  # the nearest of the other edge is its far end
+            found = max(found, ahead + mp.sqrt(clear**2 - apart**2) if past else clear * size / apart)
     return found
