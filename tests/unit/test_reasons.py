@@ -82,7 +82,7 @@ def test_a_flat_corner_says_at_which_angle_its_edges_meet(task1):
     length, least, lost = numbers(each.reason)
     assert length < lost
     assert least - lost == pytest.approx(MIN_USABLE, abs=1)
-    assert each.reason.endswith(f"{lost:.0f} at its ends lie too near to other edges")
+    assert each.reason.endswith(f"{lost:.3g} at its ends lie too near to other edges")
 
 
 def test_a_doubt_says_what_is_allowed_where_the_status_changes():
