@@ -17,7 +17,7 @@ from scenes.status import is_trusted
 
 _MOST, _ENOUGH = 6, 3  # measurands that are proposed; after so many no further setting is looked at
 _CLOSELY = 3, 24  # settings, of which the best is taken: of a large part, of a small one
-_TRIANGLES = 10_000  # about so many in all the settings that are looked at
+_TRIANGLES = 5_000  # about so many in all the settings that are looked at
 _ASKED = 8  # measurands that are looked at closely
 _CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
 _POLAR, _AZIMUTHS = (160, 140, 120, 60, 40, 20), range(10, 370, 45)
