@@ -65,7 +65,11 @@ class CrossingLocator:
 
     def locate_each(self, images: np.ndarray) -> EachPoint:
         """Edge points of images (n, height, width), each position by itself: its contrast may be of either sign."""
-        profiles = self._profiles(images)
+        return self.locate_each_in(images.reshape(len(images), -1)[:, self.pixels])
+
+    def locate_each_in(self, used: np.ndarray) -> EachPoint:
+        """The same of images of which only the locator's `pixels` are given, (n, P)."""
+        profiles = self._profiles_of(np.ascontiguousarray(used.T))
         profiles *= np.where(_rise(profiles) >= 0, 1.0, -1.0)[:, None]
         offset, valid, slope = self._offsets(*_bracket(profiles), profiles)
         return EachPoint(offset.T * self.gain, valid.T, (self.slope_to_contrast[:, None] * slope).T)
@@ -123,8 +127,11 @@ class CrossingLocator:
 
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """The function at all places, shape (m, T, n)."""
-        used = np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T)
-        profiles = (self.kernel @ used).reshape(self.positions.size, self.offsets.size, len(images))
+        return self._profiles_of(np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T))
+
+    def _profiles_of(self, used: np.ndarray) -> np.ndarray:
+        """The same of the grey levels (P, n) of its pixels."""
+        profiles = (self.kernel @ used).reshape(self.positions.size, self.offsets.size, used.shape[1])
         if len(self.level):
             profiles += (self.basis @ (self.level @ used))[:, None]
         return profiles

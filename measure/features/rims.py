@@ -23,6 +23,7 @@ from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
+from measure.features.rim_noise import is_linear
 from measure.features.tools import Curve, RimTool, held
 from scenes import Circle, Curved, Picture, status
 
@@ -64,7 +65,10 @@ def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
 
 
 def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.csr_array:
-    """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width)."""
+    """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width).
+
+    NaN where it does not tell the errors, for noise decides what is found (`measure.features.rim_noise`).
+    """
     moved = unmoved(picture, name)
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
@@ -75,7 +79,10 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
             break
         moved = _rounded(tool, np.array(moved) + change)
     taken = points.valid[0] & (tool.weights > 0)
-    return sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
+    found = sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
+    if not is_linear(tool, clean, found):
+        found.data[:] = np.nan
+    return found
 
 
 def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
