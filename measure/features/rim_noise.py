@@ -1,57 +1,130 @@
 """Are the errors of a circle linear in the noise, as the variance that is propagated says?
 
-Where two edges are near, of a rim and of what lies beside it, noise may decide at a place which of them is found. Its
-crossing then jumps from one to the other, which no derivative by the pixels of a noise-free image tells. Drawn noise
-answers it: circles through the points of drawn images beside those that the derivative gives of the same noise.
+Where two edges are near, of a rim and of what lies beside it, noise may decide at a place which of them is found, and
+with it from where the circle is looked for again. Its crossings then jump from one to the other, which no derivative by
+the pixels of a noise-free image tells. Drawn images answer it: circles that are found in them beside those that the
+derivative gives of the same noise.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import binary_dilation
 
-from measure.features.tools import RimTool
+from measure.features.optics import Optics
 
-_DRAWN, _AT_ONCE = 128, 16  # images; the same noise is in both variances, whose ratio is known better than each
+_DRAWN, _AT_ONCE = 128, 16  # images; both variances are of the same noise: their ratio is known better than each
+_AROUND = 4  # px beside the pixels looked at: in a drawn image the circle may be looked for elsewhere
 _ALIKE = 1.25  # ratio of variances, full and to first order, up to which they are alike
 _BIAS = 0.3  # standard deviations of the mean error, that `ok` allows
+_FOUND = 0.5  # part of the drawn images in which the circle must be found
 
 
-def is_linear(tool: RimTool, clean: np.ndarray, response: sparse.csr_array) -> bool:
-    """Whether a circle's errors have the variances of its linear response, and no mean beside it.
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Grey levels of n images, shape (n, pixels)."""
+
+    levels: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.levels)
+
+    def __getitem__(self, which: np.ndarray) -> Stack:
+        return Stack(self.levels[which])
+
+    def at(self, pixels: np.ndarray) -> np.ndarray:
+        """Levels (n, P) of pixels (P,), flat indices."""
+        return self.levels[:, pixels]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """n images of which noise is drawn where it matters.
+
+    Attributes
+    ----------
+    clean : ndarray, shape (pixels,)
+        Noise-free grey levels.
+    region : ndarray of int, shape (R,)
+        Flat indices of the pixels that have noise, in order.
+    noise : ndarray, shape (n, R)
+    """
+
+    clean: np.ndarray
+    region: np.ndarray
+    noise: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.noise)
+
+    def __getitem__(self, which: np.ndarray) -> Drawn:
+        return Drawn(self.clean, self.region, self.noise[which])
+
+    def at(self, pixels: np.ndarray) -> np.ndarray:
+        """Levels (n, P) of pixels (P,), flat indices."""
+        column = np.minimum(np.searchsorted(self.region, pixels), self.region.size - 1)
+        return self.clean[pixels] + np.where(self.region[column] == pixels, self.noise[:, column], 0.0)
+
+    def first_order(self, response: sparse.csr_array) -> np.ndarray:
+        """Errors (n, p) of what answers to the noise by a linear response (p, pixels)."""
+        return (sparse.csr_array(response[:, self.region]) @ self.noise.T).T
+
+
+def drawn(clean: np.ndarray, pixels: np.ndarray, optics: Optics) -> Iterator[Drawn]:
+    """Drawn images, some at once, of noise about the pixels that are looked at; always the same ones.
 
     Parameters
     ----------
-    tool : RimTool
     clean : ndarray, shape (height, width)
-        Noise-free grey levels.
-    response : csr_array, shape (p, height * width)
-        Derivative of the circle's parameters by the pixels.
+    pixels : ndarray of int
+        Flat indices.
+    optics : Optics
     """
-    linear, full = drawn(tool, clean, response)
-    spread = linear.std(0)
-    if not (np.isfinite(full).all() and (spread > 0).all()):
-        return bool(not spread.any())  # without noise there is nothing to ask
-    alike = np.abs(np.log(full.var(0) / spread**2)) <= np.log(_ALIKE)
-    return bool((alike & (np.abs((full - linear).mean(0)) <= _BIAS * spread)).all())
-
-
-def drawn(tool: RimTool, clean: np.ndarray, response: sparse.csr_array) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of a circle's parameters in drawn images, to first order and in full, both (n, p); always the same."""
-    pixels, rng = tool.locator.pixels, np.random.default_rng(0)
-    level = clean.ravel()[pixels]
-    variance = tool.optics.noise_at(level)
-    sigma = np.sqrt(tool.optics.noise_variance if variance is None else variance)
-    near = sparse.csr_array(response[:, pixels])
-    here, linear, full = _found(tool, level[None]), [], []
+    rng, region = np.random.default_rng(0), _around(pixels, clean.shape)
+    level = clean.ravel()[region]
+    variance = optics.noise_at(level)
+    sigma = np.sqrt(optics.noise_variance if variance is None else variance)
     for _ in range(0, _DRAWN, _AT_ONCE):
-        noise = sigma * rng.standard_normal((_AT_ONCE, pixels.size))
-        linear.append((near @ noise.T).T)
-        full.append(_found(tool, level + noise) - here)
-    return np.concatenate(linear), np.concatenate(full)
+        yield Drawn(clean.ravel(), region, sigma * rng.standard_normal((_AT_ONCE, region.size)))
 
 
-def _found(tool: RimTool, used: np.ndarray) -> np.ndarray:
-    """Parameters (n, p) in images of which the locator's pixels are given, (n, P)."""
-    points = tool.locator.locate_each_in(used)
-    return tool.solve(tool.fit(points.valid), points.offset)
+def _around(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Flat indices, in order, of pixels of an image of this shape and those up to `_AROUND` beside them."""
+    row, column = np.unravel_index(pixels, shape)
+    low = np.array([row.min(), column.min()]) - _AROUND
+    box = np.zeros(np.array([row.max(), column.max()]) + _AROUND + 1 - low, bool)
+    box[row - low[0], column - low[1]] = True
+    row, column = np.nonzero(binary_dilation(box, iterations=_AROUND)) + low[:, None]
+    inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
+    return np.ravel_multi_index((row[inside], column[inside]), shape)
+
+
+def is_linear(linear: np.ndarray, full: np.ndarray, found: np.ndarray) -> bool:
+    """Whether errors have the variances of a linear response, and no mean beside it.
+
+    Parameters
+    ----------
+    linear, full : ndarray, shape (n, p)
+        Errors of p parameters in n drawn images, to first order and in full.
+    found : ndarray of bool, shape (n,)
+        In which images the circle is.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).standard_normal((128, 1))
+    >>> jumps = noise + 6 * (noise > 1.5)
+    >>> is_linear(noise, 1.02 * noise, noise[:, 0] < 9), is_linear(noise, jumps, noise[:, 0] < 9)
+    (True, False)
+    """
+    if not linear.any():
+        return True  # without noise there is nothing to ask
+    if found.mean() < _FOUND or not np.isfinite(full[found]).all():
+        return False
+    linear, full = linear[found], full[found]
+    spread = np.where(linear.std(0) > 0, linear.std(0), np.finfo(float).tiny)
+    alike = np.abs(np.log(np.maximum(full.std(0), np.finfo(float).tiny) / spread)) <= np.log(_ALIKE) / 2
+    return bool((alike & (np.abs((full - linear).mean(0)) <= _BIAS * spread)).all())

@@ -23,7 +23,7 @@ from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
-from measure.features.rim_noise import is_linear
+from measure.features.rim_noise import Drawn, Stack, drawn, is_linear
 from measure.features.tools import Curve, RimTool, held
 from scenes import Circle, Curved, Picture, status
 
@@ -61,7 +61,7 @@ class Circles:
 
 def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
     """A circle or a curved surface of the object in images (n, height, width)."""
-    return _find(images, picture, name, unmoved(picture, name), _PASSES)
+    return _find(Stack(images.reshape(len(images), -1)), picture, name, unmoved(picture, name), _PASSES)
 
 
 def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.csr_array:
@@ -69,10 +69,11 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
 
     NaN where it does not tell the errors, for noise decides what is found (`measure.features.rim_noise`).
     """
-    moved = unmoved(picture, name)
+    moved, pixels = unmoved(picture, name), []
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
+        pixels.append(tool.locator.pixels)
         fit = tool.fit(points.valid)
         change = tool.solve(fit, points.offset)[0]
         if not _is_far(tool, change[None])[0]:
@@ -80,9 +81,20 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
         moved = _rounded(tool, np.array(moved) + change)
     taken = points.valid[0] & (tool.weights > 0)
     found = sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
-    if not is_linear(tool, clean, found):
+    if not _is_linear(clean, picture, name, np.concatenate(pixels), found):
         found.data[:] = np.nan
     return found
+
+
+def _is_linear(clean: np.ndarray, picture: Picture, name: str, pixels: np.ndarray, response: sparse.csr_array) -> bool:
+    """Whether what is found in drawn images are the errors that a response (p, height * width) tells."""
+    here, linear, full, found = find_circle(clean[None], picture, name).errors, [], [], []
+    for images in drawn(clean, pixels, Optics.of(picture.scene)):
+        each = _find(images, picture, name, unmoved(picture, name), _PASSES)
+        linear.append(images.first_order(response))
+        full.append(each.errors - here)
+        found.append(np.isin(each.state, status.MEASURED))
+    return is_linear(*map(np.concatenate, (linear, full, found)))
 
 
 def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
@@ -90,7 +102,7 @@ def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
     return (0.0,) * (each.count if isinstance(each, Curved) else 3)
 
 
-def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, ...], passes: int) -> Circles:
+def _find(images: Stack | Drawn, picture: Picture, name: str, moved: tuple[float, ...], passes: int) -> Circles:
     """From a circle expected at some errors; images in which it is elsewhere are measured again from there."""
     tool = rim_tool(picture, name, moved)
     found = _measured(images, tool)
@@ -109,7 +121,7 @@ def _find(images: np.ndarray, picture: Picture, name: str, moved: tuple[float, .
     return Circles(errors, covariance, state.astype(str), found.near)
 
 
-def _measured(images: np.ndarray, tool: RimTool) -> Circles:
+def _measured(images: Stack | Drawn, tool: RimTool) -> Circles:
     count, numbers = len(images), tool.design.shape[1]
     if tool.state not in status.MEASURED:
         return Circles(
@@ -118,27 +130,27 @@ def _measured(images: np.ndarray, tool: RimTool) -> Circles:
             np.full(count, tool.state),
             np.zeros(count, bool),
         )
-    points = tool.locator.locate_each(images)
+    used = images.at(tool.locator.pixels)
+    points = tool.locator.locate_each_in(used)
     taken = tool.weights > 0
     fit = tool.fit(points.valid)
     errors = tool.solve(fit, points.offset)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
-    part = (points.valid & clear)[:, taken].mean(1)
+    part = (points.valid & clear)[:, taken].sum(1) / max(taken.sum(), 1)
     determined = np.isfinite(errors).all(1)
     state = np.where(part >= _MIN_FOUND, tool.state, status.LOW_CONTRAST)
     state = np.where(determined, state, status.ILL_CONDITIONED)
-    return Circles(errors, _covariance(images, tool, fit, points), state, determined & (part >= _MIN_NEAR))
+    return Circles(errors, _covariance(used, tool, fit, points), state, determined & (part >= _MIN_NEAR))
 
 
-def _covariance(images: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
-    """Covariance (n, p, p) at the contrast that each image shows."""
+def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
+    """Covariance (n, p, p) at the contrast that images of pixels (n, P) show each."""
     contrast = np.where(points.valid, points.contrast, 0.0)
     number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
     smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
     inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
     rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
-    rows = rows.reshape(len(images), fit.shape[1], -1)
-    used = images.reshape(len(images), -1)[:, tool.locator.pixels]
+    rows = rows.reshape(len(used), fit.shape[1], -1)
     variance = tool.optics.noise_at(used)
     variance = tool.optics.noise_variance if variance is None else variance[:, None]
     return np.einsum("nip,njp->nij", rows * variance, rows)
