@@ -14,7 +14,7 @@ from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
-from measure.features.rims import circle_response
+from measure.features.rims import circle_response, tells_errors
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import MeasuredFeatures, find
@@ -101,7 +101,8 @@ def propagate(
 ) -> Propagated:
     """Propagate pixel noise through lines, circles and corners to all measurands.
 
-    On the noise-free image each line is linear in small noise, and so is all that follows. With g the derivative of a
+    On the noise-free image each line is linear in small noise, and so is all that follows; of circles drawn noise is
+    asked whether it is, and what needs one that is not has no value: ``ill_conditioned``. With g the derivative of a
     value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
     share pixels, and so their correlation is in g.
 
@@ -124,7 +125,7 @@ def propagate(
     rows, lost = _responses(clean, picture, found, estimator, threshold)
     state = [str(each) for each in found.status[0]]
     for m, gone in enumerate(((found.image.gradient[0] != 0) & lost).any(-1)):
-        if gone and state[m] in status.MEASURED:  # an edge was only found far from its place, where another one is
+        if gone and state[m] in status.MEASURED:  # noise decides which of two edges is found, or a wrong one was
             state[m] = status.ILL_CONDITIONED
     errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
@@ -151,8 +152,9 @@ def _responses(
     if layout.names:
         parts.append(_of_lines(clean, picture, layout, found, estimator, threshold))
     for name, circle in zip(found.known.circles, found.circles, strict=True):
-        good = str(circle.state[0]) in status.MEASURED
-        told = circle_response(clean, picture, name) if good else _none(circle.errors.shape[1], clean.size)
+        told = circle_response(clean, picture, name) if str(circle.state[0]) in status.MEASURED else None
+        if told is None or not tells_errors(told, clean, picture, name):
+            told = _none(circle.errors.shape[1], clean.size)
         parts.append(told)
     rows = sparse.vstack(parts, format="csr")  # few of the pixels of a large image
     lost = np.array([not np.isfinite(rows.data[start:stop]).all() for start, stop in pairwise(rows.indptr)], bool)

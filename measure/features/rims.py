@@ -65,29 +65,33 @@ def find_circle(images: np.ndarray, picture: Picture, name: str) -> Circles:
 
 
 def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.csr_array:
-    """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width).
-
-    NaN where it does not tell the errors, for noise decides what is found (`measure.features.rim_noise`).
-    """
-    moved, pixels = unmoved(picture, name), []
+    """Derivative of the circle's p parameters by the pixels of a noise-free image, (p, height * width)."""
+    moved = unmoved(picture, name)
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
-        pixels.append(tool.locator.pixels)
         fit = tool.fit(points.valid)
         change = tool.solve(fit, points.offset)[0]
         if not _is_far(tool, change[None])[0]:
             break
         moved = _rounded(tool, np.array(moved) + change)
     taken = points.valid[0] & (tool.weights > 0)
-    found = sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
-    if not _is_linear(clean, picture, name, np.concatenate(pixels), found):
-        found.data[:] = np.nan
-    return found
+    return sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
 
 
-def _is_linear(clean: np.ndarray, picture: Picture, name: str, pixels: np.ndarray, response: sparse.csr_array) -> bool:
-    """Whether what is found in drawn images are the errors that a response (p, height * width) tells."""
+def tells_errors(response: sparse.csr_array, clean: np.ndarray, picture: Picture, name: str) -> bool:
+    """Whether a circle's errors by noise are those that its derivative tells (`measure.features.rim_noise`).
+
+    Parameters
+    ----------
+    response : csr_array, shape (p, height * width)
+        That of `circle_response`.
+    clean : ndarray, shape (height, width)
+        The noise-free image, in which the circle is found.
+    picture : Picture
+    name : str
+    """
+    pixels = np.union1d(response.indices, rim_tool(picture, name, unmoved(picture, name)).locator.pixels)
     here, linear, full, found = find_circle(clean[None], picture, name).errors, [], [], []
     for images in drawn(clean, pixels, Optics.of(picture.scene)):
         each = _find(images, picture, name, unmoved(picture, name), _PASSES)

@@ -10,7 +10,7 @@ import measure
 import planner
 import scenes
 from imaging.geometry.projection import project
-from measure.features import found, linearity, relations, rims, shape, tools
+from measure.features import found, linearity, relations, rim_noise, rims, shape, tools
 from measure.features.layout import layout_of
 from measure.features.optics import Optics
 from tests.oracle import polygon_image
@@ -61,12 +61,14 @@ def _rims(name, which, lit=True):
     images, spread = painted(name), np.abs(tool.design).max()
     off = np.arange(1, 1 + tool.design.shape[1]) * np.array([[0.2], [-0.9]]) / spread
     away = painted(name, moved=(2.3, -1.7))
+    stack = rim_noise.Stack(images.reshape(len(images), -1)), rim_noise.Stack(away.reshape(len(away), -1))
     return {
         "tools": [[each.design, each.weights, each.inward, each.state] for each in (tool, near)],
         "found": rims.find_circle(images, picture, which), "away": rims.find_circle(away, picture, which),
-        "once": rims._find(away, picture, which, rims.unmoved(picture, which), 0),
+        "once": rims._find(stack[1], picture, which, rims.unmoved(picture, which), 0),
         "far": rims._is_far(tool, off), "rounded": [rims._rounded(tool, row) for row in off],
-        "response": rims.circle_response(images[0], picture, which).toarray(), "measured": rims._measured(images, near),
+        "response": rims.circle_response(images[0], picture, which).toarray(),
+        "measured": rims._measured(stack[0], near),
         "away again": rims.circle_response(away[0], picture, which).toarray(),
     }  # fmt: skip
 
