@@ -130,6 +130,7 @@ def main() -> None:
     if asked.reversed:
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
     warnings.simplefilter("error")  # as in tests
+    warnings.filterwarnings("ignore", "Implicitly cleaning up", ResourceWarning)  # folders that last as long as it
     from tests.regression.test_numbers import CASES
     from validation.batch import machine
 
