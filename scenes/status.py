@@ -31,7 +31,8 @@ MEANINGS = {
     SHORT: "too little of an edge is left in the image",
     SIGN_CHANGE: "the contrast changes its sign along an edge",
     LOW_CONTRAST: "too little of an edge stands out of the noise",
-    ILL_CONDITIONED: "edges that meet are nearly parallel, or the image says too little of what is near",
+    ILL_CONDITIONED: "edges that meet are nearly parallel, noise decides which edge is found, or the image says too "
+    "little of what is near",
     AMBIGUOUS: "another solution explains the image as well",
     COMPRESSED: "compression (JPEG) has lost what is no noise: the variance is too small",
     CORRELATED: "the noise of neighbouring pixels is not independent: the variance is not exact",
