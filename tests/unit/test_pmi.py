@@ -230,6 +230,7 @@ def test_dimensions_are_of_the_faces_that_the_file_says():
     radii = {circle.name: circle.radius for circle in scene.solid.circles}
     values = {each.number: each.value for each in read.characteristics}
     assert len(measurands) >= 12
+    assert {measurand.kind for measurand in measurands} == {"angle", "diameter"}
     for measurand in measurands:
         value = values[int(measurand.name.split("#")[1].split()[0])]
         if measurand.kind == "diameter":
