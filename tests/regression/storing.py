@@ -81,7 +81,7 @@ def _lines(way: Way, cases: list[str], folder: Path) -> list[tuple[str, float, d
     """Case, processor seconds and calls, of a run in a process of its own."""
     folder.mkdir()
     root = _edited(folder / "copy") if way.is_edited else ROOT
-    environment = dict(os.environ)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     if way.machine is not None:
         told = f"isa={way.machine.embree},threads=%i".encode()
         environment = way.machine.environment(libraries(folder / "mitsuba", told))
