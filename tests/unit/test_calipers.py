@@ -97,10 +97,10 @@ def test_trim_beside_a_neighbour_that_ends(degrees, size):
     def away(place):
         return distance_to_segment(np.array([[place, 0.0]]), np.zeros(2), end)[0]
 
-    assert found >= clear
-    assert away(found) >= clear - 1e-9
+    assert found >= clear  # margin: as near as it may be
+    assert away(found) >= clear - 1e-9  # margin: the same
     if degrees < 90:
-        assert away(found - 1e-3) < clear
+        assert away(found - 1e-3) < clear  # margin: a thousandth of a px nearer is too near
     if degrees == 0:
         assert found == pytest.approx(size + clear)
 

@@ -163,10 +163,11 @@ def _told_beside_many_rays(slot_end):
 def test_a_round_wall_is_told_as_many_rays_tell_it(slot_end):
     """Levels to 1.5 % (rms), and how they rise below the rim, which shifts it, to a tenth in the facets' mean."""
     told, expected = _told_beside_many_rays(slot_end)
+    # margin: as promised; the same rays everywhere, 0.8 %
     assert np.sqrt(np.mean((told / expected - 1) ** 2)) < 0.015
     rises = [(each[:, 3] / each[:, 0] - 1).mean() for each in (told, expected)]
     assert rises[0] / rises[1] == pytest.approx(1, abs=0.1)
-    assert rises[1] > 0.05
+    assert rises[1] > 0.05  # margin: that there is a rise; 0.17
 
 
 def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
@@ -177,7 +178,7 @@ def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     told, expected = _told_beside_many_rays(slot_end)
     for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
-    assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03
+    assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03  # margin: twice what is promised; 5.7 %
 
 
 def test_faces_are_told_together_what_each_is_told_alone(slot_end, monkeypatch):
@@ -232,7 +233,7 @@ def test_a_wall_sees_half_of_the_floor(task1, height, half_side):
     wide = half_side - abs(middle[1])
     ends = np.arctan(wide / height) - height / slant * np.arctan(wide / slant)
     expected = scene.camera.exposure * 0.05 * 0.4 * ends / np.pi
-    assert found == pytest.approx(expected, rel=0.02)
+    assert found == pytest.approx(expected, rel=0.02)  # margin: of a wall seen in patches; 0.5 %
     assert light_between(Pictures.of(scene, (40, 20), (0, 0)), point, np.array([solid.normals[:, 2].argmax()])) == 0
 
 
