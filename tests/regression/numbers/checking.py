@@ -197,7 +197,8 @@ _PRINTED = {
                        "--tolerance", "light_deg=2"],
     "plan lamps": ["plan", "copper", "--vary", "band", "--sensor", "31,137", "--light", "17,311", "--no-check"],
     "plan shares": ["plan", "two_lights", "--step", "60", "--no-check", "--sensor", "58.3,275.1"],
-    "plan by turns": ["plan", "task1", "--search", "alternating", "--step", "30", "--no-check", "--json"],
+    "plan by turns": ["plan", "task1", "--search", "alternating", "--step", "30", "--sensor-polar", "25,60",
+                      "--no-check", "--json"],
     "pose": ["predict", "task1", "--sensor", "100"], "unknown": ["plan", "no such"],
 }  # fmt: skip
 
