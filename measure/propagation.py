@@ -133,7 +133,7 @@ def propagate(
     responses = [sparse.csr_array(gradient) @ rows for gradient in gradients]
     uneven = Unevenness.about(picture, responses[1]) if picture.lights and picture.scene.textures else None
     shifts = np.zeros(len(state))
-    if uneven is not None:
+    if uneven is not None and uneven.change.any():
         even = find((clean - uneven.change)[None], picture, estimator, threshold)
         shifts = np.nan_to_num(found.image.value[0] - even.image.value[0])
     values = _values(found, image, plane, state, not photographed, shifts)

@@ -65,7 +65,7 @@ class Unevenness:
         used = np.divmod(np.unique(response.indices), camera.width)
         sizes = camera.height, camera.width
         window = (
-            slice(max(int(each.min()) - reach, 0), min(int(each.max()) + reach + 1, n)) if each.size else slice(0)
+            slice(max(int(each.min()) - reach, 0), min(int(each.max()) + reach + 1, n)) if each.size else slice(0, 0)
             for each, n in zip(used, sizes, strict=True)
         )
         return cls(picture, tuple(window))
@@ -96,7 +96,7 @@ class Unevenness:
 
     @property
     def _shape(self) -> tuple[int, int]:
-        rows, columns = (each.stop - (each.start or 0) for each in self.window)
+        rows, columns = (each.stop - each.start for each in self.window)
         return rows, columns
 
     @property

@@ -116,6 +116,7 @@ class Layout:
             corners=tuple(tuple(number[e] for e in self.corners[c]) for c in corners),
             joints=tuple(tuple((number[e], end) for e, end in pair) for pair in joints),
             clutter=None if self.clutter is None else self.clutter[edges],
+            strong=None if self.strong is None else self.strong[edges],
             arrangement=self.arrangement and self.arrangement.only(edges, corners),
         )
         return kept, corners

@@ -181,10 +181,7 @@ def _widths(known: _Faces, each: Characteristic, unit: Unit, planes: list[Plane]
         is_parallel = np.linalg.norm(np.cross(*along)) <= _SAME
         if is_parallel and is_square and abs(np.linalg.norm(away) - wanted) <= _AS_DRAWN * wanted:
             found.append((-min(solid.length(one), solid.length(other)), one, other))
-    sides = [(one.name, other.name) for _, one, other in sorted(found, key=lambda row: row[0])[:_MOST]]
-    return [
-        _measurand(each, unit, "width", (Side(edge=one), Side(edge=other)), f"{one} {other}") for one, other in sides
-    ]
+    return _by_sides(each, unit, "width", found)
 
 
 def _angles(known: _Faces, each: Characteristic, planes: list[Plane]) -> list[Measurand]:
@@ -203,10 +200,13 @@ def _angles(known: _Faces, each: Characteristic, planes: list[Plane]) -> list[Me
             between = np.degrees(np.arctan2(np.linalg.norm(np.cross(*along)), along[0] @ along[1]))
             if min(abs(between - each.value), abs(180 - between - each.value)) <= _AS_DRAWN * each.value:
                 found.append((-min(solid.length(one), solid.length(other)), one, other))
-    sides = [(one.name, other.name) for _, one, other in sorted(found, key=lambda row: row[0])[:_MOST]]
-    return [
-        _measurand(each, "mm", "angle", (Side(edge=one), Side(edge=other)), f"{one} {other}") for one, other in sides
-    ]
+    return _by_sides(each, "mm", "angle", found)
+
+
+def _by_sides(each: Characteristic, unit: Unit, kind: str, pairs: list[tuple[float, Edge, Edge]]) -> list[Measurand]:
+    """By pairs of edges, the first number least first."""
+    sides = [(one.name, other.name) for _, one, other in sorted(pairs, key=lambda row: row[0])[:_MOST]]
+    return [_measurand(each, unit, kind, (Side(edge=one), Side(edge=other)), f"{one} {other}") for one, other in sides]
 
 
 def _measurand(each: Characteristic, unit: Unit, kind: str, features: tuple, of: str) -> Measurand:

@@ -62,7 +62,9 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
             break
     if not found:
         raise broken
-    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(_faces(solid))}
+    faces, place = _faces(solid), _places(reader)
+    found = [row | {"place": place(face)} for row, face in zip(found, faces, strict=True)]
+    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
 
 
 def _faces(shape: Any) -> list[Any]:
@@ -76,9 +78,8 @@ def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, A
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(shape)}")
-    places = _places(reader)
     return [
-        {"name": _name(reader, face), "place": places(face), **_surface(face), **_triangles(divided)}
+        {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
         for face, divided in zip(_faces(shape), _faces(cut), strict=True)
     ]
 

@@ -11,7 +11,7 @@ from imaging.pictures import Pictures
 from measure.features.calipers import edge_calipers
 from measure.features.layout import BACKGROUND, layout_of, polygon_layout
 from measure.features.optics import Optics
-from scenes import status
+from scenes import Picture, status
 from tests.oracle import axes
 from tests.parts import newcomers_plate
 
@@ -170,3 +170,16 @@ def test_what_is_left_of_an_edge_is_what_the_planner_says(pose, slotted):
             assert (caliper.status == status.SHORT) == (left < MIN_USABLE)
         if caliper.positions.size:
             assert caliper.positions[[0, -1]] == pytest.approx([trims[0], length - trims[1]], abs=1e-9)
+
+
+def test_some_of_the_edges_have_their_own_rows():
+    """Of all that is told edge by edge, in the order asked for."""
+    scene = scenes.load("bracket_mm")
+    whole = layout_of(Picture.of(scene, (43, 261), (35, 100)))
+    edges = np.arange(len(whole.names))[::-1][:2]
+    some, corners = whole.only(edges)
+    assert some.names == tuple(whole.names[e] for e in edges)
+    for key in ("ends", "visible", "shown", "sides", "defocus", "clutter", "strong"):
+        assert np.array_equal(getattr(some, key), getattr(whole, key)[edges]), key
+    assert len(some.beside) == len(some.apart) == 2
+    assert len(some.corners) == len(corners)
