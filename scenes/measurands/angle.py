@@ -15,6 +15,7 @@ class Angle(MeasurandKind):
     """Between two lines, from their common vertex if they have one."""
 
     features = ("ee",)
+    qif = "AngleBetween"
     is_angle = True
 
     def check(self, solid, key, quantity) -> None:

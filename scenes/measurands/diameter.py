@@ -12,6 +12,7 @@ class Diameter(MeasurandKind):
     """Of a circle; a cone's in its middle."""
 
     features = ("r",)
+    qif = "Diameter"
 
     def in_image(self, seen, quantity) -> Evaluated:
         """Of the diameter that is parallel to the image: 2 r f / z, z the depth of the centre; no foreshortening."""

@@ -10,6 +10,7 @@ class Distance(MeasurandKind):
     """Between two points, each found for itself."""
 
     features = ("pp",)
+    qif = "DistanceBetween"
     is_flat = False
 
     def evaluated(self, seen, quantity, plane) -> Evaluated:

@@ -32,6 +32,8 @@ class MeasurandKind:
     """Whether its unit is degrees."""
     is_flat: ClassVar[bool] = True
     """Whether its features must lie in one plane."""
+    qif: ClassVar[str] = ""
+    """QIF's name of the characteristic (ISO 23952: Diameter, Width, ...); empty where QIF has none."""
 
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""

@@ -15,6 +15,7 @@ class Width(MeasurandKind):
     """Between two edges that are nearly parallel."""
 
     features = ("ee",)
+    qif = "Width"
 
     def check(self, solid, key, quantity) -> None:
         """Within 30 degrees of parallel."""

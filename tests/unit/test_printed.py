@@ -116,15 +116,8 @@ def test_records_of_a_prediction_are_standard_deviations(several):
 # --- measure
 
 
-@pytest.mark.parametrize(
-    ("value", "decision"),
-    [(10.08, "pass"), (10.085, "undecided"), (10.106, "fail"), (9.975, "undecided"), (9.99, "pass"), (9.959, "fail")],
-)
-def test_measured_values_and_their_decisions_are_printed(value, decision):
-    """+0.09 -0.02 about 10 with u 0.004, of sigma 0.0024 and u(bias) 0.0032: it is u that decides.
-
-    What is well within the one limit is beyond the other.
-    """
+def test_measured_values_and_their_decisions_are_printed():
+    """u 0.004 is of sigma 0.0024 and u(bias) 0.0032; U is the budget's, and may be much more."""
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.02))
     other = SimpleNamespace(name="lean", kind="angle", tolerance=None)
     found = SimpleNamespace(
@@ -132,51 +125,39 @@ def test_measured_values_and_their_decisions_are_printed(value, decision):
         covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
         u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
-        value=np.array([value, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
+        value=np.array([10.08, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
     )  # fmt: skip
-    one, two = measurands.facts(found)
+    rows = [SimpleNamespace(requirement=SimpleNamespace(U=U), decision=each)
+            for U, each in ((0.0131, "undecided"), (None, None))]  # fmt: skip
+    one, two = measurands.facts(SimpleNamespace(found=found, rows=rows))
     assert one == {
-        "name": "slot", "kind": "width", "unit": "mm", "value": value, "sigma": 0.0024, "value_image": 812.0,
-        "bias": 0.011, "u_bias": 0.0032, "u": 0.004,
+        "name": "slot", "kind": "width", "unit": "mm", "value": 10.08, "sigma": 0.0024, "value_image": 812.0,
+        "bias": 0.011, "u_bias": 0.0032, "u": 0.004, "U": 0.0131,
         "sigma_image": pytest.approx(0.3), "nominal": 10.0, "tolerance": {"plus": 0.09, "minus": 0.02},
-        "decision": decision, "status": "ok",
+        "decision": "undecided", "status": "ok",
     }  # fmt: skip
     assert (two["value"], two["sigma"], two["sigma_image"], two["nominal"]) == (29.5, 0.5, pytest.approx(0.4), 30.0)
+    assert (two["U"], two["decision"]) == (None, None)
     assert measurands.covariance(found) == found.covariance.tolist()
     headings, rows = cells(measurands.table([one, two]))
-    assert headings == ["name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision",
-                        "status"]  # fmt: skip
-    assert rows[0] == ["slot", "width", f"{value:.4f}", "+- 0.0040", "mm", "0.011", "0.0032", "10", "+0.09 -0.02",
-                       decision, "ok"]  # fmt: skip
-    assert rows[1] == ["lean", "angle", "29.50", "+- 0.50", "degrees", "-", "-", "30", "-", "-", "ok"]
+    assert headings == ["name", "kind", "value", "u", "unit", "bias off", "u(bias)", "U", "nominal", "tolerance",
+                        "decision", "status"]  # fmt: skip
+    assert rows[0] == ["slot", "width", "10.0800", "0.0040", "mm", "0.011", "0.0032", "0.013", "10", "+0.09 -0.02",
+                       "undecided", "ok"]  # fmt: skip
+    assert rows[1] == ["lean", "angle", "29.50", "0.50", "degrees", "-", "-", "-", "30", "-", "-", "ok"]
 
 
-@pytest.mark.parametrize(
-    ("value", "state", "decision", "printed"),
-    [
-        (10.075, "ok", "pass", "pass"),
-        (10.0805, "ok", "undecided", "undecided"),
-        (10.1005, "ok", "fail", "fail"),
-        (10.0995, "ok", "undecided", "undecided"),
-        (10.0, "clutter", "undecided", "undecided (bias up to 0.006)"),
-        (10.0, "short", "undecided", "undecided (bias up to 0.006)"),
-    ],
-)
-def test_what_a_correction_is_not_sure_of_is_decided_with(value, state, decision, printed):
-    """+-0.09 about 10; sigma 0.004 and u(bias) 0.003 make u = 0.005, of which two are kept from both limits."""
-    quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.09))
-    found = SimpleNamespace(
-        quantities=(quantity,), sigma=np.array([0.004]), covariance_image=np.array([[0.09]]), nominal=np.array([10.0]),
-        units=("mm",), value=np.array([value]), value_image=np.array([812.0]), status=np.array([state]),
-        bias=np.array([-0.034]), u_bias=np.array([0.003]), u=np.array([0.005]),
-    )  # fmt: skip
-    (one,) = measurands.facts(found)
-    assert (one["sigma"], one["bias"], one["u_bias"], one["u"]) == (0.004, -0.034, 0.003, 0.005)
-    assert one["decision"] == decision
-    (row,) = cells(measurands.table([one]))[1]
-    assert row[3] == "+- 0.0050"
-    assert row[5:7] == ["-0.034", "0.003"]
-    assert row[-2:] == [printed, state]
+@pytest.mark.parametrize(("state", "printed"), [("ok", "undecided"), ("clutter", "undecided (bias up to 0.006)")])
+def test_what_a_correction_is_not_sure_of_is_printed(state, printed):
+    row = {
+        "name": "slot", "kind": "width", "unit": "mm", "value": 10.0, "sigma": 0.004, "bias": -0.034, "u_bias": 0.003,
+        "u": 0.005, "U": 0.0098, "nominal": 10.0, "tolerance": {"plus": 0.09, "minus": 0.09}, "decision": "undecided",
+        "status": state,
+    }  # fmt: skip
+    (told,) = cells(measurands.table([row]))[1]
+    assert told[3] == "0.0050"
+    assert told[5:8] == ["-0.034", "0.003", "0.0098"]
+    assert told[-2:] == [printed, state]
 
 
 # --- plan

@@ -318,7 +318,8 @@ def test_balloons_keep_apart_and_their_leaders_do_not_cross(count, rng):
     anchors = [corner + rng.random((1 + k % 3, 2)) * size for k in range(count)]
     if count > 5:
         anchors[5] = anchors[2]
-    spots, tied = station_view.balloons(anchors, size, corner)
+    frame = station_view.Frame(1.0, size, corner, 5.2, 3.6)
+    spots, tied = station_view.balloons(anchors, frame.around(count))
     assert all((each == one).all(1).any() for each, one in zip(anchors, tied, strict=True))
     outside = (spots < corner) | (spots > corner + size)
     assert outside.any(1).all()

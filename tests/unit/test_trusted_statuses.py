@@ -11,8 +11,8 @@ import scenes
 from planner.budgeting.plans import Placed
 from planner.uncertainty import decide
 from scenes import Tolerance, status
-from validation import budgets, vary_check, views_check
-from validation.cli import measurands, plan_capability
+from validation import budgets, inspection, vary_check, views_check
+from validation.cli import plan_capability
 from validation.report import budget_table
 from validation.statistics import verdict
 
@@ -105,10 +105,9 @@ def test_measured_values_that_are_not_ok_are_undecided():
     scene = scenes.load("calibrated_rig")
     image = planner.image(scene, (10, 60), (20, 280))
     found = measure.measure(image, scene, (10, 60), (20, 280))
-    (row,) = measurands.facts(found)
-    assert row["status"] == "ok"
-    (doubted,) = measurands.facts(replace(found, status=np.array([status.CLUTTER], object)))
-    assert (row["decision"], doubted["decision"]) == ("pass", "undecided")
+    (row,) = inspection.inspect(found).rows
+    (doubted,) = inspection.inspect(replace(found, status=np.array([status.CLUTTER], object))).rows
+    assert (row.requirement.status, row.decision, doubted.decision) == ("ok", "pass", "undecided")
 
 
 def test_a_gain_between_values_that_are_not_ok_is_not_agreed():

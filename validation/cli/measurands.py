@@ -15,17 +15,16 @@ from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
+    from validation.inspection import Inspection
 
 
-def facts(found: measure.Measurements) -> list[dict[str, Any]]:
+def facts(inspected: Inspection) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
-    from planner.uncertainty.conformity import decide
-
+    found = inspected.found
     rows, combined, sigma_image = [], found.u, np.sqrt(np.einsum("mm->m", found.covariance_image))
-    for k, quantity in enumerate(found.quantities):
+    for k, (quantity, row) in enumerate(zip(found.quantities, inspected.rows, strict=True)):
         zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
         state, good, known = str(found.status[k]), bool(np.isfinite(value)), bool(np.isfinite(combined[k]))
-        told = combined[k] if known else spread
         rows.append({
             "name": quantity.name,
             "kind": quantity.kind,
@@ -39,7 +38,8 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
             "sigma_image": sigma_image[k] if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(float(value), float(told), nominal, zone, status=state),
+            "U": row.requirement.U,
+            "decision": row.decision,
             "status": state,
         })  # fmt: skip
     return plain(rows)
@@ -73,15 +73,15 @@ def covariance(found: measure.Measurements) -> list[list[float | None]]:
 def table(rows: list[dict[str, Any]]) -> Table:
     """The same for a terminal."""
     columns = (
-        "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision", "status",
+        "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "U", "nominal", "tolerance", "decision", "status",
     )  # fmt: skip
     shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
     for row in rows:
         told = row["sigma"] if row["u"] is None else row["u"]
         places = digits(told)
         value = "-" if row["value"] is None else f"{row['value']:.{places}f}"
-        sigma = "" if told is None else f"+- {told:.{places}f}"
-        off = ["-" if row[name] is None else f"{row[name]:.2g}" for name in ("bias", "u_bias")]
+        sigma = "" if told is None else f"{told:.{places}f}"
+        off = ["-" if row[name] is None else f"{row[name]:.2g}" for name in ("bias", "u_bias", "U")]
         nominal, zone = f"{row['nominal']:.6g}", row["tolerance"]
         limits = "-" if zone is None else _limits(zone)
         about = row["name"], row["kind"], value, sigma, row["unit"], *off
@@ -102,8 +102,9 @@ def _decision(row: dict[str, Any]) -> str:
 _CAPTION = (
     "value: with the bias taken off that a simulation of this picture tells (bias off). u(bias): standard uncertainty "
     "of that. u: combined standard uncertainty, of noise and u(bias); of noise alone where no light is given, or with "
-    "--as-measured. pass, fail: by more than 2 u within or beyond the tolerance (ISO 14253-1); only a value whose "
-    "status is ok is decided."
+    "--as-measured. U: expanded uncertainty (95 %) of all that the scene says is not exact; none where no light is "
+    "given. pass, fail: by more than U within or beyond the tolerance (ISO 14253-1); only a value whose status is ok "
+    "is decided."
 )
 
 

@@ -17,12 +17,13 @@ from scenes.photograph import Photograph
 from scenes.status import legend
 from validation.cli import measurands, photograph, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
-from validation.cli.outputs import check_file
+from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
+    from validation.inspection import Inspection
 
 commands = commands()
 
@@ -57,6 +58,16 @@ class Options:
     as_measured: Annotated[
         bool, typer.Option("--as-measured", help="With SCENE: take no bias off, simulate nothing.")
     ] = False
+    inspection: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="With SCENE and --light: write inspection.html, .csv, .svg (balloons) and .qif, with U and decisions.",
+        ),
+    ] = None
+    serial: Annotated[str | None, typer.Option(metavar="TEXT", help="Serial number of the part, for --inspection.")] = (
+        None
+    )
     gamma: recorded.Gamma = None
     channel: recorded.Channel = None
     bayer: recorded.Bayer = None
@@ -68,6 +79,11 @@ class Options:
         """What is asked of a photograph without a scene alone, by option; None where it is not."""
         names = ("near", "box", "corners", "kind", "most", "output", "all", "gamma", "channel", "bayer", "mtf")
         return {f"--{name}": self.every or None if name == "all" else getattr(self, name) for name in names}
+
+    @property
+    def of_scenes(self) -> dict[str, Any]:
+        """What is asked of the picture of a scene alone, by option; None or False where it is not."""
+        return {"--as-measured": self.as_measured, "--inspection": self.inspection, "--serial": self.serial}
 
 
 @commands.command("measure")
@@ -84,6 +100,7 @@ def measure_command(given: Options) -> None:
     if given.estimator is not None and given.estimator not in measure.ESTIMATORS:
         raise InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {given.estimator!r}")
     check_file("--output", given.output, ".png", ".pdf", ".svg")
+    check_directory("--inspection", given.inspection)
     check_file("--mtf", given.mtf, ".png")
     if given.scene is None:
         _measure_photograph(given)
@@ -93,8 +110,9 @@ def measure_command(given: Options) -> None:
 def _measure_photograph(given: Options) -> NoReturn:
     import measure
 
-    if given.as_measured:
-        raise InvalidInput("--as-measured must be left out without a scene, got it")
+    for option, value in given.of_scenes.items():
+        if value:
+            raise InvalidInput(f"{option} must be left out without a scene, got {value if value is not True else 'it'}")
     wanted = _shapes_wanted(given)
     photo = scenes.photograph.read(given.file, given.gamma, given.channel, given.bayer)
     lens = given.lens and measure.load_lens(given.lens)
@@ -113,16 +131,35 @@ def _measure_scene(given: Options) -> NoReturn:
     if given.lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {given.lens}")
     poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
-    from validation import picture_file
+    from validation import inspection, picture_file
 
     known = scenes.load(given.scene)
     image = picture_file.read(given.file, Size.of_camera(known.camera))
     shown = scenes.Picture.of(known, *poses)
+    _check_inspection(given, shown)
     if given.as_measured or not shown.lights:
         found = measure.measure(image, shown, estimator=given.estimator, threshold=given.threshold)
     else:
         found = _corrected(image, shown, given.estimator, given.threshold)
-    _say_measurands(given.file, found, found.first if known.task is not None else None, given.as_json)
+    inspected = inspection.inspect(found)
+    if given.inspection is not None:
+        from validation.report import inspection_files
+
+        about = inspection_files.About(given.serial or "", given.file.name)
+        inspection_files.write(inspected, image, about, given.inspection)
+    _say_measurands(given, inspected, found.first if known.task is not None else None)
+
+
+def _check_inspection(given: Options, shown: scenes.Picture) -> None:
+    """What is handed on has its bias taken off."""
+    if given.inspection is None:
+        if given.serial is not None:
+            raise InvalidInput(f"--serial must be used with --inspection, got {given.serial!r} alone")
+        return
+    if given.as_measured:
+        raise InvalidInput("--as-measured must be left out with --inspection, whose values have their bias taken off")
+    if not shown.lights:
+        raise InvalidInput("--light must be given with --inspection, got nothing")
 
 
 def _corrected(
@@ -158,16 +195,14 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
     return wanted
 
 
-def _say_measurands(
-    file: Path, found: measure.Measurements, distance: measure.Measurement | None, as_json: bool
-) -> NoReturn:
+def _say_measurands(given: Options, inspected: Inspection, distance: measure.Measurement | None) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
-    rows = measurands.facts(found)
+    found, rows = inspected.found, measurands.facts(inspected)
     told = {"measurands": rows, "covariance": measurands.covariance(found)}
     if distance is not None:
         told |= _distance_facts(distance)
-    if as_json:
-        say({"file": str(file), **told}, True, "")
+    if given.as_json:
+        say({"file": str(given.file), **told}, True, "")
     else:
         shown = console()
         shown.print(measurands.table(rows))
@@ -175,6 +210,8 @@ def _say_measurands(
             shown.print(f" {line}", highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)
+        if given.inspection is not None:
+            shown.print(f"inspection.html, .csv, .svg and .qif: {given.inspection}", highlight=False)
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 

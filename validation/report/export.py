@@ -29,12 +29,12 @@ def write_measurands(found: Validation, path: Path) -> Path:
 def _write(keys: list[str], lines: Iterator[dict[str, object]], path: Path) -> Path:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=keys)
-        writer.writerow({key: _inert(key) for key in writer.fieldnames})
-        writer.writerows({key: _inert(value) for key, value in line.items()} for line in lines)
+        writer.writerow({key: inert(key) for key in writer.fieldnames})
+        writer.writerows({key: inert(value) for key, value in line.items()} for line in lines)
     return path
 
 
-def _inert(value: object) -> object:
+def inert(value: object) -> object:
     """A text that no spreadsheet takes for a formula: an apostrophe before what would begin one."""
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else value
 

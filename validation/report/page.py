@@ -65,7 +65,7 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     """Write report.html and report.md of a run to a directory; their paths."""
     shown = station if len(found.rows) > 1 else replace(station, number=None)
     first = _of_run(first_screen(shown, not store.identity().get("photos")), found, station)
-    sections = [_proof(campaign, found, store), *_budget(station.budget)]
+    sections = [_proof(campaign, found, store), *budget_sections(station.budget)]
     if len(found.rows) > 1:
         sections.insert(0, _settings(campaign, found, station, bool(first["simulated"])))
     if found.refused:
@@ -74,25 +74,26 @@ def write(campaign: Campaign, found: Validation, store: RunFile, station: Statio
     name, title = station.picture.scene.name, _title(found, station)
     context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": found.verdict.agrees}
     paths = [directory / "report.html", directory / "report.md"]
-    paths[0].write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
-    paths[1].write_text(_environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
+    paths[0].write_text(environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
+    paths[1].write_text(environment(False).get_template("report.md.j2").render(context), encoding="utf-8")
     return paths
 
 
 def write_station(station: Station, title: str, path: Path, more: Sequence[Section] = ()) -> Path:
     """Write the page of a station that was not rendered: its first screen, sections of one's own, and its budget."""
-    sections = [*more, *_budget(station.budget)]
+    sections = [*more, *budget_sections(station.budget)]
     return write_page(first_screen(station), station.picture.scene.name, title, sections, path)
 
 
 def write_page(first: dict[str, Any], name: str, title: str, sections: list[Section], path: Path) -> Path:
     """Write a page with a first screen and sections of one's own."""
     context = {"name": name, "title": title, "sections": sections, "station": first, "agrees": True}
-    path.write_text(_environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
+    path.write_text(environment(True).get_template("page.html.j2").render(context), encoding="utf-8")
     return path
 
 
-def _environment(escaped: bool) -> jinja2.Environment:
+def environment(escaped: bool) -> jinja2.Environment:
+    """Of the templates; ``escaped``: for HTML."""
     loader = jinja2.PackageLoader("validation.report")
     made = jinja2.Environment(loader=loader, autoescape=escaped, trim_blocks=True, undefined=jinja2.StrictUndefined)
     made.filters |= {"md": markdown, "words": words, "linked": linked}
@@ -246,7 +247,8 @@ def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
     return Section("Are these uncertainties true?", answer, found.verdict.text, plots, folded=folded)
 
 
-def _budget(found: SceneBudget | None) -> list[Section]:
+def budget_sections(found: SceneBudget | None) -> list[Section]:
+    """Where the uncertainty comes from, as a picture and a table a measurand; none without a budget."""
     if found is None:
         return []
     caption = (

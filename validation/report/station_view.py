@@ -21,6 +21,7 @@ from validation.report.grades import LOOKS
 from validation.report.requirements import Grade, Requirement
 
 _BAND, _PITCH = 0.34, 0.36  # inches: of the rim in which balloons stand, and from one to the next
+_TEXT = 1.35  # inches: of what stands beside a balloon
 _TALLEST = 5.5  # inches, of the picture in it
 _MOST_PX = 900  # of the picture's longer side
 _SOFT = 2  # times that a pixel is enlarged, from which on edges look soft
@@ -114,7 +115,12 @@ def _seen(picture: Picture, points: np.ndarray) -> np.ndarray:
 
 
 def draw(
-    picture: Picture, found: Sequence[Requirement | None], image: np.ndarray | None, label: str, key: str = "view"
+    picture: Picture,
+    found: Sequence[Requirement | None],
+    image: np.ndarray | None,
+    label: str,
+    key: str = "view",
+    values: Sequence[str] = (),
 ) -> Markup:
     """The picture as SVG, a balloon for each requirement around it.
 
@@ -126,28 +132,72 @@ def draw(
         Grey levels of the whole image; None: drawn from the model, without shadows.
     label, key : str
         As of `canvas.inline`.
+    values : sequence of str
+        Of each quantity what stands beside its balloon, of one or two lines; then the balloons stand on both sides.
     """
     part = preview.window(picture.scene, picture)
     grey = preview.drawn(picture.scene, picture, part) if image is None else _cut(picture, image, part)
-    scale = _scale(part)
-    size = np.array([part.width, part.height]) * scale
-    figure = plt.figure(figsize=(WIDTH, size[1] + 2 * _BAND))
-    left = (WIDTH - size[0]) / 2
-    axis = figure.add_axes((0, 0, 1, 1), xlim=(0, WIDTH), ylim=(size[1] + 2 * _BAND, 0))
+    frame = _frame(part, len(values))
+    figure = plt.figure(figsize=(frame.width, frame.height))
+    axis = figure.add_axes((0, 0, 1, 1), xlim=(0, frame.width), ylim=(frame.height, 0))
     axis.set_axis_off()
+    (left, top), (wide, high) = frame.corner, frame.size
     axis.imshow(grey, cmap="gray", vmin=0, vmax=255, interpolation="none", aspect="auto",
-                extent=(left, left + size[0], _BAND + size[1], _BAND))  # fmt: skip
+                extent=(left, left + wide, top + high, top))  # fmt: skip
 
     def placed(points: np.ndarray) -> np.ndarray:
         """Inches in the figure of px in the image."""
-        return (points + 0.5 - [part.left, part.top]) * scale + [left, _BAND]
+        return (points + 0.5 - [part.left, part.top]) * frame.scale + frame.corner
 
-    both = [(each, mark) for each, mark in zip(found, marks(picture), strict=True) if each] if found else []
-    found, drawn = [each for each, _ in both], [mark for _, mark in both]
-    spots, anchors = balloons([placed(mark.anchors) for mark in drawn], size, np.array([left, _BAND]))
-    for each, mark, anchor, spot in zip(found, drawn, anchors, spots, strict=True):
+    texts = values or [""] * len(found)
+    both = [each for each in zip(found, marks(picture), texts, strict=True) if each[0]] if found else []
+    anchors = [placed(mark.anchors) for _, mark, _ in both]
+    spots, tied = balloons(anchors, frame.beside(len(both)) if values else frame.around(len(both)))
+    for (each, mark, text), anchor, spot in zip(both, tied, spots, strict=True):
         _requirement(axis, each, [placed(line) for line in mark.lines], anchor, spot)
+        aside = 1 if spot[0] > frame.width / 2 else -1
+        axis.text(spot[0] + 0.2 * aside, spot[1], text, fontsize=TEXT, va="center", ha="left" if aside > 0 else "right")
     return inline(figure, key, label)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the picture lies in its figure, inches.
+
+    ``scale`` of a pixel; ``size`` of the picture, ``corner`` its upper left one; ``width``, ``height`` of the figure.
+    """
+
+    scale: float
+    size: np.ndarray
+    corner: np.ndarray
+    width: float
+    height: float
+
+    def around(self, count: int) -> np.ndarray:
+        """Places around the picture for at least so many balloons, none nearer to another than a pitch, (n, 2)."""
+        outer = self.size + _BAND
+        around = 2 * outer.sum()
+        many = max(int(around / _PITCH), count)
+        at = (np.arange(many) + 0.5) * around / many
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * outer
+        start = np.array([0, outer[0], outer.sum(), outer.sum() + outer[0], around])
+        return np.stack([np.interp(at, start, corners[:, i]) for i in (0, 1)], -1) + self.corner - _BAND / 2
+
+    def beside(self, count: int) -> np.ndarray:
+        """Places on both sides of the picture for at least so many balloons with two lines of text, (n, 2)."""
+        many = max(int(self.height / _PITCH), -(-count // 2))
+        at = (np.arange(many) + 0.5) * self.height / many
+        sides = self.corner[0] - _BAND / 2, self.corner[0] + self.size[0] + _BAND / 2
+        return np.array([[side, y] for side in sides for y in at])
+
+
+def _frame(part: preview.Window, values: int) -> Frame:
+    """Of a picture with balloons, beside which so many values stand."""
+    scale = _scale(part)
+    size = np.array([part.width, part.height]) * scale
+    width = WIDTH + 2 * _TEXT * bool(values)
+    height = max(size[1] + 2 * _BAND, _PITCH * -(-values // 2))
+    return Frame(scale, size, (np.array([width, height]) - size) / 2, width, height)
 
 
 def enlarged(picture: Picture) -> str:
@@ -172,15 +222,15 @@ def _cut(picture: Picture, image: np.ndarray, part: preview.Window) -> np.ndarra
     return preview.shades(picture.scene, some)
 
 
-def balloons(anchors: list[np.ndarray], size: np.ndarray, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places of n balloons around a picture, none nearer to another than a pitch, and the points that they are tied to.
+def balloons(anchors: list[np.ndarray], slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places of n balloons, and the points that they are tied to.
 
     Parameters
     ----------
     anchors : list of n ndarray, shape (k, 2)
         The points to one of which each may be tied.
-    size, corner : ndarray, shape (2,)
-        Of the picture, and where its upper left corner lies.
+    slots : ndarray, shape (at least n, 2)
+        Where a balloon may stand.
 
     Returns
     -------
@@ -189,13 +239,6 @@ def balloons(anchors: list[np.ndarray], size: np.ndarray, corner: np.ndarray) ->
     """
     if not anchors:
         return np.empty((0, 2)), np.empty((0, 2))
-    outer = size + _BAND
-    around = 2 * outer.sum()
-    count = max(int(around / _PITCH), len(anchors))
-    at = (np.arange(count) + 0.5) * around / count
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * outer
-    start = np.array([0, outer[0], outer.sum(), outer.sum() + outer[0], around])
-    slots = np.stack([np.interp(at, start, corners[:, i]) for i in (0, 1)], -1) + corner - _BAND / 2
     away = [np.linalg.norm(np.nan_to_num(each)[:, None] - slots, axis=-1).round(6) for each in anchors]
     _, chosen = linear_sum_assignment(np.array([each.min(0) for each in away]))
     tied = [each[far[:, slot].argmin()] for each, far, slot in zip(anchors, away, chosen, strict=True)]

@@ -1,0 +1,115 @@
+"""An inspection: what one picture of a part says of each characteristic of its drawing, with U and decision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.budgeting.budgets import SceneBudget
+from planner.uncertainty.conformity import Decision, decide
+from scenes.results import finite
+from validation.report.requirements import Requirement, measurable_budget, requirements
+
+if TYPE_CHECKING:
+    import measure
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """A characteristic as it was measured.
+
+    Attributes
+    ----------
+    requirement : Requirement
+        Its balloon's number, name, nominal value, tolerance, U and status.
+    value : float or None
+        Its bias taken off; None where it could not be measured.
+    u : float or None
+        Combined standard uncertainty, of which U is a multiple; None where there is no U.
+    decision : {"pass", "fail", "undecided"} or None
+        By U (ISO 14253-1); None without a tolerance.
+    """
+
+    requirement: Requirement
+    value: float | None
+    u: float | None
+    decision: Decision | None
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Of what is accepted; None without a tolerance."""
+        told = self.requirement
+        zone = told.tolerance
+        return None if zone is None else (told.nominal - zone.minus, told.nominal + zone.plus)
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """All characteristics of one part in one picture, and the budget of those that could be measured."""
+
+    found: measure.Measurements
+    rows: tuple[Inspected, ...]
+    budget: SceneBudget | None
+
+    @property
+    def decision(self) -> Decision | None:
+        """Of the part: ``fail`` by one characteristic, ``pass`` by all that have a tolerance; None where none has."""
+        each = [row.decision for row in self.rows if row.decision is not None]
+        if not each:
+            return None
+        return "fail" if "fail" in each else "undecided" if "undecided" in each else "pass"
+
+
+def inspect(found: measure.Measurements) -> Inspection:
+    """The inspection of a part whose picture has been measured.
+
+    Without U, and undecided, where no light is known. U holds all that the scene says is not exact: noise and the
+    correction's doubt as measured, camera, places, temperature (`planner.budgeting.budgets.budget`).
+    """
+    known = expanded(found)
+    told = _requirements(found, known) if found.picture.lights else _unlit(found)
+    rows = (_inspected(each, float(value), known) for each, value in zip(told, found.value, strict=True))
+    return Inspection(found, tuple(rows), known)
+
+
+def expanded(found: measure.Measurements) -> SceneBudget | None:
+    """The budget of what was measured in one picture, with its own noise and, where its bias was taken off, the doubt
+    of that; None where no light is known, or nothing could be measured."""
+    if not found.picture.lights:
+        return None
+    doubts = {} if np.isnan(found.u_bias).all() else {"doubts": np.nan_to_num(found.u_bias, nan=np.inf, posinf=np.inf)}
+    variances = np.einsum("mm->m", found.covariance)
+    return measurable_budget(found.picture, statuses=[str(s) for s in found.status], variances=variances, **doubts)
+
+
+def _requirements(found: measure.Measurements, known: SceneBudget | None) -> tuple[Requirement, ...]:
+    return requirements(
+        found.picture,
+        sigmas=found.sigma.tolist(),
+        biases=[0.0 if np.isfinite(u) else None for u in found.u_bias],
+        found=known,
+        statuses=[str(state) for state in found.status],
+        u_biases=[finite(u) for u in found.u_bias],
+    )
+
+
+def _unlit(found: measure.Measurements) -> tuple[Requirement, ...]:
+    """Where no light is known nothing is known of biases: without U."""
+    return tuple(
+        Requirement(
+            number=m + 1, name=quantity.name, unit=found.units[m], nominal=float(found.nominal[m]),
+            tolerance=quantity.tolerance, sigma=float(found.sigma[m]), bias=None, u_bias=None, U=None,
+            status=str(found.status[m]), limits="", kind=quantity.kind,
+        )
+        for m, quantity in enumerate(found.quantities)
+    )  # fmt: skip
+
+
+def _inspected(told: Requirement, value: float, known: SceneBudget | None) -> Inspected:
+    u = None if told.U is None or known is None else known[told.name].u
+    zone = told.tolerance
+    U = np.inf if told.U is None else told.U
+    decision = zone and decide(value, U, told.nominal, zone, k=1.0, status=told.status)
+    return Inspected(told, finite(value), u, decision)

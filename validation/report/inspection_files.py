@@ -1,0 +1,170 @@
+"""An inspection handed on: a page with balloon picture and table, the table as CSV, the picture as SVG, and QIF."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes.results import finite
+from scenes.status import is_trusted
+from validation.inspection import Inspected, Inspection
+from validation.report import cells, qif, station_sketch, station_view
+from validation.report.budget_table import decimals
+from validation.report.camera_words import told as camera
+from validation.report.export import inert
+from validation.report.grades import LOOKS, MEANS
+from validation.report.page import budget_sections, environment
+
+COLUMNS = (
+    "no.", "characteristic", "kind", "nominal", "lower limit", "upper limit", "value", "U", "decision", "status",
+)  # fmt: skip
+NOTE = (
+    "value: as measured in this picture, the bias taken off that a simulation of it tells. U: expanded uncertainty "
+    "(95 %) of noise, of the bias' correction and of all else that the scene says is not exactly known. decision (ISO "
+    "14253-1): pass where the value keeps both limits by at least U, fail where it is beyond one by more than U; only "
+    "a value whose status is ok is decided."
+)
+FILES = ("inspection.html", "inspection.csv", "inspection.svg", "inspection.qif")
+
+
+@dataclass(frozen=True)
+class About:
+    """What is said of an inspection beside its numbers: the part's serial number, empty if not known, and the picture's
+    file name."""
+
+    serial: str
+    file: str
+
+
+def write(found: Inspection, image: np.ndarray, about: About, directory: Path) -> list[Path]:
+    """Write the four files to a directory, which is made; their paths.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+        The picture, grey levels.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    page, table, drawing, results = (directory / name for name in FILES)
+    drawn = balloons(found, image)
+    context = _context(found, about) | {"view": drawn}
+    page.write_text(environment(True).get_template("inspection.html.j2").render(context), encoding="utf-8")
+    write_csv(found, about, table)
+    drawing.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{drawn}', encoding="utf-8")
+    results.write_bytes(qif.document(found, about.serial))
+    return [page, table, drawing, results]
+
+
+def balloons(found: Inspection, image: np.ndarray):
+    """The picture with each characteristic's features, balloon, value and U, SVG."""
+    values = [_beside(row) for row in found.rows]
+    label = "What was measured: " + "; ".join(f"{row.requirement.number} {row.requirement.title}" for row in found.rows)
+    return station_view.draw(
+        found.found.picture, [row.requirement for row in found.rows], image, label, "inspection", values
+    )
+
+
+def write_csv(found: Inspection, about: About, path: Path) -> None:
+    """One line a characteristic, lengths in the scene's unit, angles in degrees; empty where there is no number."""
+    rows = records(found, about)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows({key: inert(value) for key, value in row.items()} for row in rows)
+
+
+def records(found: Inspection, about: About) -> list[dict[str, Any]]:
+    """One a characteristic, with all that the table shows, unrounded."""
+    told = []
+    for row, u_bias in zip(found.rows, found.found.u_bias, strict=True):
+        each = row.requirement
+        low, high = row.limits or (None, None)
+        told.append({
+            "part": about.serial, "file": about.file, "number": each.number, "characteristic": each.name,
+            "kind": each.kind, "unit": each.unit, "nominal": each.nominal, "lower": low, "upper": high,
+            "value": row.value, "U": each.U, "sigma": finite(each.sigma), "u_bias": finite(u_bias),
+            "decision": row.decision, "status": each.status, "reason": each.reason,
+        })  # fmt: skip
+    return told
+
+
+def sentence(found: Inspection) -> str:
+    """What the inspection says of the part."""
+    rows = found.rows
+    if found.decision is None:
+        return "No characteristic has a tolerance: nothing is decided."
+    judged = [row for row in rows if row.decision is not None]
+    if found.decision == "pass":
+        many = f"all {len(judged)} characteristics keep their limits" if len(judged) > 1 else "it keeps its limits"
+        return f"Pass: {many} by at least U (ISO 14253-1){_untold(rows)}."
+    parts = []
+    if some := [row for row in judged if row.decision == "fail"]:
+        parts.append(f"Fail: {_named(some)} {'are' if len(some) > 1 else 'is'} beyond a limit by more than U")
+    if some := [row for row in judged if row.decision == "undecided"]:
+        parts.append(f"{'undecided' if parts else 'Undecided'}: {_named(some)}")
+    kept = sum(row.decision == "pass" for row in judged)
+    return f"{'; '.join(parts)}; {kept} of {len(judged)} pass{_untold(rows)}."
+
+
+def _untold(rows: Sequence[Inspected]) -> str:
+    """Of those without a tolerance."""
+    count = sum(row.decision is None for row in rows)
+    return f"; {count} without a tolerance" if count else ""
+
+
+def _named(rows: Sequence[Inspected]) -> str:
+    return ", ".join(f"{row.requirement.title} (no. {row.requirement.number})" for row in rows)
+
+
+def _context(found: Inspection, about: About) -> dict[str, Any]:
+    """What the page's template takes."""
+    scene, picture = found.found.picture.scene, found.found.picture
+    grades = dict.fromkeys(row.requirement.grade for row in found.rows)
+    title = scene.title or scene.name
+    told = station_sketch.told(picture)
+    return {
+        "name": scene.name,
+        "title": f"Inspection of part {about.serial}: {title}" if about.serial else f"Inspection: {title}",
+        "decision": found.decision or "open",
+        "sentence": sentence(found),
+        "taken": f"Measured in {about.file}. {camera(scene)}. {told[0].upper()}{told[1:]}.",
+        "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
+        "columns": COLUMNS,
+        "rows": [(LOOKS[row.requirement.grade], row.decision or "", _cells(row)) for row in found.rows],
+        "note": NOTE,
+        "why": [f"{row.requirement.title} (no. {row.requirement.number}), {row.requirement.status}: "
+                f"{row.requirement.reason}" for row in found.rows if row.requirement.reason],
+        "sections": budget_sections(found.budget),
+        "agrees": found.decision == "pass",
+    }  # fmt: skip
+
+
+def _cells(row: Inspected) -> tuple[str, ...]:
+    """As `COLUMNS`."""
+    each, places = row.requirement, _places(row)
+    low, high = ("-" if limit is None else f"{limit:.6g}" for limit in row.limits or (None, None))
+    value = "-" if row.value is None else f"{row.value:.{places}f}"
+    whole = f"{each.U:.{places}f}" if each.U is not None and is_trusted(each.status) else "-"
+    return (
+        str(each.number), each.title, each.kind, cells.united(f"{each.nominal:.6g}", each.unit),
+        cells.united(low, each.unit), cells.united(high, each.unit), cells.united(value, each.unit),
+        cells.united(whole, each.unit), row.decision or "-", each.status,
+    )  # fmt: skip
+
+
+def _places(row: Inspected) -> int:
+    """Decimal places of value and U: two digits of U."""
+    return decimals(row.requirement.U) if row.requirement.U else 4
+
+
+def _beside(row: Inspected) -> str:
+    """What stands beside a balloon: the value, and below it U, or why there is none."""
+    each, places = row.requirement, _places(row)
+    if row.value is None or each.U is None or not is_trusted(each.status):
+        return each.status if row.value is None else f"{row.value:.{places}f}\n{each.status}"
+    return f"{cells.united(f'{row.value:.{places}f}', each.unit)}\n±{each.U:.{places}f}"
