@@ -13,9 +13,10 @@ from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
 from planner.combining import Combination, combine
+from planner.covering import Coverage, coverage
 from planner.forecast import Forecast
 from planner.maps import Map, pose_map, variance_map
-from planner.planning import Plan, plan
+from planner.planning import NothingMeasuresAll, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.robustness import Robust, Tolerances, robust
 from planner.search.candidates import Candidate
@@ -48,9 +49,9 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
-    "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "EdgePrediction",
-    "Forecast", "Map", "Pictures", "Plan", "Prediction", "Robust", "SceneBudget", "Tolerances", "Varied",
-    "View", "ViewSet", "ViewingSpace", "Views", "budget", "combine", "exhaustive",
-    "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter",
-    "predict", "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "Coverage",
+    "EdgePrediction", "Forecast", "Map", "NothingMeasuresAll", "Pictures", "Plan", "Prediction", "Robust",
+    "SceneBudget", "Tolerances", "Varied", "View", "ViewSet", "ViewingSpace", "Views", "budget", "combine",
+    "coverage", "exhaustive", "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "predict",
+    "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
 ]  # fmt: skip

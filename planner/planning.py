@@ -40,6 +40,10 @@ _CLOSELY = 3  # settings beside an optimum that are looked at closely
 COARSE_STEP = 10.0  # degrees; where every pair has to be evaluated
 
 
+class NothingMeasuresAll(InvalidInput):
+    """No allowed setting measures every quantity of a scene."""
+
+
 @dataclass(frozen=True, repr=False)
 class Plan(Shown):
     """The best setting and how it was found.
@@ -191,7 +195,7 @@ def plan(
     Raises
     ------
     InvalidInput
-        If an argument is none of its choices, or no allowed setting can measure.
+        If an argument is none of its choices; `NothingMeasuresAll`, which is one, if no allowed setting measures all.
 
     Examples
     --------
@@ -214,7 +218,7 @@ def plan(
         searches.append(Searched.of(SearchProblem(world, model, aim, limits), grid, search, start, shares, report))
     best = min(searches, key=lambda each: each.variance)
     if not np.isfinite(best.variance):
-        raise InvalidInput("constraints must leave a setting that can measure, got none")
+        raise NothingMeasuresAll("constraints must leave a setting that can measure, got none")
     made = _finished(best, searches, refined)
     return replace(made, varied=_varied(made, best, vary, hold, report)) if vary else made
 

@@ -39,6 +39,7 @@ _NOT_CAPABILITY = (
     "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
     "--views", "--views-share", "--vary", "--hold", "--write",
 )  # fmt: skip
+_NOT_COVERAGE = tuple(each for each in _NOT_CAPABILITY if each != "--model")
 
 Pair = Annotated[str | None, typer.Option(metavar="P,A", help="Hold it fixed: polar angle and azimuth, degrees.")]
 Range = Annotated[
@@ -126,6 +127,10 @@ class Options:
     views: Annotated[int | None, typer.Option(metavar="N", help="Plan 1 to N pictures that together measure best.")] = (
         None
     )
+    coverage: Annotated[
+        bool,
+        typer.Option("--coverage", help="From where each can be measured, and the fewest pictures that measure all."),
+    ] = False
     views_share: Annotated[
         str | None, typer.Option(help="With --views: sensor or light, the same in all pictures.")
     ] = None
@@ -170,6 +175,7 @@ class Planned:
 @taking(Options)
 def plan_command(given: Options) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
+    import planner
     from validation.cli import plan_capability, plan_views
 
     _check_options(given)
@@ -185,17 +191,55 @@ def plan_command(given: Options) -> None:
         plan_capability.run(scene, how, given.as_json)
         return
     count = 0 if given.no_check else _renders(scene) if given.check is None else given.check
+    if given.coverage:
+        check_left_out(given.context, "--coverage", *_NOT_COVERAGE)
+        found, seconds = _coverage(scene, how | {"model": given.model})
+        _say_coverage(found, seconds, given.as_json)
+        raise typer.Exit(1 if found.lost else 0)
     how |= {"over": given.over, "model": given.model}
     if given.several:
         plan_views.run(scene, given, how, checked=bool(count))
         _say_unchecked(scene, given, count)
         return
-    made = _planned(scene, given, how | {"start": first}, count)
+    try:
+        made = _planned(scene, given, how | {"start": first}, count)
+    except planner.NothingMeasuresAll:
+        _say_several(scene, how, given.as_json)
+        raise
     if target:
         _write(target, made)
     _show(made, _pictures(made, given), target, given.as_json)
     _say_unchecked(scene, given, count)
     if made.scatter and not made.scatter.agrees:
+        raise typer.Exit(1)
+
+
+def _coverage(scene: scenes.Scene, how: dict) -> tuple[planner.Coverage, float]:
+    """Who can see what, and the seconds that it took to find out."""
+    import planner
+
+    began, wanted = time.perf_counter(), ("model", "step_deg", "constraints", "sensor", "light")
+    with progress(f"{scene.name}: who can see what", "steps", at_once=True) as shown:
+        found = planner.coverage(scene, **{name: how[name] for name in wanted}, report=shown)
+    return found, time.perf_counter() - began
+
+
+def _say_coverage(found: planner.Coverage, seconds: float, as_json: bool) -> None:
+    from validation.report import coverage_table
+
+    if as_json:
+        say(plain(coverage_table.facts(found, seconds)), True, "")
+    else:
+        console().print(coverage_table.report(found, seconds), highlight=False)
+
+
+def _say_several(scene: scenes.Scene, how: dict, as_json: bool) -> None:
+    """Where no one picture measures all: the pictures that do; the command ends with 1 then."""
+    if len(scene.free) > 1:
+        return
+    found, seconds = _coverage(scene, how)
+    if found.shots:
+        _say_coverage(found, seconds, as_json)
         raise typer.Exit(1)
 
 
