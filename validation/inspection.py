@@ -1,4 +1,4 @@
-"""An inspection: what one picture of a part says of each characteristic of its drawing, with U and decision."""
+"""An inspection: what pictures of a part say of each characteristic of its drawing, with U and decision."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision, decide
 from scenes.results import finite
+from scenes.status import is_trusted
 from validation.report.requirements import Requirement, measurable_budget, requirements
 
 if TYPE_CHECKING:
@@ -30,12 +31,15 @@ class Inspected:
         Combined standard uncertainty, of which U is a multiple; None where there is no U.
     decision : {"pass", "fail", "undecided"} or None
         By U (ISO 14253-1); None without a tolerance.
+    picture : int
+        In which, from 1.
     """
 
     requirement: Requirement
     value: float | None
     u: float | None
     decision: Decision | None
+    picture: int = 1
 
     @property
     def limits(self) -> tuple[float, float] | None:
@@ -46,12 +50,31 @@ class Inspected:
 
 
 @dataclass(frozen=True, eq=False)
-class Inspection:
-    """All characteristics of one part in one picture, and the budget of those that could be measured."""
+class Taken:
+    """All characteristics in one picture of a part, and the budget of those that could be measured."""
 
     found: measure.Measurements
     rows: tuple[Inspected, ...]
     budget: SceneBudget | None
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """All characteristics of one part: ``rows`` are each of the picture that tells it best, of all that were taken."""
+
+    taken: tuple[Taken, ...]
+    rows: tuple[Inspected, ...]
+
+    def found(self, row: Inspected) -> measure.Measurements:
+        """What was measured in a row's picture."""
+        return self.taken[row.picture - 1].found
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Joint covariance (M, M) of the rows' values by noise: 0 between values of different pictures."""
+        each = np.array([taken.found.covariance for taken in self.taken])
+        which = np.array([row.picture - 1 for row in self.rows])
+        return np.where(which[:, None] == which, each[which, np.arange(len(which))], 0.0)
 
     @property
     def decision(self) -> Decision | None:
@@ -62,16 +85,30 @@ class Inspection:
         return "fail" if "fail" in each else "undecided" if "undecided" in each else "pass"
 
 
-def inspect(found: measure.Measurements) -> Inspection:
-    """The inspection of a part whose picture has been measured.
+def inspect(*found: measure.Measurements) -> Inspection:
+    """The inspection of a part of which one picture, or several of one scene, have been measured.
 
-    Without U, and undecided, where no light is known. U holds all that the scene says is not exact: noise and the
-    correction's doubt as measured, camera, places, temperature (`planner.budgeting.budgets.budget`).
+    Each characteristic is told by the picture in which it is ``ok`` with the least U; where in none, with the least
+    sigma. Without U, and undecided, where no light is known. U holds all that the scene says is not exact: noise and
+    the correction's doubt as measured, camera, places, temperature (`planner.budgeting.budgets.budget`).
     """
+    taken = tuple(_taken(each, number) for number, each in enumerate(found, 1))
+    every = zip(*(each.rows for each in taken), strict=True)
+    return Inspection(taken, tuple(min(rows, key=_doubt) for rows in every))
+
+
+def _doubt(row: Inspected) -> tuple[bool, bool, float, float]:
+    """What is least of the picture that tells a characteristic best."""
+    told = row.requirement
+    U = np.inf if told.U is None else told.U
+    return not is_trusted(told.status), row.value is None, U, told.sigma
+
+
+def _taken(found: measure.Measurements, number: int) -> Taken:
     known = expanded(found)
     told = _requirements(found, known) if found.picture.lights else _unlit(found)
-    rows = (_inspected(each, float(value), known) for each, value in zip(told, found.value, strict=True))
-    return Inspection(found, tuple(rows), known)
+    rows = (_inspected(each, float(value), known, number) for each, value in zip(told, found.value, strict=True))
+    return Taken(found, tuple(rows), known)
 
 
 def expanded(found: measure.Measurements) -> SceneBudget | None:
@@ -107,9 +144,9 @@ def _unlit(found: measure.Measurements) -> tuple[Requirement, ...]:
     )  # fmt: skip
 
 
-def _inspected(told: Requirement, value: float, known: SceneBudget | None) -> Inspected:
+def _inspected(told: Requirement, value: float, known: SceneBudget | None, number: int) -> Inspected:
     u = None if told.U is None or known is None else known[told.name].u
     zone = told.tolerance
     U = np.inf if told.U is None else told.U
     decision = zone and decide(value, U, told.nominal, zone, k=1.0, status=told.status)
-    return Inspected(told, finite(value), u, decision)
+    return Inspected(told, finite(value), u, decision, number)

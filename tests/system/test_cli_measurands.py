@@ -54,6 +54,37 @@ def test_the_table_and_a_part_that_fails(image, tmp_path):
     assert "ISO" in done.stdout
 
 
+def test_an_inspection_of_two_pictures(image, tmp_path):
+    """The second picture is the first one again: each value is told once, and the files say so."""
+    done = ice("measure", image, "plate", *POSES, "--also", f"{image} 30,80 35,335", "--inspection", tmp_path / "out",
+               "--serial", "7", "--json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    rows = json.loads(done.stdout)["measurands"]
+    assert [(row["name"], row["decision"], row["picture"]) for row in rows] == [(name, "pass", 1) for name in NAMES]
+    assert all(1.9 * row["u"] < row["U"] for row in rows)  # margin: k is 1.96
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert written == [f"inspection{end}" for end in (".csv", ".html", ".qif", "_1.svg", "_2.svg")]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--inspection", "out"), "--light must be given with --inspection, got nothing"),
+        (("--light", "35,335", "--serial", "7"), "--serial must be used with --inspection, got '7' alone"),
+        (("--light", "35,335", "--as-measured", "--inspection", "out"), "--as-measured must be left out with --insp"),
+        (
+            ("--light", "35,335", "--also", "other.png"),
+            '--also must be "FILE P,A P,A": a picture, its sensor and light',
+        ),
+    ],
+)
+def test_what_an_inspection_needs(image, tmp_path, options, said):
+    done = ice("measure", image, "plate", "--sensor", "30,80", *options, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(said)
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_cannot_be_measured_is_said(image):
     """From behind, nothing of the top is seen: no values, exit status 1."""
     done = ice("measure", image, "plate", "--sensor", "120,80", "--light", "35,335", "--json")

@@ -4,7 +4,6 @@ import csv
 import os
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,7 +19,7 @@ from validation.report import inspection_files, qif
 from validation.report.requirements import Requirement
 
 NAMES = ["hole to corner", "bore", "length", "square", "hole from front"]
-ABOUT = inspection_files.About("SN17", "picture.png")
+ABOUT = inspection_files.About("SN17", ("picture.png",))
 QIF = "{http://qifstandards.org/xsd/qif3}"
 
 
@@ -116,7 +115,7 @@ def test_one_that_was_not_measured_leaves_the_others_their_u(measured):
 )  # fmt: skip
 def test_the_part_fails_by_one_and_passes_by_all(decisions, whole, said):
     rows = tuple(inspected(each, k, f"c{k}") for k, each in enumerate(decisions))
-    made = Inspection(SimpleNamespace(), rows, None)
+    made = Inspection((), rows)
     assert made.decision == whole
     assert inspection_files.sentence(made) == said
 
@@ -124,9 +123,9 @@ def test_the_part_fails_by_one_and_passes_by_all(decisions, whole, said):
 def test_the_files_say_the_same(measured, tmp_path):
     found, image = measured
     made = inspection.inspect(found)
-    paths = inspection_files.write(made, image, ABOUT, tmp_path / "new")
-    assert [path.name for path in paths] == list(inspection_files.FILES)
-    page, table, drawing, _ = paths
+    paths = inspection_files.write(made, [image], ABOUT, tmp_path / "new")
+    assert [path.name for path in paths] == [f"inspection.{end}" for end in ("html", "csv", "qif", "svg")]
+    page, table, _, drawing = paths
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert [row["characteristic"] for row in rows] == NAMES
     for row, each in zip(rows, made.rows, strict=True):
@@ -145,6 +144,53 @@ def test_the_files_say_the_same(measured, tmp_path):
         assert f"{each.value:.{places}f}" in told
 
 
+@pytest.fixture(scope="module")
+def twice(measured):
+    """Two pictures of the part: the bore is clutter in the first, the length is more precise there."""
+    first, _ = measured
+    states = first.status.copy()
+    states[1] = status.CLUTTER
+    second = replace(first, covariance=4 * first.covariance, value=first.value + 0.001)
+    return inspection.inspect(replace(first, status=states), second)
+
+
+def test_each_characteristic_is_told_by_the_picture_that_sees_it_best(twice, measured):
+    first, _ = measured
+    assert [row.picture for row in twice.rows] == [1, 2, 1, 1, 1]
+    assert twice.rows[1].value == first.value[1] + 0.001
+    assert twice.decision == "pass"
+    joint = twice.covariance
+    np.testing.assert_array_equal(np.diag(joint), np.diag(first.covariance) * [1, 4, 1, 1, 1])
+    assert np.count_nonzero(joint[1]) == 1
+    np.testing.assert_array_equal(joint[0, 2:], first.covariance[0, 2:])
+
+
+def test_of_what_no_picture_tells_well_it_is_the_one_with_a_value(measured):
+    first, _ = measured
+    value, states = first.value.copy(), first.status.copy()
+    value[1], states[1] = np.nan, status.SHORT
+    lost = replace(first, value=value, status=states)
+    states = first.status.copy()
+    states[1] = status.CLUTTER
+    made = inspection.inspect(lost, replace(first, status=states))
+    assert (made.rows[1].picture, made.rows[1].value) == (2, first.value[1])
+
+
+def test_several_pictures_are_written_one_below_the_other(twice, measured, tmp_path):
+    _, image = measured
+    about = inspection_files.About("", ("top.png", "side.png"))
+    paths = inspection_files.write(twice, [image, image], about, tmp_path)
+    names = ["inspection.html", "inspection.csv", "inspection.qif", "inspection_1.svg", "inspection_2.svg"]
+    assert [path.name for path in paths] == names
+    rows = list(csv.DictReader(paths[1].read_text(encoding="utf-8").splitlines()))
+    assert [row["file"] for row in rows] == ["top.png", "side.png", "top.png", "top.png", "top.png"]
+    told = paths[0].read_text(encoding="utf-8")
+    assert told.index("Measured in top.png") < told.index("Measured in side.png")
+    first, second = (path.read_text(encoding="utf-8") for path in paths[3:])
+    assert "2 bore" in second
+    assert "2 bore" not in first
+
+
 def test_a_value_that_is_not_ok_stands_without_u(measured):
     found, image = measured
     states = found.status.copy()
@@ -153,7 +199,7 @@ def test_a_value_that_is_not_ok_stands_without_u(measured):
     cells = inspection_files._cells(made.rows[2])
     assert cells[-3:] == ("-", "undecided", "clutter")
     assert inspection_files._beside(made.rows[2]).endswith("\nclutter")
-    assert "clutter" in str(inspection_files.balloons(made, image))
+    assert "clutter" in str(inspection_files.balloons(made, 1, image))
 
 
 def _results(document):

@@ -26,6 +26,7 @@ from validation.boards import Boards
 from validation.cli import measurands, plan_json, plan_views
 from validation.cli import predict as predict_cli
 from validation.effects_check import RENDERED, Switched
+from validation.inspection import Inspection
 from validation.plan_check import CheckedSetting, PlanCheck
 from validation.report import (
     budget_table,
@@ -127,9 +128,10 @@ def test_measured_values_and_their_decisions_are_printed():
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
         value=np.array([10.08, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
     )  # fmt: skip
-    rows = [SimpleNamespace(requirement=SimpleNamespace(U=U), decision=each)
+    rows = [SimpleNamespace(requirement=SimpleNamespace(U=U), decision=each, picture=1)
             for U, each in ((0.0131, "undecided"), (None, None))]  # fmt: skip
-    one, two = measurands.facts(SimpleNamespace(found=found, rows=rows))
+    whole = Inspection((SimpleNamespace(found=found),), tuple(rows))
+    one, two = measurands.facts(whole)
     assert one == {
         "name": "slot", "kind": "width", "unit": "mm", "value": 10.08, "sigma": 0.0024, "value_image": 812.0,
         "bias": 0.011, "u_bias": 0.0032, "u": 0.004, "U": 0.0131,
@@ -138,7 +140,7 @@ def test_measured_values_and_their_decisions_are_printed():
     }  # fmt: skip
     assert (two["value"], two["sigma"], two["sigma_image"], two["nominal"]) == (29.5, 0.5, pytest.approx(0.4), 30.0)
     assert (two["U"], two["decision"]) == (None, None)
-    assert measurands.covariance(found) == found.covariance.tolist()
+    assert measurands.covariance(whole) == found.covariance.tolist()
     headings, rows = cells(measurands.table([one, two]))
     assert headings == ["name", "kind", "value", "u", "unit", "bias off", "u(bias)", "U", "nominal", "tolerance",
                         "decision", "status"]  # fmt: skip

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
 def facts(inspected: Inspection) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
-    found = inspected.found
-    rows, combined, sigma_image = [], found.u, np.sqrt(np.einsum("mm->m", found.covariance_image))
-    for k, (quantity, row) in enumerate(zip(found.quantities, inspected.rows, strict=True)):
+    rows = []
+    for k, row in enumerate(inspected.rows):
+        found = inspected.found(row)
+        quantity, combined, sigma_image = found.quantities[k], found.u, np.sqrt(np.diag(found.covariance_image))
         zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
         state, good, known = str(found.status[k]), bool(np.isfinite(value)), bool(np.isfinite(combined[k]))
         rows.append({
@@ -41,12 +42,18 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
             "U": row.requirement.U,
             "decision": row.decision,
             "status": state,
-        })  # fmt: skip
+        } | ({"picture": row.picture} if len(inspected.taken) > 1 else {}))  # fmt: skip
     return plain(rows)
 
 
-def reasons(rows: list[dict[str, Any]], found: measure.Measurements) -> list[str]:
+def reasons(rows: list[dict[str, Any]], inspected: Inspection) -> list[str]:
     """What decided each record's status, with its number; empty where it is ``ok``, or nothing more is known."""
+    every = [_reasons(rows, each.found) for each in inspected.taken]
+    return [every[row.picture - 1][m] for m, row in enumerate(inspected.rows)]
+
+
+def _reasons(rows: list[dict[str, Any]], found: measure.Measurements) -> list[str]:
+    """The same of one picture."""
     picture = found.picture
     if not picture.lights or all(is_trusted(row["status"]) for row in rows):
         return [""] * len(rows)
@@ -65,9 +72,9 @@ def _saturated(count: int) -> str:
     return f"{pixels} at the end of the sensor's scale, not as in the simulation, whose bias is another one"
 
 
-def covariance(found: measure.Measurements) -> list[list[float | None]]:
+def covariance(inspected: Inspection) -> list[list[float | None]]:
     """Joint covariance of all values; null for what is not known."""
-    return plain(found.covariance)
+    return plain(inspected.covariance)
 
 
 def table(rows: list[dict[str, Any]]) -> Table:

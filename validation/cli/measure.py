@@ -65,6 +65,13 @@ class Options:
             help="With SCENE and --light: write inspection.html, .csv, .svg (balloons) and .qif, with U and decisions.",
         ),
     ] = None
+    also: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE P,A P,A",
+            help='With SCENE: another picture of the part, "FILE SENSOR LIGHT"; each is told by what sees it best.',
+        ),
+    ] = None
     serial: Annotated[str | None, typer.Option(metavar="TEXT", help="Serial number of the part, for --inspection.")] = (
         None
     )
@@ -83,7 +90,8 @@ class Options:
     @property
     def of_scenes(self) -> dict[str, Any]:
         """What is asked of the picture of a scene alone, by option; None or False where it is not."""
-        return {"--as-measured": self.as_measured, "--inspection": self.inspection, "--serial": self.serial}
+        return {"--as-measured": self.as_measured, "--also": self.also, "--inspection": self.inspection,
+                "--serial": self.serial}  # fmt: skip
 
 
 @commands.command("measure")
@@ -121,8 +129,6 @@ def _measure_photograph(given: Options) -> NoReturn:
 
 
 def _measure_scene(given: Options) -> NoReturn:
-    import measure
-
     for option, value in given.of_photographs.items():
         if value is not None:
             raise InvalidInput(f"{option} must be left out with a scene, got {value}")
@@ -134,20 +140,36 @@ def _measure_scene(given: Options) -> NoReturn:
     from validation import inspection, picture_file
 
     known = scenes.load(given.scene)
-    image = picture_file.read(given.file, Size.of_camera(known.camera))
-    shown = scenes.Picture.of(known, *poses)
-    _check_inspection(given, shown)
-    if given.as_measured or not shown.lights:
-        found = measure.measure(image, shown, estimator=given.estimator, threshold=given.threshold)
-    else:
-        found = _corrected(image, shown, given.estimator, given.threshold)
-    inspected = inspection.inspect(found)
+    files = [(given.file, *poses), *(_also(text) for text in given.also or [])]
+    shown = [scenes.Picture.of(known, *where) for _, *where in files]
+    for each in shown:
+        _check_inspection(given, each)
+    images = [picture_file.read(file, Size.of_camera(known.camera)) for file, *_ in files]
+    inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
     if given.inspection is not None:
         from validation.report import inspection_files
 
-        about = inspection_files.About(given.serial or "", given.file.name)
-        inspection_files.write(inspected, image, about, given.inspection)
-    _say_measurands(given, inspected, found.first if known.task is not None else None)
+        about = inspection_files.About(given.serial or "", tuple(file.name for file, *_ in files))
+        inspection_files.write(inspected, images, about, given.inspection)
+    first = inspected.taken[0].found.first if known.task is not None and len(files) == 1 else None
+    _say_measurands(given, inspected, first)
+
+
+def _also(text: str) -> tuple[Path, Any, Any]:
+    """Another picture: its file, sensor and lights."""
+    file, *poses = text.rsplit(maxsplit=2)
+    if len(poses) != 2:
+        raise InvalidInput(f'--also must be "FILE P,A P,A": a picture, its sensor and light, got {text!r}')
+    return Path(file), parse_pose("--also", poses[0]), parse_pose("--also", poses[1])
+
+
+def _measured(given: Options, image: np.ndarray, shown: scenes.Picture) -> measure.Measurements:
+    """One picture of a scene, its bias taken off where its light is known."""
+    import measure
+
+    if given.as_measured or not shown.lights:
+        return measure.measure(image, shown, estimator=given.estimator, threshold=given.threshold)
+    return _corrected(image, shown, given.estimator, given.threshold)
 
 
 def _check_inspection(given: Options, shown: scenes.Picture) -> None:
@@ -197,8 +219,8 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
 
 def _say_measurands(given: Options, inspected: Inspection, distance: measure.Measurement | None) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
-    found, rows = inspected.found, measurands.facts(inspected)
-    told = {"measurands": rows, "covariance": measurands.covariance(found)}
+    rows = measurands.facts(inspected)
+    told = {"measurands": rows, "covariance": measurands.covariance(inspected)}
     if distance is not None:
         told |= _distance_facts(distance)
     if given.as_json:
@@ -206,7 +228,7 @@ def _say_measurands(given: Options, inspected: Inspection, distance: measure.Mea
     else:
         shown = console()
         shown.print(measurands.table(rows))
-        for line in legend([row["status"] for row in rows], measurands.reasons(rows, found)):
+        for line in legend([row["status"] for row in rows], measurands.reasons(rows, inspected)):
             shown.print(f" {line}", highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from validation.report.budget_table import decimals
 from validation.report.camera_words import told as camera
 from validation.report.export import inert
 from validation.report.grades import LOOKS, MEANS
-from validation.report.page import budget_sections, environment
+from validation.report.page import Section, budget_sections, environment
 
 COLUMNS = (
     "no.", "characteristic", "kind", "nominal", "lower limit", "upper limit", "value", "U", "decision", "status",
@@ -29,44 +29,47 @@ NOTE = (
     "14253-1): pass where the value keeps both limits by at least U, fail where it is beyond one by more than U; only "
     "a value whose status is ok is decided."
 )
-FILES = ("inspection.html", "inspection.csv", "inspection.svg", "inspection.qif")
 
 
 @dataclass(frozen=True)
 class About:
     """What is said of an inspection beside its numbers: the part's serial number, empty if not known, and the picture's
-    file name."""
+    files' names, in their order."""
 
     serial: str
-    file: str
+    files: tuple[str, ...]
 
 
-def write(found: Inspection, image: np.ndarray, about: About, directory: Path) -> list[Path]:
-    """Write the four files to a directory, which is made; their paths.
+def write(found: Inspection, images: Sequence[np.ndarray], about: About, directory: Path) -> list[Path]:
+    """Write page, table, QIF and an SVG of each picture to a directory, which is made; their paths.
 
     Parameters
     ----------
-    image : ndarray, shape (height, width)
-        The picture, grey levels.
+    images : sequence of ndarray, shape (height, width)
+        The pictures, grey levels.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    page, table, drawing, results = (directory / name for name in FILES)
-    drawn = balloons(found, image)
-    context = _context(found, about) | {"view": drawn}
+    page, table, results = (directory / f"inspection.{ending}" for ending in ("html", "csv", "qif"))
+    views = [balloons(found, number, image) for number, image in enumerate(images, 1)]
+    context = _context(found, about) | {"views": list(zip(_taken(found, about), views, strict=True))}
     page.write_text(environment(True).get_template("inspection.html.j2").render(context), encoding="utf-8")
     write_csv(found, about, table)
-    drawing.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{drawn}', encoding="utf-8")
     results.write_bytes(qif.document(found, about.serial))
-    return [page, table, drawing, results]
+    paths = [page, table, results]
+    for number, drawn in enumerate(views, 1):
+        paths.append(directory / f"inspection{f'_{number}' * (len(views) > 1)}.svg")
+        paths[-1].write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{drawn}', encoding="utf-8")
+    return paths
 
 
-def balloons(found: Inspection, image: np.ndarray):
-    """The picture with each characteristic's features, balloon, value and U, SVG."""
-    values = [_beside(row) for row in found.rows]
-    label = "What was measured: " + "; ".join(f"{row.requirement.number} {row.requirement.title}" for row in found.rows)
-    return station_view.draw(
-        found.found.picture, [row.requirement for row in found.rows], image, label, "inspection", values
-    )
+def balloons(found: Inspection, number: int, image: np.ndarray):
+    """A picture, from 1, with what it tells: each characteristic's features, balloon, value and U, SVG."""
+    rows = [row if row.picture == number else None for row in found.rows]
+    requirements = [row and row.requirement for row in rows]
+    label = "What was measured: " + "; ".join(f"{each.number} {each.title}" for each in requirements if each)
+    values = [_beside(row) if row else "" for row in rows]
+    picture = found.taken[number - 1].found.picture
+    return station_view.draw(picture, requirements, image, label, f"inspection-{number}", values)
 
 
 def write_csv(found: Inspection, about: About, path: Path) -> None:
@@ -81,13 +84,14 @@ def write_csv(found: Inspection, about: About, path: Path) -> None:
 def records(found: Inspection, about: About) -> list[dict[str, Any]]:
     """One a characteristic, with all that the table shows, unrounded."""
     told = []
-    for row, u_bias in zip(found.rows, found.found.u_bias, strict=True):
-        each = row.requirement
+    for m, row in enumerate(found.rows):
+        each, u_bias = row.requirement, found.found(row).u_bias[m]
         low, high = row.limits or (None, None)
         told.append({
-            "part": about.serial, "file": about.file, "number": each.number, "characteristic": each.name,
-            "kind": each.kind, "unit": each.unit, "nominal": each.nominal, "lower": low, "upper": high,
-            "value": row.value, "U": each.U, "sigma": finite(each.sigma), "u_bias": finite(u_bias),
+            "part": about.serial, "file": about.files[row.picture - 1], "number": each.number,
+            "characteristic": each.name, "kind": each.kind, "unit": each.unit,
+            "nominal": each.nominal, "lower": low, "upper": high, "value": row.value,
+            "U": each.U, "sigma": finite(each.sigma), "u_bias": finite(u_bias),
             "decision": row.decision, "status": each.status, "reason": each.reason,
         })  # fmt: skip
     return told
@@ -123,25 +127,42 @@ def _named(rows: Sequence[Inspected]) -> str:
 
 def _context(found: Inspection, about: About) -> dict[str, Any]:
     """What the page's template takes."""
-    scene, picture = found.found.picture.scene, found.found.picture
+    scene, several = found.taken[0].found.picture.scene, len(found.taken) > 1
     grades = dict.fromkeys(row.requirement.grade for row in found.rows)
     title = scene.title or scene.name
-    told = station_sketch.told(picture)
     return {
         "name": scene.name,
         "title": f"Inspection of part {about.serial}: {title}" if about.serial else f"Inspection: {title}",
         "decision": found.decision or "open",
         "sentence": sentence(found),
-        "taken": f"Measured in {about.file}. {camera(scene)}. {told[0].upper()}{told[1:]}.",
         "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
-        "columns": COLUMNS,
-        "rows": [(LOOKS[row.requirement.grade], row.decision or "", _cells(row)) for row in found.rows],
+        "columns": (*COLUMNS, "picture") if several else COLUMNS,
+        "rows": [(LOOKS[row.requirement.grade], row.decision or "", (*_cells(row), *[str(row.picture)] * several))
+                 for row in found.rows],
         "note": NOTE,
         "why": [f"{row.requirement.title} (no. {row.requirement.number}), {row.requirement.status}: "
                 f"{row.requirement.reason}" for row in found.rows if row.requirement.reason],
-        "sections": budget_sections(found.budget),
+        "sections": _budgets(found),
         "agrees": found.decision == "pass",
     }  # fmt: skip
+
+
+def _budgets(found: Inspection) -> list[Section]:
+    """Where the uncertainty comes from, of each picture."""
+    sections = []
+    for number, each in enumerate(found.taken, 1):
+        where = f", picture {number}" * (len(found.taken) > 1)
+        sections += [replace(one, heading=f"{one.heading}{where}") for one in budget_sections(each.budget)]
+    return sections
+
+
+def _taken(found: Inspection, about: About) -> list[str]:
+    """Of each picture its file, and where camera and lamps stood."""
+    lines = []
+    for file, taken in zip(about.files, found.taken, strict=True):
+        picture, told = taken.found.picture, station_sketch.told(taken.found.picture)
+        lines.append(f"Measured in {file}. {camera(picture.scene)}. {told[0].upper()}{told[1:]}.")
+    return lines
 
 
 def _cells(row: Inspected) -> tuple[str, ...]:

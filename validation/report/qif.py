@@ -33,7 +33,7 @@ def document(found: Inspection, serial: str = "") -> bytes:
     serial : str
         Of the part; left out where empty.
     """
-    ids, scene = count(1), found.found.picture.scene
+    ids, scene = count(1), found.taken[0].found.picture.scene
     root = Element("QIFDocument", {"xmlns": _NAMESPACE, "versionQIF": "3.0.0", "idMax": "0"})
     identity = _child(root, "QPId")
     header = _child(_child(root, "Header"), "Application")
