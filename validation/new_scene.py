@@ -181,7 +181,8 @@ def _facts(each: Drawn, scene: Scene) -> dict[str, Any]:
     return {
         "number": told.number, "kind": told.kind, "value": told.value, "plus": told.plus, "minus": told.minus,
         "fit": told.fit or None, "zone": told.zone, "round_zone": told.is_round, "modifiers": list(told.modifiers),
-        "datums": list(told.datums), "unit": told.unit, "faces": list(each.faces),
+        "datums": list(told.datums), "datum_modifiers": list(told.datum_modifiers), "unit": told.unit,
+        "faces": list(each.faces),
         "measurand": measured[0] if measured else None, "measurands": measured, "reason": each.reason or unseen or None,
     }  # fmt: skip
 

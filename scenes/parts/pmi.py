@@ -69,6 +69,8 @@ class Characteristic:
         ``M``, ``L``, ... of a geometric tolerance.
     datums : tuple of str
         Its datum system: letters, in their order; ``A-B`` of a common datum.
+    datum_modifiers : tuple of str
+        ``M``, ``L``, ... of each of these datums; empty without.
     unit : str
         ``mm`` or ``deg``.
     faces : tuple of int
@@ -87,6 +89,7 @@ class Characteristic:
     is_round: bool = False
     modifiers: tuple[str, ...] = ()
     datums: tuple[str, ...] = ()
+    datum_modifiers: tuple[str, ...] = ()
     unit: Unit | str = "mm"
     faces: tuple[int, ...] = ()
     others: tuple[int, ...] = ()
@@ -172,10 +175,12 @@ class _File:
             systems = here.of("GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE") or told[4:5]
             modifiers = (here.of("GEOMETRIC_TOLERANCE_WITH_MODIFIERS") or ((),))[0] or ()
             zone, unit = self._measure(_number(told, 2))
+            datums = tuple(self._letters(systems[0] if systems else ()))
             yield Characteristic(
                 number, _TOLERANCES[kind], zone=zone, unit=unit or "mm", is_round=number in self._round,
                 modifiers=tuple(_MODIFIERS.get(each, str(each).lower()) for each in modifiers),
-                datums=tuple(self._letters(systems[0] if systems else ())), faces=self.faces(_number(told, 3)),
+                datums=tuple(letter for letter, _ in datums), datum_modifiers=tuple(own for _, own in datums),
+                faces=self.faces(_number(told, 3)),
             )  # fmt: skip
 
     def datums(self) -> dict[str, tuple[int, ...]]:
@@ -245,26 +250,35 @@ class _File:
         pairs = [(_number(each, 2), _number(each, 3)) for each in told]
         return [(one, other) for one, other in pairs if one is not None and other is not None]
 
-    def _letters(self, systems: Any) -> Iterator[str]:
-        """Letters of a datum system, in its order."""
+    def _letters(self, systems: Any) -> Iterator[tuple[str, str]]:
+        """Letters of a datum system, in its order, with their modifiers."""
         for each in systems if isinstance(systems, tuple) else (systems,):
             if isinstance(each, Reference):
                 yield from self._letters_of(each, 0)
 
-    def _letters_of(self, number: int, deep: int) -> Iterator[str]:
+    def _letters_of(self, number: int, deep: int) -> Iterator[tuple[str, str]]:
         here = self.part[number]
         datum, system = here.of("DATUM", "COMMON_DATUM"), here.of("DATUM_SYSTEM")
         if datum is not None:
-            yield _text(datum, 4)
+            yield _text(datum, 4), ""
         elif system is not None and deep < _DEEPEST:
             for each in system[4] if len(system) > 4 and isinstance(system[4], tuple) else ():
                 yield from self._letters_of(each, deep + 1)
         elif (base := self._base(here)) is not None and deep < _DEEPEST:
             parts = base if isinstance(base, tuple) else (base,)
-            found = [letter for part in parts if isinstance(part, Reference)
-                     for letter in self._letters_of(part, deep + 1)]  # fmt: skip
+            found = [told for part in parts if isinstance(part, Reference)
+                     for told in self._letters_of(part, deep + 1)]  # fmt: skip
             if found:
-                yield "-".join(found)
+                told = dict.fromkeys([*(each for _, own in found for each in own), *self._modified(here)])
+                yield "-".join(letter for letter, _ in found), " ".join(told)
+
+    @staticmethod
+    def _modified(here: Instance) -> tuple[str, ...]:
+        """Modifiers of a datum's compartment: `M`, `L`, ..., those with a value left out."""
+        compartment = here.of("DATUM_REFERENCE_COMPARTMENT", "DATUM_REFERENCE_ELEMENT", "GENERAL_DATUM_REFERENCE")
+        given = compartment[5] if compartment is not None and len(compartment) > 5 else None
+        words = (each.value if isinstance(each, Typed) else each for each in given if each) if given else ()
+        return tuple(_MODIFIERS.get(str(word), str(word).lower()) for word in words if not isinstance(word, Reference))
 
     def _base(self, here: Instance) -> Any:
         """What a reference to a datum, or a compartment of a datum system, is of."""

@@ -94,8 +94,10 @@ def test_a_position_in_a_datum_system_with_a_common_datum():
     """Its zone, the modifier, letters in order; a dimension as what is toleranced stands for its faces."""
     text = "#29=DIMENSIONAL_SIZE(#21,'diameter');\n#31=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.25),#1);\n"
     text += "#40=DATUM('',$,#8,.F.,'A');\n#41=DATUM('',$,#8,.F.,'B');\n#42=DATUM('',$,#8,.F.,'C');\n"
-    text += "#43=DATUM_REFERENCE_COMPARTMENT('',$,#8,.F.,#40,$);\n"
-    text += "#44=DATUM_REFERENCE_ELEMENT('',$,#8,.F.,#41,$);\n#45=DATUM_REFERENCE_ELEMENT('',$,#8,.F.,#42,$);\n"
+    text += "#43=DATUM_REFERENCE_COMPARTMENT('',$,#8,.F.,#40,(SIMPLE_DATUM_REFERENCE_MODIFIER(.TRANSLATION.)));\n"
+    most = "(SIMPLE_DATUM_REFERENCE_MODIFIER(.MAXIMUM_MATERIAL_REQUIREMENT.))"
+    text += f"#44=DATUM_REFERENCE_ELEMENT('',$,#8,.F.,#41,{most});"
+    text += "\n#45=DATUM_REFERENCE_ELEMENT('',$,#8,.F.,#42,$);\n"
     text += "#46=DATUM_REFERENCE_COMPARTMENT('',$,#8,.F.,COMMON_DATUM_LIST((#44,#45)),$);\n"
     text += "#47=DATUM_SYSTEM('',$,#8,.F.,(#43,#46));\n"
     text += "#50=(GEOMETRIC_TOLERANCE('','',#31,#29)GEOMETRIC_TOLERANCE_WITH_DATUM_REFERENCE((#47))"
@@ -108,6 +110,7 @@ def test_a_position_in_a_datum_system_with_a_common_datum():
     assert size.value is None
     assert (found.kind, found.zone, found.is_round, found.modifiers) == ("position", 0.25, True, ("M",))
     assert (found.datums, found.faces, found.is_tolerance) == (("A", "B-C"), (6, 7), True)
+    assert found.datum_modifiers == ("translation", "M")
     assert read.datums == {"A": (7, 5), "B": (), "C": ()}
 
 
