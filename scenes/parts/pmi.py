@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from scenes.parts.limits import of_fit
 from scenes.parts.part21 import Instance, Part21, Reference, Typed
 from scenes.units import Unit
 
@@ -41,6 +42,7 @@ _MODIFIERS = {"MAXIMUM_MATERIAL_REQUIREMENT": "M", "LEAST_MATERIAL_REQUIREMENT":
 _PREFIXES = {"KILO": 1e3, "HECTO": 1e2, "DECA": 10.0, "DECI": 0.1, "CENTI": 1e-2, "MILLI": 1e-3, "MICRO": 1e-6,
              "NANO": 1e-9, None: 1.0}  # fmt: skip
 _TO_UNIT = {"METRE": ("mm", 1000.0), "RADIAN": ("deg", 57.29577951308232)}
+_NOTES = ("theoretical", "auxiliary")
 _DEEPEST = 16  # aspects of aspects
 
 
@@ -60,7 +62,10 @@ class Characteristic:
     plus, minus : float or None
         Limits of deviations, both positive where the value may lie on either side; None without limits.
     fit : str
-        ``H7`` and the like (ISO 286), empty without.
+        ``H7`` and the like (ISO 286), empty without; its limits are `plus` and `minus` where `limits.of_fit` has them.
+    note : str
+        What the file says of a dimension that has no limits: ``theoretical``, exact, or ``auxiliary``, not to be
+        inspected; empty where it says nothing.
     zone : float or None
         Width of a geometric tolerance's zone, or its diameter.
     is_round : bool
@@ -85,6 +90,7 @@ class Characteristic:
     plus: float | None = None
     minus: float | None = None
     fit: str = ""
+    note: str = ""
     zone: float | None = None
     is_round: bool = False
     modifiers: tuple[str, ...] = ()
@@ -150,9 +156,11 @@ class _File:
                 continue
             value, plus, minus, unit = self._value(number)
             fit = self._fits.get(number, "")
+            if fit and plus is None and value is not None:
+                plus, minus = of_fit(value, fit) or (None, None)
             is_angle = here.of("ANGULAR_SIZE", "ANGULAR_LOCATION") is not None
             yield Characteristic(
-                number, "angle" if is_angle else name or "dimension", value, plus, minus, fit,
+                number, "angle" if is_angle else name or "dimension", value, plus, minus, fit, self._note(number),
                 unit=unit or ("deg" if is_angle else "mm"), faces=self.faces(first),
                 others=self.faces(second) if second is not None else (),
             )  # fmt: skip
@@ -315,6 +323,12 @@ class _File:
             return nominal, upper - nominal, nominal - lower, unit
         plus, minus = self._limits.get(number, (None, None))
         return nominal, plus, minus, unit
+
+    def _note(self, number: int) -> str:
+        """Of a dimension: an item of its representation by the name of ``dimensional note``."""
+        told = (self.part[item].of("DESCRIPTIVE_REPRESENTATION_ITEM") or () for item in self._items.get(number, ()))
+        notes = {_text(each, 1).lower() for each in told if _text(each, 0).lower() == "dimensional note"}
+        return next((note for note in _NOTES if note in notes), "")
 
     @cached_property
     def _items(self) -> dict[int, tuple[int, ...]]:

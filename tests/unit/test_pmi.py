@@ -73,7 +73,15 @@ def test_a_fit_of_iso_286():
     text = "#30=DIMENSIONAL_SIZE(#20,'diameter');\n" + _measure(31, 20.0) + _shown(30, 31)
     text += "#34=LIMITS_AND_FITS('H','hole','7','');\n#35=PLUS_MINUS_TOLERANCE(#34,#30);\n"
     (found,) = _read(text).characteristics
-    assert (found.value, found.plus, found.fit) == (20.0, None, "H7")
+    assert (found.value, found.plus, found.minus, found.fit) == (20.0, 0.021, 0.0, "H7")
+
+
+@pytest.mark.parametrize("note", ["theoretical", "auxiliary"])
+def test_a_dimension_that_has_no_limits_for_a_reason(note):
+    text = "#30=DIMENSIONAL_SIZE(#20,'diameter');\n" + _measure(31, 20.0) + _shown(30, 31, 32)
+    text += f"#32=DESCRIPTIVE_REPRESENTATION_ITEM('dimensional note','{note}');\n"
+    (found,) = _read(text).characteristics
+    assert (found.value, found.plus, found.note) == (20.0, None, note)
 
 
 @pytest.mark.parametrize(
