@@ -19,7 +19,7 @@ from scenes.load import from_document
 from scenes.measurands.drawn import Drawn, drawn
 from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
-from scenes.parts import pmi, step
+from scenes.parts import limits, pmi, step
 from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.step_file import Step
 from scenes.units import in_unit
@@ -111,6 +111,7 @@ def written(
     units: str,
     report: Callable[[str, int, int], None] = lambda *_: None,
     body: str | int | None = None,
+    general: str | None = None,
 ) -> NewScene:
     """Write a scene of a part's file; of the dimensions in the file, where it has any (STEP AP242).
 
@@ -126,6 +127,8 @@ def written(
         Called with what is done, how many steps are done, and of how many.
     body : str or int, optional
         One of several bodies by its name or number; all where not given.
+    general : {"f", "m", "c", "v"}, optional
+        Class of ISO 2768-1 that gives the file's lengths limits where they have none.
 
     Raises
     ------
@@ -134,11 +137,13 @@ def written(
     """
     if units not in scenes.UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(scenes.UNITS)}, got {units!r}")
+    if general is not None and general not in limits.CLASSES:
+        raise InvalidInput(f"--general must be one of {', '.join(limits.CLASSES)}, got {general!r}")
     report("reading", 0, 5)
     record = _record(part, units, body)
     text = _text(record, path, units, *_box(record.solid_in(units)))
     scene = _loaded(text, path, record)
-    asked = _asked_by_file(record, units)
+    asked = _asked_by_file(record, units, general)
     options = [measurand for each in asked for some in each.candidates for measurand in some]
     candidates = tuple(options) or proposed(scene.all_walls, units)
     look = None
@@ -151,11 +156,13 @@ def written(
     return NewScene(made, look, asked)
 
 
-def _asked_by_file(record: Step | Mesh, units: str) -> tuple[Drawn, ...]:
+def _asked_by_file(record: Step | Mesh, units: str, general: str | None) -> tuple[Drawn, ...]:
     """Dimensions and tolerances of the part's file."""
     if not isinstance(record, Step):
         return ()
     found = pmi.read(read_bytes(record.file, step.MOST_BYTES))
+    if general:
+        found = replace(found, characteristics=tuple(pmi.with_general(each, general) for each in found.characteristics))
     return drawn(record.part_in(units), found, units) if found.characteristics else ()
 
 
@@ -180,7 +187,8 @@ def _facts(each: Drawn, scene: Scene) -> dict[str, Any]:
     unseen = f"{lost} of {features} " * (features > 1) + "not seen from the setting that is proposed" if lost else ""
     return {
         "number": told.number, "kind": told.kind, "value": told.value, "plus": told.plus, "minus": told.minus,
-        "fit": told.fit or None, "zone": told.zone, "round_zone": told.is_round, "modifiers": list(told.modifiers),
+        "fit": told.fit or None, "general": told.general or None, "note": told.note or None, "zone": told.zone,
+        "round_zone": told.is_round, "modifiers": list(told.modifiers),
         "datums": list(told.datums), "datum_modifiers": list(told.datum_modifiers), "unit": told.unit,
         "faces": list(each.faces),
         "measurand": measured[0] if measured else None, "measurands": measured, "reason": each.reason or unseen or None,

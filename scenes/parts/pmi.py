@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from scenes.parts.limits import of_fit
+from scenes.parts.limits import General, general, of_fit
 from scenes.parts.part21 import Instance, Part21, Reference, Typed
 from scenes.units import Unit
 
@@ -63,6 +63,8 @@ class Characteristic:
         Limits of deviations, both positive where the value may lie on either side; None without limits.
     fit : str
         ``H7`` and the like (ISO 286), empty without; its limits are `plus` and `minus` where `limits.of_fit` has them.
+    general : str
+        The general tolerance that gives its limits, ``ISO 2768-m``; empty where they are its own, or it has none.
     note : str
         What the file says of a dimension that has no limits: ``theoretical``, exact, or ``auxiliary``, not to be
         inspected; empty where it says nothing.
@@ -90,6 +92,7 @@ class Characteristic:
     plus: float | None = None
     minus: float | None = None
     fit: str = ""
+    general: str = ""
     note: str = ""
     zone: float | None = None
     is_round: bool = False
@@ -137,6 +140,14 @@ def read(data: bytes) -> Pmi:
     )
 
 
+def with_general(each: Characteristic, of_class: General) -> Characteristic:
+    """With the limits of a general tolerance where it is a length that has none, and is not exact nor auxiliary."""
+    if each.is_tolerance or each.value is None or each.plus is not None or each.note or each.unit != "mm":
+        return each
+    limit = general(each.value, of_class)
+    return each if limit is None else replace(each, plus=limit, minus=limit, general=f"ISO 2768-{of_class}")
+
+
 def has_pmi(data: bytes) -> bool:
     """Whether a file's text speaks of dimensions or tolerances at all."""
     return b"DIMENSIONAL_" in data or b"_TOLERANCE" in data or b"ANGULAR_" in data
@@ -160,7 +171,7 @@ class _File:
                 plus, minus = of_fit(value, fit) or (None, None)
             is_angle = here.of("ANGULAR_SIZE", "ANGULAR_LOCATION") is not None
             yield Characteristic(
-                number, "angle" if is_angle else name or "dimension", value, plus, minus, fit, self._note(number),
+                number, "angle" if is_angle else name or "dimension", value, plus, minus, fit, note=self._note(number),
                 unit=unit or ("deg" if is_angle else "mm"), faces=self.faces(first),
                 others=self.faces(second) if second is not None else (),
             )  # fmt: skip

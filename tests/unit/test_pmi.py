@@ -76,6 +76,19 @@ def test_a_fit_of_iso_286():
     assert (found.value, found.plus, found.minus, found.fit) == (20.0, 0.021, 0.0, "H7")
 
 
+def test_a_general_tolerance_is_of_lengths_that_have_none():
+    """20 mm +-0.2 in class m; not what has limits, is exact, has no value, or is an angle."""
+    free = pmi.Characteristic(1, "diameter", 20.0)
+    told = pmi.with_general(free, "m")
+    assert (told.plus, told.minus, told.general) == (0.2, 0.2, "ISO 2768-m")
+    for same in (
+        pmi.Characteristic(1, "diameter", 20.0, 0.1, 0.1), pmi.Characteristic(1, "diameter", 20.0, note="theoretical"),
+        pmi.Characteristic(1, "diameter"), pmi.Characteristic(1, "angle", 20.0, unit="deg"),
+        pmi.Characteristic(1, "flatness", zone=0.1), pmi.Characteristic(1, "diameter", 0.2),
+    ):  # fmt: skip
+        assert pmi.with_general(same, "m") is same
+
+
 @pytest.mark.parametrize("note", ["theoretical", "auxiliary"])
 def test_a_dimension_that_has_no_limits_for_a_reason(note):
     text = "#30=DIMENSIONAL_SIZE(#20,'diameter');\n" + _measure(31, 20.0) + _shown(30, 31, 32)

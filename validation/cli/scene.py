@@ -28,13 +28,24 @@ Units = Annotated[
 Body = Annotated[
     str | None, typer.Option(metavar="BODY", help="Name or number of one of several bodies (STEP, GLB, 3MF).")
 ]
+General = Annotated[
+    str | None,
+    typer.Option(
+        metavar="CLASS", help="ISO 2768-1: f, m, c or v, of the lengths of a STEP file's dimensions without limits."
+    ),
+]
 Picture = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.png", help="Draw them with their names.")]
 Sensor = Annotated[str | None, typer.Option(metavar="P,A", help="Seen from there; else the first setting's sensor.")]
 
 
 @commands.command("new")
 def new_command(
-    part: Part, output: Output = None, units: Units = "mm", body: Body = None, as_json: Json = False
+    part: Part,
+    output: Output = None,
+    units: Units = "mm",
+    body: Body = None,
+    general: General = None,
+    as_json: Json = False,
 ) -> None:
     """Write a commented scene of a part: camera, light, what could be measured, a setting. It runs as it is."""
     path = output or Path(f"{part.stem}.toml")
@@ -44,11 +55,14 @@ def new_command(
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
 
-        new = written(part, path, units, shown, int(body) if body and body.isdecimal() else body)
+        which = int(body) if body and body.isdecimal() else body
+        new = written(part, path, units, shown, which, general and general.removeprefix("ISO2768-"))
     made, look = new.scene, new.look
     asked = [] if look is None else look.facts
     facts = {
         "file": str(path),
+        "scene": str(path),
+        "features": {"edges": len(made.solid.sharp), "circles": len(made.solid.rims)},
         "edges": len(made.solid.sharp),
         "circles": len(made.solid.rims),
         "measurands": asked,
@@ -84,10 +98,12 @@ def _said(row: dict[str, Any]) -> str:
     unit = "degrees" if row["unit"] == "deg" else row["unit"]
     if row["zone"] is not None:
         words = [row["kind"], f"{'diameter ' * row['round_zone']}{row['zone']:.6g} {unit}", *row["modifiers"]]
-        return " ".join([*words, *([f"to {' '.join(row['datums'])}"] if row["datums"] else [])])
+        letters = [f"{one} {own}".strip() for one, own in zip(row["datums"], row["datum_modifiers"], strict=True)]
+        return " ".join([*words, *([f"to {', '.join(letters)}"] if letters else [])])
     value = "" if row["value"] is None else f" {row['value']:.6g} {unit}"
     limits = "" if row["plus"] is None else f" +{abs(row['plus']):.6g} -{abs(row['minus']):.6g}"
-    return f"{row['kind']}{value}{limits}{' ' * bool(row['fit'])}{row['fit'] or ''}"
+    more = [part for part in (row["fit"], row["general"], row["note"]) if part]
+    return " ".join([f"{row['kind']}{value}{limits}", *more])
 
 
 def _outcome(row: dict[str, Any]) -> str:
