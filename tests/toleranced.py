@@ -1,4 +1,4 @@
-"""A plate with geometric tolerances and features between others, each measurand with its value from the plate's numbers."""
+"""A plate with geometric tolerances and features between others, each with its values from the plate's numbers."""
 
 from __future__ import annotations
 
@@ -46,6 +46,7 @@ ASKED: tuple[tuple[str, str, list, float | None, dict[str, float]], ...] = (
     ("to the foot", "distance", [_B, {"foot": _D, "on": "e5"}], 0.1, {"to the foot": np.hypot(22, 8)}),
     ("from the line", "offset", [_D, {"through": [_B, _C]}], 0.1, {"from the line": 24.0}),
     ("to the pattern", "offset", [{"pitch_circle": ["c2", "c6", "c4"]}, _FRONT], 0.1, {"to the pattern": _CENTRE[1]}),
+    ("slot to bores", "width", [{"centre_line": ["e4", "e15"]}, {"square_at": [_B, _C]}], 0.2, {"slot to bores": 22.0}),
     ("wall", "width", [_SLOT, _BACK], 0.1, {"wall": 22.0}),
     ("lines", "angle", [{"through": [_B, _D]}, _FRONT], 0.1, {"lines": np.degrees(np.arctan2(24, 22))}),
 )  # fmt: skip

@@ -16,8 +16,8 @@ import scenes
 from scenes import InvalidInput, Measurand, Mesh, Scene, Solid
 from scenes.files.door import read_bytes
 from scenes.load import from_document
+from scenes.measurands.between import AnyFeature
 from scenes.measurands.drawn import Drawn, drawn
-from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
 from scenes.parts import pmi, step
 from scenes.parts.mesh_file import SAY_UNIT
@@ -244,8 +244,14 @@ def _measurand(each: Measurand) -> str:
 
 def _inline(feature: AnyFeature) -> str:
     """A feature as a table in one line."""
-    said = (f"{key} = {json.dumps(value)}" for key, value in feature.model_dump(mode="json").items())
-    return "{ " + ", ".join(said) + " }"
+    return _value(feature.model_dump(mode="json"))
+
+
+def _value(value: Any) -> str:
+    """Names, lists and tables of them as TOML has them in a line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(part)}" for key, part in value.items()) + " }"
+    return f"[{', '.join(map(_value, value))}]" if isinstance(value, list) else json.dumps(value)
 
 
 def _loaded(text: str, path: Path, record: Step | Mesh) -> Scene:

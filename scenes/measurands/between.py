@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Discriminator, Field, Tag
 
-from scenes.measurands.evaluated import Line, Point, circle_through, crossing, foot, mean
+from scenes.measurands.evaluated import Line, Point, beside, circle_through, crossing, foot, mean
 from scenes.measurands.features import (
     Between,
     Centre,
@@ -62,6 +62,24 @@ class Through(Between):
     def made(self, seen: Any, plane: np.ndarray | None) -> Line:
         """Both of them."""
         return Line(*(seen.point(part, plane) for part in self.through))
+
+
+class SquareAt(Between):
+    """The line through the first of two corners or centres that is square to the way to the second, and as long."""
+
+    is_line: ClassVar[bool] = True
+
+    square_at: tuple[Feature, Feature]
+    """The corners or centres of circles."""
+
+    @property
+    def parts(self) -> tuple[Corner | Centre, ...]:
+        return self.square_at
+
+    def made(self, seen: Any, plane: np.ndarray | None) -> Line:
+        """From the first, to the left of that way as it is seen."""
+        first, second = (seen.point(part, plane) for part in self.square_at)
+        return Line(first, beside(first, second, plane))
 
 
 class CentreLine(Between):
@@ -148,7 +166,7 @@ class Foot(Between):
         return foot(seen.point(self.foot, plane), seen.line(self.parts[1], plane))
 
 
-_KEYS = {"midpoint": Midpoint, "through": Through, "centre_line": CentreLine, "crossing": Crossing,
+_KEYS = {"midpoint": Midpoint, "through": Through, "square_at": SquareAt, "centre_line": CentreLine, "crossing": Crossing,
          "pitch_circle": PitchCircle, "foot": Foot}  # fmt: skip
 
 
@@ -166,6 +184,7 @@ AnyFeature = Annotated[
     | Annotated[Wall, Tag("wall")]
     | Annotated[Midpoint, Tag("midpoint")]
     | Annotated[Through, Tag("through")]
+    | Annotated[SquareAt, Tag("square_at")]
     | Annotated[CentreLine, Tag("centre_line")]
     | Annotated[Crossing, Tag("crossing")]
     | Annotated[PitchCircle, Tag("pitch_circle")]

@@ -130,6 +130,15 @@ def shared(line: Line, share: np.ndarray) -> Point:
     )
 
 
+def beside(first: Point, second: Point, plane: np.ndarray | None) -> Point:
+    """The first point moved by the way to the second, turned by a right angle: to where `across` of it points."""
+    parts = [
+        (lambda move: move - across(move, plane), first.moves),
+        (lambda move: across(move, plane), second.moves),
+    ]
+    return Point(first.at + across(second.at - first.at, plane), _mapped(parts))
+
+
 def foot(point: Point, line: Line) -> Point:
     """The place on a line that is nearest to a point."""
     along = line.stop.at - line.start.at

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -32,3 +33,8 @@ class Zone:
     def is_joint(self) -> bool:
         """Whether no number alone says that it is kept."""
         return len(self.parts) > 1
+
+
+def joint_parts(zones: Iterable[Zone]) -> frozenset[str]:
+    """Names of the numbers that nothing is decided of alone."""
+    return frozenset(name for zone in zones if zone.is_joint for name in zone.parts)

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from planner.uncertainty.conformity import COVERAGE
+from scenes.measurands.zone import joint_parts
 from scenes.status import CLUTTER, is_trusted
 from validation.report import cells
 from validation.strict_json import plain
@@ -21,6 +22,7 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
     """One record a measurand, of one image; null for what is not known."""
     from planner.uncertainty.conformity import decide
 
+    joint = joint_parts(found.picture.scene.zones)
     rows, combined, sigma_image = [], found.u, np.sqrt(np.einsum("mm->m", found.covariance_image))
     for k, quantity in enumerate(found.quantities):
         zone, value, spread, nominal = quantity.tolerance, found.value[k], found.sigma[k], float(found.nominal[k])
@@ -39,10 +41,19 @@ def facts(found: measure.Measurements) -> list[dict[str, Any]]:
             "sigma_image": sigma_image[k] if good else None,
             "nominal": nominal,
             "tolerance": zone and {"plus": zone.plus, "minus": zone.minus},
-            "decision": zone and decide(float(value), float(told), nominal, zone, status=state),
+            "decision": None
+            if zone is None or quantity.name in joint
+            else decide(float(value), float(told), nominal, zone, status=state),
             "status": state,
         })  # fmt: skip
     return plain(rows)
+
+
+def zones(found: measure.Measurements) -> list[dict[str, Any]]:
+    """One record a geometric tolerance that several numbers keep together; null for what is not known."""
+    from validation.zones import measured_zones
+
+    return plain([each.facts for each in measured_zones(found)])
 
 
 def reasons(rows: list[dict[str, Any]], found: measure.Measurements) -> list[str]:
@@ -70,12 +81,14 @@ def covariance(found: measure.Measurements) -> list[list[float | None]]:
     return plain(found.covariance)
 
 
-def table(rows: list[dict[str, Any]]) -> Table:
-    """The same for a terminal."""
+def table(rows: list[dict[str, Any]], zones: list[dict[str, Any]] = ()) -> Table:
+    """The same for a terminal, each zone in a row below its numbers."""
     columns = (
         "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision", "status",
     )  # fmt: skip
-    shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
+    caption = f"{_CAPTION} {_OF_ZONES}" if zones else _CAPTION
+    shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=caption)
+    after = {zone["parts"][-1]: zone for zone in zones}
     for row in rows:
         told = row["sigma"] if row["u"] is None else row["u"]
         places = digits(told)
@@ -86,7 +99,23 @@ def table(rows: list[dict[str, Any]]) -> Table:
         limits = "-" if zone is None else _limits(zone)
         about = row["name"], row["kind"], value, sigma, row["unit"], *off
         shown.add_row(*about, nominal, limits, _decision(row), row["status"])
+        if row["name"] in after:
+            shown.add_row(*_zone_cells(after[row["name"]]))
     return shown
+
+
+def _zone_cells(zone: dict[str, Any]) -> tuple[str, ...]:
+    """A zone's row: the size that is needed, and what it is below in 95 %."""
+    if zone["value"] is None:
+        value, below = "-", ""
+    else:
+        places = digits(zone["u"])
+        value, below = f"{zone['value']:.{places}f}", f"<= {zone['at_most']:.{places}f}"
+    size = "-" if zone["size"] is None else f"{zone['size']:g}"
+    return (
+        zone["name"], zone["kind"], value, below, zone["unit"], "-", "-", "0", size, zone["decision"] or "-",
+        zone["status"],
+    )  # fmt: skip
 
 
 def _decision(row: dict[str, Any]) -> str:
@@ -104,6 +133,11 @@ _CAPTION = (
     "of that. u: combined standard uncertainty, of noise and u(bias); of noise alone where no light is given, or with "
     "--as-measured. pass, fail: by more than 2 u within or beyond the tolerance (ISO 14253-1); only a value whose "
     "status is ok is decided."
+)
+
+_OF_ZONES = (
+    "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law is "
+    "not normal near 0. It is decided by that law, as surely as by 2 u; its numbers alone are not."
 )
 
 

@@ -163,14 +163,16 @@ def _say_measurands(
 ) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(found)
-    told = {"measurands": rows, "covariance": measurands.covariance(found)}
+    told, zones = {"measurands": rows, "covariance": measurands.covariance(found)}, measurands.zones(found)
+    if zones:
+        told["zones"] = zones
     if distance is not None:
         told |= _distance_facts(distance)
     if as_json:
         say({"file": str(file), **told}, True, "")
     else:
         shown = console()
-        shown.print(measurands.table(rows))
+        shown.print(measurands.table(rows, zones))
         for line in legend([row["status"] for row in rows], measurands.reasons(rows, found)):
             shown.print(f" {line}", highlight=False)
         if distance is not None:
