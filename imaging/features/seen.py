@@ -19,6 +19,8 @@ from imaging.geometry.projection import Frame, camera_frame, rays, sensor_positi
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
 from scenes.measurands.evaluated import Line, Moves, Point, mean, shared
 from scenes.measurands.features import Between, ends_of, place_of, point_of
+from scenes.measurands.kind import turn
+from scenes.measurands.measurands import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +115,10 @@ class Seen:
             return Line(start, stop)
         ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
         return Line(*(self.onto(end, plane, place) for end, place in zip((start, stop), ends, strict=True)))
+
+    def left(self, parts: tuple, plane: np.ndarray | None) -> np.ndarray:
+        """+1 or -1 (...): whether `across` of a direction in the plane of features is to its left, from outside."""
+        return turn(self, Quantity("", "", parts), in_space=plane is not None)
 
     def middle(self, side: Side | Between, plane: np.ndarray | None) -> Point:
         """The place on a line where the image of its middle is expected."""

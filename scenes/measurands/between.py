@@ -77,9 +77,9 @@ class SquareAt(Between):
         return self.square_at
 
     def made(self, seen: Any, plane: np.ndarray | None) -> Line:
-        """From the first, to the left of that way as it is seen."""
+        """From the first, to the left of that way, seen from outside."""
         first, second = (seen.point(part, plane) for part in self.square_at)
-        return Line(first, beside(first, second, plane))
+        return Line(first, beside(first, second, plane, seen.left(self.parts, plane)))
 
 
 class CentreLine(Between):
@@ -166,8 +166,8 @@ class Foot(Between):
         return foot(seen.point(self.foot, plane), seen.line(self.parts[1], plane))
 
 
-_KEYS = {"midpoint": Midpoint, "through": Through, "square_at": SquareAt, "centre_line": CentreLine, "crossing": Crossing,
-         "pitch_circle": PitchCircle, "foot": Foot}  # fmt: skip
+_KEYS = {"midpoint": Midpoint, "through": Through, "square_at": SquareAt, "centre_line": CentreLine,
+         "crossing": Crossing, "pitch_circle": PitchCircle, "foot": Foot}  # fmt: skip
 
 
 def _tag_of_feature(value: Any) -> str:

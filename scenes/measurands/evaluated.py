@@ -130,13 +130,14 @@ def shared(line: Line, share: np.ndarray) -> Point:
     )
 
 
-def beside(first: Point, second: Point, plane: np.ndarray | None) -> Point:
-    """The first point moved by the way to the second, turned by a right angle: to where `across` of it points."""
-    parts = [
-        (lambda move: move - across(move, plane), first.moves),
-        (lambda move: across(move, plane), second.moves),
-    ]
-    return Point(first.at + across(second.at - first.at, plane), _mapped(parts))
+def beside(first: Point, second: Point, plane: np.ndarray | None, left: np.ndarray | float) -> Point:
+    """The first point moved by the way to the second, turned by a right angle: `left` (...) times `across` of it."""
+
+    def turned(way: np.ndarray) -> np.ndarray:
+        return np.asarray(left)[..., None] * across(way, plane)
+
+    parts = [(lambda move: move - turned(move), first.moves), (turned, second.moves)]
+    return Point(first.at + turned(second.at - first.at), _mapped(parts))
 
 
 def foot(point: Point, line: Line) -> Point:

@@ -18,6 +18,7 @@ from scenes.parts.solid import Solid
 if TYPE_CHECKING:
     from scenes.measurands.measurands import Quantity
 
+_DIGITS = 6  # by which components of a normal are compared, so that rounding chooses none
 _FLAT = 1e-6  # of the object's size: how far a feature may be from the plane of the others
 
 
@@ -69,6 +70,8 @@ class Lookup(Protocol):
     def point(self, feature: Any, plane: np.ndarray | None) -> Point: ...
 
     def line(self, feature: Any, plane: np.ndarray | None) -> Line: ...
+
+    def left(self, parts: tuple, plane: np.ndarray | None) -> Any: ...
 
 
 class Between(Model):
@@ -163,6 +166,10 @@ class Nominal:
         start, stop = ends_of(self.solid, feature)
         return Line(Point(start, {}), Point(stop, {}))
 
+    def left(self, parts: tuple, plane: np.ndarray) -> float:
+        """+1 or -1: whether a plane's normal points outwards, so that `across` of a direction is to the left of it."""
+        return float(np.sign(outward(plane) @ plane))
+
     def of(self, feature: Between) -> Any:
         """What lies between others."""
         points = places(self.solid, feature.parts)
@@ -233,6 +240,12 @@ def _spanned(points: np.ndarray, near: float) -> np.ndarray | None:
     """Unit normal of the plane that points (n, 3) span, (3,); None where they lie on a line."""
     _, size, axes = np.linalg.svd(points - points.mean(0))
     return axes[2] if len(points) > 2 and size[1] > near else None
+
+
+def outward(normal: np.ndarray) -> np.ndarray:
+    """A plane's normal (..., 3) with the sign that its largest component is positive: the side that signs refer to."""
+    largest = np.abs(normal).round(_DIGITS).argmax(-1)[..., None]
+    return normal * np.sign(np.take_along_axis(normal, largest, -1))
 
 
 def is_flat(points: np.ndarray, extent: float) -> bool:

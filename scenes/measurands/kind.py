@@ -16,6 +16,7 @@ from scenes.measurands.features import (
     found_at,
     is_flat,
     is_line,
+    outward,
     plane_of,
     points_of,
 )
@@ -26,7 +27,6 @@ from scenes.registry import Registry
 if TYPE_CHECKING:
     from scenes.measurands.measurands import Measurand, Quantity
 
-_DIGITS = 6  # by which components of a normal are compared, so that rounding chooses none
 _ZERO = 1e-9  # of the object's size: an offset that is none, and has no side
 WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "s": "a curved surface", "e": "an edge",
          "c": "a circle"}  # fmt: skip
@@ -170,6 +170,5 @@ def turn(seen: Any, quantity: Quantity, *, in_space: bool) -> np.ndarray:
     facing = plane(seen, quantity)
     normal = plane_of(seen.solid, quantity)
     normal = facing if normal is None else normal
-    largest = np.take_along_axis(normal, np.abs(normal).round(_DIGITS).argmax(-1)[..., None], -1)
-    outward = np.sign(np.einsum("...i,...i->...", normal * np.sign(largest), facing))
-    return outward if in_space else -outward
+    sign = np.sign(np.einsum("...i,...i->...", outward(normal), facing))
+    return sign if in_space else -sign

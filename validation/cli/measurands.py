@@ -136,8 +136,8 @@ _CAPTION = (
 )
 
 _OF_ZONES = (
-    "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law is "
-    "not normal near 0. It is decided by that law, as surely as by 2 u; its numbers alone are not."
+    "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law "
+    "is not normal near 0. It is decided by that law, as surely as by 2 u; its numbers alone are not."
 )
 
 
