@@ -13,7 +13,7 @@ from pydantic import Discriminator, Tag
 
 from scenes.measurands.evaluated import Line, Point
 from scenes.model import Model
-from scenes.parts.solid import Solid
+from scenes.parts.solid import Circle, Solid
 
 if TYPE_CHECKING:
     from scenes.measurands.measurands import Quantity
@@ -215,8 +215,8 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     """Unit normal of the plane in which a quantity is measured, shape (3,); its sign has no meaning.
 
     The plane of its features: that of a circle if all lies in it, else the one that its centre and an edge span, whose
-    heights may differ. Two points span none: theirs is the plane of the one face that has both. None where there is no
-    such plane or there are several.
+    heights may differ; of at least three circles in parallel planes the one that is parallel to these. Two points span
+    none: theirs is the plane of the one face that has both. None where there is no such plane or there are several.
     """
     features = basic_of(quantity.features)
     circles = [solid.circle(f.circle) for f in features if isinstance(f, Centre)]
@@ -226,7 +226,7 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
         return None
     if circles:
         flat = (np.abs((points - circles[0].centre) @ circles[0].axis) <= near).all()
-        return circles[0].axis if flat else _spanned(points, near)
+        return circles[0].axis if flat or are_level(circles, features) else _spanned(points, near)
     if len(points) > 2:
         return np.linalg.svd(points - points.mean(0))[2][2]
     ends = [solid.vertex_names.index(f.vertex) for f in features]
@@ -234,6 +234,12 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
     normals = solid.normals[faces]
     alike = len(faces) and (np.abs(normals @ normals[0]) > 1 - 1e-12).all()
     return normals[0] if alike else None
+
+
+def are_level(circles: list[Circle], features: tuple) -> bool:
+    """Whether features are at least three circles in parallel planes."""
+    axes = np.array([circle.axis for circle in circles])
+    return len(features) == len(circles) > 2 and bool((np.abs(axes @ axes[0]) > 1 - 1e-12).all())
 
 
 def _spanned(points: np.ndarray, near: float) -> np.ndarray | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenes.measurands.evaluated import Evaluated, Line, across_line, along_line
-from scenes.measurands.features import Side, is_line
+from scenes.measurands.features import Centre, are_level, found_at, is_flat, is_line
 from scenes.measurands.kind import MEASURANDS, MeasurandKind, turn
 
 
@@ -20,6 +20,14 @@ class TruePosition(MeasurandKind):
     parts = "x", "y"
     nominals = 2
     zone = 2.0
+    is_flat = False
+
+    def check(self, solid, key, quantity) -> None:
+        """In one plane; of circles alone in parallel planes, along whose axis it is then seen."""
+        features = quantity.basic
+        circles = [solid.circle(each.circle) for each in features if isinstance(each, Centre)]
+        if not (are_level(circles, features) or is_flat(found_at(solid, quantity), solid.extent)):
+            raise ValueError(f"{key} must be features in one plane, got {', '.join(quantity.edges)}")
 
     def needed(self, features, name) -> tuple:
         """For y from a line that line alone."""
@@ -43,7 +51,7 @@ class TruePosition(MeasurandKind):
 
 def _on(seen, datum, plane):
     """A datum's place: of an edge its middle."""
-    return seen.middle(datum, plane) if isinstance(datum, Side) or is_line(datum) else seen.point(datum, plane)
+    return seen.middle(datum, plane) if is_line(datum) else seen.point(datum, plane)
 
 
 MEASURANDS.add("true_position")(TruePosition())
