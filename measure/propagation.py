@@ -19,8 +19,9 @@ from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import MeasuredFeatures, find
 from measure.unevenness import Unevenness
-from scenes import Picture, Scene, Side, status
+from scenes import Picture, Scene, status
 from scenes.arrays import picture as one_picture
+from scenes.measurands.features import is_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +234,7 @@ def _of_first(
     measured, quantity = values.status[0] in status.MEASURED, found.known.quantities[0]
     covariance = np.full((4, 4), np.inf)
     if measured:
-        is_pair = len(quantity.features) == 2 and not any(isinstance(f, Side) for f in quantity.features)
+        is_pair = len(quantity.features) == 2 and not any(map(is_line, quantity.features))
         covariance = found.with_errors(errors).ends()[1][0] if is_pair else np.full((4, 4), np.nan)
     return Propagated(
         float(values.value_image[0]),

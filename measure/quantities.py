@@ -18,6 +18,7 @@ from measure.features.layout import Layout, layout_of
 from measure.features.rims import Circles, find_circle
 from measure.features.shape import find_shape
 from scenes import Corner, Picture, Quantity, status
+from scenes.measurands.between import Crossing
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,14 +178,14 @@ def _states(known: Measurands, layout: Layout, shape: Shape, circles: tuple[Circ
     for m, quantity in enumerate(known.quantities):
         columns = [shape.counted[:, names.index(name)] for name in quantity.edges if name in names]
         columns += [circles[known.circles.index(name)].state for name in quantity.edges if name in known.circles]
-        columns += [_crossing(shape, names, f) for f in quantity.features if isinstance(f, Corner)]
+        columns += [_crossing(shape, names, each) for each in quantity.crossings]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
         found[:, m] = [status.worst(*row) for row in zip(*columns, strict=True)]
     return found.astype(str)
 
 
-def _crossing(shape: Shape, names: tuple[str, ...], corner: Corner) -> np.ndarray:
+def _crossing(shape: Shape, names: tuple[str, ...], corner: Corner | Crossing) -> np.ndarray:
     first, second = (shape.normals[:, names.index(name)] for name in corner.edges)
     sine = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     return np.where(sine < MIN_SINE, status.ILL_CONDITIONED, status.OK)

@@ -9,6 +9,7 @@ from imaging.features.locator import MIN_CONTRAST, MIN_USABLE
 from imaging.features.seen import unit_normals
 from imaging.models.errors import Errors
 from scenes import Corner, status
+from scenes.measurands.between import Crossing
 from scenes.status import WORST_FIRST
 
 _NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = map(
@@ -55,16 +56,15 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     for m, (quantity, needs) in enumerate(zip(known.quantities, known.depends(), strict=True)):
         rank = np.where(needs, single, _OK).min(-1)
         flat = np.zeros(rank.shape, bool)
-        for corner in quantity.features:
-            if isinstance(corner, Corner):
-                flat = flat | (sine(evaluated, corner) < MIN_SINE)
+        for corner in quantity.crossings:
+            flat = flat | (sine(evaluated, corner) < MIN_SINE)
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
     return np.stack(ranks, -1)
 
 
-def sine(evaluated: Errors, corner: Corner) -> np.ndarray:
+def sine(evaluated: Errors, corner: Corner | Crossing) -> np.ndarray:
     """Of the angle at which a corner's two edges meet in the image, shape (...); NaN where one is seen end-on."""
     view = evaluated.measurands.view
     pair = unit_normals(view.along)[..., [view.names.index(name) for name in corner.edges], :]

@@ -10,6 +10,7 @@ from imaging.models.bias import NEGLIGIBLE
 from imaging.models.errors import Errors
 from planner.ranks import MIN_SINE, edge_ranks, least_contrast, sine
 from scenes import Corner
+from scenes.measurands.between import Crossing
 from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, NOT_VISIBLE, OK, SHORT, WORST_FIRST
 
 
@@ -30,7 +31,7 @@ def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, st
         return ""
     known = evaluated.measurands
     if status == ILL_CONDITIONED:
-        return _flattest(evaluated, [each for each in known.quantities[m].features if isinstance(each, Corner)])
+        return _flattest(evaluated, known.quantities[m].crossings)
     names, ranks = known.view.names, edge_ranks(evaluated, clutter)
     needed = np.flatnonzero(known.depends()[m][: len(names)])
     guilty = [int(e) for e in needed if WORST_FIRST[ranks[e]] == status]
@@ -97,7 +98,7 @@ def _faint(evaluated: Errors, edges: list[int]) -> str:
     )
 
 
-def _flattest(evaluated: Errors, corners: list[Corner]) -> str:
+def _flattest(evaluated: Errors, corners: tuple[Corner | Crossing, ...]) -> str:
     worst = min(corners, key=lambda each: round(float(np.nan_to_num(sine(evaluated, each))), 9), default=None)
     if worst is None:
         return ""

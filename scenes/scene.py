@@ -25,9 +25,10 @@ from scenes.materials.kinds import MATERIALS, AnyMaterial
 from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.measurands.features import Centre, Corner, Side, Wall, check_feature, place_of
+from scenes.measurands.features import Basic, Corner, Wall, check_feature, place_of
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
+from scenes.measurands.zone import Zone
 from scenes.model import FileName, Model, Title, rebuild
 from scenes.parts.ball import Ball
 from scenes.parts.block import Block
@@ -175,9 +176,9 @@ class Scene(Model):
         return quantities_of(self.task, self.measurands)
 
     @property
-    def features(self) -> tuple[Corner | Centre | Side | Wall, ...]:
-        """Those of all quantities, in their order; none of a scene that asks for nothing."""
-        return sum((quantity.features for quantity in quantities_of(self.task, self.measurands)), ())
+    def features(self) -> tuple[Basic, ...]:
+        """Those that are found for all quantities, in their order; none of a scene that asks for nothing."""
+        return sum((quantity.basic for quantity in quantities_of(self.task, self.measurands)), ())
 
     @property
     def required(self) -> tuple[str, ...]:
@@ -185,6 +186,11 @@ class Scene(Model):
         if self.task is not None:
             return self.task.edges
         return tuple(dict.fromkeys(name for feature in self.features for name in feature.edges))
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """Of the geometric tolerances among the measurands."""
+        return tuple(zone for each in self.measurands if (zone := each.zone) is not None)
 
     def unit_of(self, quantity: Quantity) -> str:
         """Of a number in the object: the scene's unit of length, or degrees."""

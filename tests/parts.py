@@ -254,3 +254,13 @@ def notched(turn: float = 180.0, radius: float = 8.0) -> trimesh.Trimesh:
     bore = arc((25.0, -depth), radius, 90 + turn / 2, 90 - turn / 2)
     far = np.array([[50, 0], [50, 30], [0, 30], [0, 0]], float)
     return plate(np.concatenate([bore, far]), 8.0)
+
+
+TOLERANCED = ((8.0, 8.0, 3.0), (52.0, 8.0, 3.5), (30.0, 32.0, 4.0))  # centres and radii of its bores
+
+
+def toleranced(facets: int = 96) -> trimesh.Trimesh:
+    """60 x 40 x 6 mm, three bores, and a slot of 6 mm whose round ends are about (23, 18) and (37, 18)."""
+    bores = [Hole(x, y, radius, evenly(facets), 0.0, 6.0) for x, y, radius in TOLERANCED]
+    profile = [(0.0, 0.0), (60.0, 0.0), (60.0, 6.0), (0.0, 6.0)]
+    return prism(profile, 40.0, [*bores, Slot(30.0, 18.0, 3.0, 14.0, facets // 2, 0.0, 6.0)])

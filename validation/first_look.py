@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 import planner
 from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.pictures import Pictures
+from planner.forecast import Forecast
 from scenes import Measurand, Pose, Scene
-from scenes.status import is_trusted
+from scenes.status import WORST_FIRST, is_trusted
 
 _MOST, _ENOUGH = 6, 3  # measurands that are proposed; after so many no further setting is looked at
 _CLOSELY = 3, 24  # settings, of which the best is taken: of a large part, of a small one
@@ -64,7 +66,7 @@ def first_look(
     scene : Scene
         Without measurands; with one free light.
     candidates : tuple of Measurand
-        At least one, each of one number with a tolerance.
+        At least one, each with a tolerance.
     report : callable
         Called with what is done, how many steps are done, and of how many.
     most : int
@@ -80,7 +82,7 @@ def first_look(
         some = _varied([candidates[m] for m in seen], max(_ASKED, most)) or candidates[:most]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
         forecasts = planner.predict(scene.with_(measurands=some), sensor, light).measurands
-        told = dict(zip(some, forecasts, strict=True))
+        told = {m: min((forecasts[k] for k in rows), key=_rank) for m, rows in zip(some, _rows(some), strict=True)}
         good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:
             shown = tuple(_varied(good or some, most))
@@ -103,10 +105,21 @@ def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     half = np.array([quantity.tolerance.half for quantity in scene.quantities])
     with np.errstate(divide="ignore", invalid="ignore"):
         worth = np.minimum(_CAPABLE * half / np.sqrt(variances), 1)
-    worth = np.nan_to_num(worth) * np.where(sensors[:, 0] > 90, _BELOW, 1.0)[:, None, None]
+    worth = np.stack([np.nan_to_num(worth[..., rows]).min(-1) for rows in _rows(scene.measurands)], -1)
+    worth = worth * np.where(sensors[:, 0] > 90, _BELOW, 1.0)[:, None, None]
     shape = worth.shape[:-1]
     wide = np.broadcast_to(sensors[:, None], (*shape, 2)).reshape(-1, 2)
     return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1]).round(_PLACES)
+
+
+def _rows(measurands: Sequence[Measurand]) -> list[list[int]]:
+    """Numbers of the quantities of each, among those of all."""
+    ends = np.cumsum([0, *(len(measurand.quantities) for measurand in measurands)])
+    return [list(range(first, last)) for first, last in pairwise(ends)]
+
+
+def _rank(forecast: Forecast) -> int:
+    return WORST_FIRST.index(forecast.status)
 
 
 def _apart(worth: np.ndarray, most: int) -> list[int]:

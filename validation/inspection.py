@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision, decide
+from scenes.measurands.zone import joint_parts
 from scenes.results import finite
 from scenes.status import is_trusted
 from validation.report.requirements import Requirement, measurable_budget, requirements
+from validation.zones import MeasuredZone, measured_zones
 
 if TYPE_CHECKING:
     import measure
@@ -30,7 +32,7 @@ class Inspected:
     u : float or None
         Combined standard uncertainty, of which U is a multiple; None where there is no U.
     decision : {"pass", "fail", "undecided"} or None
-        By U (ISO 14253-1); None without a tolerance.
+        By U (ISO 14253-1); None without a tolerance, and of what is decided with others (`Inspection.zones`).
     picture : int
         In which, from 1.
     """
@@ -56,6 +58,7 @@ class Taken:
     found: measure.Measurements
     rows: tuple[Inspected, ...]
     budget: SceneBudget | None
+    zones: tuple[MeasuredZone, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,11 @@ class Inspection:
 
     taken: tuple[Taken, ...]
     rows: tuple[Inspected, ...]
+
+    @property
+    def zones(self) -> tuple[MeasuredZone, ...]:
+        """Geometric tolerances that several numbers keep together, each of the picture that tells it best."""
+        return tuple(min(each, key=_doubt_of_zone) for each in zip(*(one.zones for one in self.taken), strict=True))
 
     def found(self, row: Inspected) -> measure.Measurements:
         """What was measured in a row's picture."""
@@ -78,8 +86,11 @@ class Inspection:
 
     @property
     def decision(self) -> Decision | None:
-        """Of the part: ``fail`` by one characteristic, ``pass`` by all that have a tolerance; None where none has."""
-        each = [row.decision for row in self.rows if row.decision is not None]
+        """Of the part: ``fail`` by one characteristic, ``pass`` by all that have a tolerance; None where none has.
+
+        A zone's numbers are decided together.
+        """
+        each = [one.decision for one in (*self.rows, *self.zones) if one.decision is not None]
         if not each:
             return None
         return "fail" if "fail" in each else "undecided" if "undecided" in each else "pass"
@@ -104,11 +115,18 @@ def _doubt(row: Inspected) -> tuple[bool, bool, float, float]:
     return not is_trusted(told.status), row.value is None, U, told.sigma
 
 
+def _doubt_of_zone(zone: MeasuredZone) -> tuple[bool, float]:
+    """The same of a zone: the one of which least is left open."""
+    return not is_trusted(zone.status), zone.size.quantile(0.95) - zone.size.value if zone.size.is_known else np.inf
+
+
 def _taken(found: measure.Measurements, number: int) -> Taken:
     known = expanded(found)
     told = _requirements(found, known) if found.picture.lights else _unlit(found)
+    joint = joint_parts(found.picture.scene.zones)
     rows = (_inspected(each, float(value), known, number) for each, value in zip(told, found.value, strict=True))
-    return Taken(found, tuple(rows), known)
+    alone = (replace(row, decision=None) if row.requirement.name in joint else row for row in rows)
+    return Taken(found, tuple(alone), known, measured_zones(found, known))
 
 
 def expanded(found: measure.Measurements) -> SceneBudget | None:

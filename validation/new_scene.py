@@ -16,8 +16,8 @@ import scenes
 from scenes import InvalidInput, Measurand, Mesh, Scene, Solid
 from scenes.files.door import read_bytes
 from scenes.load import from_document
+from scenes.measurands.between import AnyFeature
 from scenes.measurands.drawn import Drawn, drawn
-from scenes.measurands.features import AnyFeature
 from scenes.measurands.proposed import proposed
 from scenes.parts import limits, pmi, step
 from scenes.parts.mesh_file import SAY_UNIT
@@ -69,7 +69,7 @@ sensor = {sensor}
 light = {light}
 """
 _UNSEEN = """\
-# The file asks for this, too; it is not seen from there (ice plan --views finds several pictures):
+# The file asks for this, too; it is not seen from there; with the # away, ice plan --coverage finds pictures that do:
 {measurands}
 """
 _PROPOSED = (
@@ -245,16 +245,23 @@ def _measurand(each: Measurand) -> str:
     features = ", ".join(map(_inline, each.features))
     limits = each.tolerance
     tolerance = limits.plus if limits.plus == limits.minus else f"{{ plus = {limits.plus}, minus = {limits.minus} }}"
+    nominal = "" if each.nominal is None else f"nominal = {_value(each.nominal)}\n"
     return (
         f"[[measurands]]\nname = {json.dumps(each.name)}\nkind = {json.dumps(each.kind)}\n"
-        f"features = [{features}]\ntolerance = {tolerance}\n"
+        f"features = [{features}]\n{nominal}tolerance = {tolerance}\n"
     )
 
 
 def _inline(feature: AnyFeature) -> str:
     """A feature as a table in one line."""
-    said = (f"{key} = {json.dumps(value)}" for key, value in feature.model_dump(mode="json").items())
-    return "{ " + ", ".join(said) + " }"
+    return _value(feature.model_dump(mode="json"))
+
+
+def _value(value: Any) -> str:
+    """Names, lists and tables of them as TOML has them in a line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(part)}" for key, part in value.items()) + " }"
+    return f"[{', '.join(map(_value, value))}]" if isinstance(value, list) else json.dumps(value)
 
 
 def _loaded(text: str, path: Path, record: Step | Mesh) -> Scene:

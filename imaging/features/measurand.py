@@ -19,7 +19,8 @@ from imaging.features.seen import Seen, corner_response, half_angle_of, unit_nor
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
-from scenes import Centre, Corner, Quantity, Scene, Side, Task
+from scenes import Centre, Corner, Quantity, Scene, Task
+from scenes.measurands.features import is_line
 
 __all__ = ["Measurand", "Measurands", "corner_response", "measurand", "measurands", "normals", "required_edges"]
 
@@ -197,9 +198,7 @@ def _points(known: Measurands, quantity: Quantity) -> np.ndarray:
     seen = known.seen
     with np.errstate(divide="ignore", invalid="ignore"):
         places = [
-            seen.start[..., seen.names.index(feature.edge), :]
-            if isinstance(feature, Side)
-            else seen.point(feature, None).at
+            seen.line(feature, None).start.at if is_line(feature) else seen.point(feature, None).at
             for feature in (quantity.features * 2)[:2]
         ]
     return np.stack(places, -2) + image_centre(seen.camera)

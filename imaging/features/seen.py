@@ -17,8 +17,10 @@ import numpy as np
 
 from imaging.geometry.projection import Frame, camera_frame, rays, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
-from scenes.measurands.evaluated import Line, Moves, Point
-from scenes.measurands.features import place_of, point_of
+from scenes.measurands.evaluated import Line, Moves, Point, mean, shared
+from scenes.measurands.features import Between, ends_of, place_of, point_of
+from scenes.measurands.kind import turn
+from scenes.measurands.measurands import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +92,20 @@ class Seen:
     def axes(self) -> Frame:
         return camera_frame(self.camera, self.sensors)
 
-    def point(self, feature: Corner | Centre | Wall, plane: np.ndarray | None) -> Point:
-        """A corner or a centre: in the image, or on the plane of a unit normal (..., 3)."""
+    def point(self, feature: Corner | Centre | Wall | Between, plane: np.ndarray | None) -> Point:
+        """A corner, a centre or a point between others: in the image, or on the plane of a unit normal (..., 3)."""
+        if isinstance(feature, Between):
+            return feature.made(self, plane)
         if isinstance(feature, Centre | Wall):
             return self._centre(feature, plane is not None)
         at, moves = self.corners[feature], self._corner_moves(feature)
         found = Point(at, moves)
         return found if plane is None else self.onto(found, plane, point_of(self.solid, feature))
 
-    def line(self, side: Side, plane: np.ndarray | None) -> Line:
-        """An edge's line: in the image, or on a plane."""
+    def line(self, side: Side | Between, plane: np.ndarray | None) -> Line:
+        """The line of an edge, or between others: in the image, or on a plane."""
+        if isinstance(side, Between):
+            return side.made(self, plane)
         e = self.names.index(side.edge)
         normal, along = self.normals[..., e, :], self.along[..., e, :]
         length = np.linalg.norm(along, axis=-1)[..., None]
@@ -110,8 +116,18 @@ class Seen:
         ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
         return Line(*(self.onto(end, plane, place) for end, place in zip((start, stop), ends, strict=True)))
 
-    def middle(self, side: Side, plane: np.ndarray | None) -> Point:
-        """The place on an edge's line where the image of the edge's middle is expected."""
+    def left(self, parts: tuple, plane: np.ndarray | None) -> np.ndarray:
+        """+1 or -1 (...): whether `across` of a direction in the plane of features is to its left, from outside."""
+        return turn(self, Quantity("", "", parts), in_space=plane is not None)
+
+    def middle(self, side: Side | Between, plane: np.ndarray | None) -> Point:
+        """The place on a line where the image of its middle is expected."""
+        if isinstance(side, Between):
+            line = side.made(self, plane)
+            if plane is not None:
+                return mean([line.start, line.stop])
+            depths = self._depth(ends_of(self.solid, side))
+            return shared(line, depths[..., 0] / depths.sum(-1))
         e = self.names.index(side.edge)
         ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
         depths = np.moveaxis(self._depth(ends), -1, 0)
@@ -142,6 +158,18 @@ class Seen:
         """Distance of places (..., 3) from the sensor along its axis, shape (...)."""
         return np.einsum("...i,...i->...", places - self.eye, self.axes.forward)
 
+    def slid(self, place: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """How the image of a place (3,) moves when it moves by a step (3,), to first order, px, shape (..., 2)."""
+        return np.einsum("...ij,j->...i", self._slope(place - self.eye)[1], step)
+
+    def _slope(self, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Image (..., 2) of what is that far from the sensor (..., 3), and its derivative (..., 2, 3), px."""
+        axes, focal = self.axes, self.camera.focal_px
+        z = np.einsum("...i,...i->...", away, axes.forward)[..., None]
+        screen = np.stack([axes.right, axes.down], -2)
+        at = focal * np.einsum("...ki,...i->...k", screen, away) / z
+        return at, (focal * screen - at[..., None] * axes.forward[..., None, :]) / z[..., None]
+
     def _depth(self, points: np.ndarray) -> np.ndarray:
         """The same of points (n, 3), shape (..., n)."""
         return np.einsum("...ni,...i->...n", points - self.eye[..., None, :], self.axes.forward)
@@ -150,11 +178,7 @@ class Seen:
         _, point, _, _ = self.circle(feature)
         if in_space:
             return point
-        axes, away = self.axes, point.at - self.eye
-        z = np.einsum("...i,...i->...", away, axes.forward)[..., None]
-        screen = np.stack([axes.right, axes.down], -2)
-        at = self.camera.focal_px * np.einsum("...ki,...i->...k", screen, away) / z
-        slope = (self.camera.focal_px * screen - at[..., None] * axes.forward[..., None, :]) / z[..., None]
+        at, slope = self._slope(point.at - self.eye)
         return Point(at, {k: np.einsum("...ij,...j->...i", slope, move) for k, move in point.moves.items()})
 
     def _corner_moves(self, corner: Corner) -> Moves:

@@ -97,7 +97,7 @@ def _of_doubts(doubts: Mapping[str, np.ndarray], m: int, unit: str) -> list[Term
 
 def _model_error(known: Measurands, m: int, each: Forecast, sigma: float, biased: bool) -> float:
     """Largest error of the estimator's model: the predicted bias, or where no formula tells it what `ok` allows."""
-    circular = any(isinstance(feature, Centre) for feature in known.quantities[m].features)
+    circular = any(isinstance(feature, Centre) for feature in known.quantities[m].basic)
     if biased and not circular and np.isfinite(each.bias_object):
         return abs(each.bias_object)
     return MOST * sigma

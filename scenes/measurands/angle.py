@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.measurands.evaluated import Evaluated, between_lines
-from scenes.measurands.features import along_of
+from scenes.measurands.features import Side, along_of
 from scenes.measurands.kind import MEASURANDS, MeasurandKind
 
 _PARALLEL = 1e-6  # sine of an angle that is none
@@ -26,10 +26,15 @@ class Angle(MeasurandKind):
 
     def evaluated(self, seen, quantity, plane) -> Evaluated:
         """The angle, degrees."""
-        ends = [seen.solid.edge(feature.edge).ends for feature in quantity.features]
+        ends = [_vertices(seen.solid, feature) for feature in quantity.features]
         shared = set(ends[0]) & set(ends[1])
         signs = [1 if not shared or pair[0] in shared else -1 for pair in ends]
         return between_lines([seen.line(feature, plane) for feature in quantity.features], signs, plane)
+
+
+def _vertices(solid, feature) -> tuple[int, ...]:
+    """Of an edge; a line between others has none."""
+    return solid.edge(feature.edge).ends if isinstance(feature, Side) else ()
 
 
 MEASURANDS.add("angle")(Angle())

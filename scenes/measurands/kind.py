@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from scenes.measurands.evaluated import Evaluated
-from scenes.measurands.features import Centre, Corner, Side, Wall, is_flat, plane_of, points_of
+from scenes.measurands.features import (
+    Between,
+    Centre,
+    Corner,
+    Side,
+    Wall,
+    found_at,
+    is_flat,
+    is_line,
+    outward,
+    plane_of,
+    points_of,
+)
+from scenes.measurands.zone import Zone
 from scenes.parts.solid import Solid
 from scenes.registry import Registry
 
@@ -15,8 +28,9 @@ if TYPE_CHECKING:
     from scenes.measurands.measurands import Measurand, Quantity
 
 _ZERO = 1e-9  # of the object's size: an offset that is none, and has no side
-WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "s": "a curved surface", "e": "an edge"}
-_FEATURES = {"p": (Corner, Centre), "r": (Centre, Wall), "s": (Wall,), "e": (Side,)}
+WORDS = {"p": "a corner or a circle", "r": "a circle or a curved surface", "s": "a curved surface", "e": "an edge",
+         "c": "a circle"}  # fmt: skip
+_FEATURES = {"p": (Corner, Centre), "r": (Centre, Wall), "s": (Wall,), "e": (Side,), "c": (Centre,)}
 
 
 class MeasurandKind:
@@ -27,19 +41,31 @@ class MeasurandKind:
     """
 
     features: ClassVar[tuple[str, ...]]
-    """Orders of features that make one: p a corner or centre, r a circle or a curved surface s, e an edge."""
+    """Orders of features that make one: p a corner or centre, c a circle, r one or a curved surface s, e an edge.
+
+    A point between others (`scenes.measurands.between`) may stand for p, a line between others for e.
+    """
     is_angle: ClassVar[bool] = False
     """Whether its unit is degrees."""
     is_flat: ClassVar[bool] = True
     """Whether its features must lie in one plane."""
     qif: ClassVar[str] = ""
     """QIF's name of the characteristic (ISO 23952: Diameter, Width, ...); empty where QIF has none."""
+    parts: ClassVar[tuple[str, ...]] = ()
+    """What it consists of, where that are several numbers, each called NAME.part."""
+    nominals: ClassVar[int] = 1
+    """How many nominal values one may be given; what is 0 by its meaning has none."""
+    zone: ClassVar[float] = 0.0
+    """Of a geometric tolerance its zone's size over how far a value may be off: 2 about a true place, 1 to one side.
+
+    0 for a dimension. ``tolerance`` of a measurand is then the zone's diameter or width.
+    """
 
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""
         return any(
             len(features) == len(each)
-            and all(isinstance(feature, _FEATURES[letter]) for letter, feature in zip(each, features, strict=True))
+            and all(_stands_for(feature, letter) for letter, feature in zip(each, features, strict=True))
             for each in self.features
         )
 
@@ -50,16 +76,40 @@ class MeasurandKind:
 
     def check(self, solid: Solid, key: str, quantity: Quantity) -> None:
         """See that features of an object make one; ValueError if not."""
-        if self.is_flat and not is_flat(points_of(solid, quantity), solid.extent):
+        if self.is_flat and not is_flat(found_at(solid, quantity), solid.extent):
             raise ValueError(f"{key} must be features in one plane, got {', '.join(quantity.edges)}")
 
     def quantities(self, measurand: Measurand, make: type[Quantity]) -> tuple[Quantity, ...]:
         """The numbers that a measurand of this kind consists of."""
-        return (
-            make(
-                *(getattr(measurand, name) for name in ("name", "kind", "features", "nominal", "tolerance", "weight"))
-            ),
+        nominal = measurand.nominal if isinstance(measurand.nominal, tuple) else (measurand.nominal,)
+        wanted = nominal * (len(self.parts) or 1) if len(nominal) == 1 else nominal
+        wanted = wanted if self.nominals else (0.0,) * (len(self.parts) or 1)
+        limits = measurand.tolerance and measurand.tolerance.scaled(1 / (self.zone or 1.0))
+        names = [f"{measurand.name}.{part}" for part in self.parts] or [measurand.name]
+        return tuple(
+            make(name, measurand.kind, self.needed(measurand.features, name), value, limits, measurand.weight)
+            for name, value in zip(names, wanted, strict=True)
         )
+
+    def check_values(self, measurand: Measurand) -> None:
+        """See that nominal value and tolerance are such as this kind has; ValueError if not."""
+        limits = measurand.tolerance
+        if self.zone and limits is not None and limits.plus != limits.minus:
+            raise ValueError(
+                f"tolerance must be one number, the zone's size, for kind {measurand.kind}, "
+                f"got plus {limits.plus}, minus {limits.minus}"
+            )
+
+    def needed(self, features: tuple, name: str) -> tuple:
+        """Those of a measurand's features of which a number of it, by its name, is."""
+        return features
+
+    def zone_of(self, measurand: Measurand) -> Zone | None:
+        """What a geometric tolerance of this kind limits; None of a dimension."""
+        if not self.zone:
+            return None
+        names = tuple(f"{measurand.name}.{part}" for part in self.parts) or (measurand.name,)
+        return Zone(measurand.name, measurand.kind, names, self.zone, measurand.tolerance and measurand.tolerance.plus)
 
     def in_image(self, seen: Any, quantity: Quantity) -> Evaluated:
         """Value and derivatives in the image: px, or degrees."""
@@ -75,6 +125,12 @@ class MeasurandKind:
 
 
 MEASURANDS: Registry[MeasurandKind] = Registry("measurand kind")
+
+
+def _stands_for(feature: Any, letter: str) -> bool:
+    if isinstance(feature, Between):
+        return letter == ("e" if is_line(feature) else "p")
+    return isinstance(feature, _FEATURES[letter])
 
 
 def plane(seen: Any, quantity: Quantity) -> np.ndarray:
@@ -104,4 +160,17 @@ def side(
     start, along = line
     away = np.cross(plane(seen, quantity), along) @ (point - start)
     sign = np.where(away < -_ZERO * seen.solid.extent * np.linalg.norm(along), -1.0, 1.0)
+    return sign if in_space else -sign
+
+
+def turn(seen: Any, quantity: Quantity, *, in_space: bool) -> np.ndarray:
+    """+1 or -1 (...): whether `across` of a direction points to the left of it as seen from a plane's own outside.
+
+    For what may lie on either side of a line, or upon it, so that the object itself tells no side. The outside is the
+    side to which the normal's largest component points along the scene's axes.
+    """
+    facing = plane(seen, quantity)
+    normal = plane_of(seen.solid, quantity)
+    normal = facing if normal is None else normal
+    sign = np.sign(np.einsum("...i,...i->...", outward(normal), facing))
     return sign if in_space else -sign

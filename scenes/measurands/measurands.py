@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from scenes.measurands.features import AnyFeature, Centre, Corner, Feature, Side, Wall, place_of
+from scenes.measurands.between import AnyFeature, Crossing
+from scenes.measurands.features import Basic, Between, Centre, Corner, Feature, Side, basic_of, place_of
 from scenes.measurands.kinds import MEASURANDS
+from scenes.measurands.zone import Zone
 from scenes.model import Model, Name, Title
 from scenes.parts.solid import Solid
 from scenes.ranges import Coordinate, Positive, Spread
@@ -36,6 +38,10 @@ class Tolerance(Model):
         """Half of the whole zone: what a standard deviation is compared with."""
         return (self.plus + self.minus) / 2
 
+    def scaled(self, factor: float) -> Tolerance:
+        """So many times as wide."""
+        return self if factor == 1 else Tolerance(plus=factor * self.plus, minus=factor * self.minus)
+
 
 def _both_ways(value: Any) -> Any:
     """A single number is meant for both sides."""
@@ -45,15 +51,15 @@ def _both_ways(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number to be measured: a measurand, or one coordinate of a position.
+    """One number to be measured: a measurand, or one of several that it consists of.
 
     Attributes
     ----------
     name, kind : str
         Of the measurand; a position's two coordinates are NAME.x, from its first datum edge, and NAME.y, from its
-        second.
+        second; other kinds' numbers are NAME.part, too (`MeasurandKind.parts`).
     features : tuple
-        A coordinate's are the feature and that datum edge; a ball has none.
+        A coordinate's are the feature and that datum edge; a ball has none. Some may lie between others.
     nominal : float or None
         The value that is wanted, in the scene's unit or degrees; the object's own where None.
     tolerance : Tolerance or None
@@ -63,7 +69,7 @@ class Quantity:
 
     name: str
     kind: str
-    features: tuple[Corner | Centre | Side | Wall, ...]
+    features: tuple[Basic | Between, ...]
     nominal: float | None = None
     tolerance: Tolerance | None = None
     weight: float = 1.0
@@ -74,36 +80,62 @@ class Quantity:
         return sum((feature.edges for feature in self.features), ())
 
     @property
+    def basic(self) -> tuple[Basic, ...]:
+        """The features that are found for it, those of which others are made among them."""
+        return basic_of(self.features)
+
+    @property
+    def crossings(self) -> tuple[Corner | Crossing, ...]:
+        """Of its features those at which two edges' lines cross, each once."""
+        found = (f for f in (*self.features, *self.basic) if isinstance(f, Corner | Crossing))
+        return tuple(dict.fromkeys(found))
+
+    @property
     def is_angle(self) -> bool:
         """Whether its unit is degrees."""
         return MEASURANDS[self.kind].is_angle
 
     @property
     def axis(self) -> int:
-        """Of a ball's coordinate: 0 for x, 1 for y."""
+        """Of a coordinate: 0 for x, 1 for y."""
         return int(self.name.endswith(".y"))
+
+    def of(self, *features: Basic | Between) -> Quantity:
+        """The same number of other features."""
+        return replace(self, features=features)
+
+    @property
+    def part(self) -> str:
+        """Which number of its measurand it is; of a single one without meaning."""
+        return self.name.rpartition(".")[2]
 
 
 class Measurand(Model):
     """What to measure, on the plane of its features.
 
     ``distance`` between two corners or centres of circles; ``width`` from the middle of the first edge to the line of
-    the second; ``offset`` of a corner or centre from the line of an edge; ``angle`` between two edges; ``diameter`` of
-    a circle, a ball or a round wall, a cone's in its middle; ``taper`` of a cone, the angle between opposite lines of
-    its wall; ``position`` of a corner or centre from two datum edges, as two offsets with two nominal values, or of a
-    ball's centre in the scene's x and y, its z being that of the scene.
+    the second; ``offset`` of a corner or centre from the line of an edge; ``angle`` between two edges; ``diameter`` or
+    ``radius`` of a circle, an arc, a ball or a round wall, a cone's in its middle; ``taper`` of a cone, the angle
+    between opposite lines of its wall; ``position`` of a corner or centre from two datum edges, as two offsets with two
+    nominal values, or of a ball's centre in the scene's x and y, its z being that of the scene; ``slot`` of two round
+    ends, NAME.width and NAME.length; ``pitch_circle`` of at least three circles, its diameter.
+
+    Geometric tolerances, whose ``tolerance`` is the zone's width or diameter: ``true_position`` of a corner or centre
+    in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
+    NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, as NAME.x and NAME.y; ``symmetry`` of a line
+    or a point about a line; ``parallelism`` and ``perpendicularity`` of an edge to a datum edge.
     """
 
     name: Title
     """What the drawing calls it; different for each."""
     kind: Annotated[str, NameOf(MEASURANDS)]
     """What is measured of the features."""
-    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=3)]
-    """Corners, circles and edges, in the order that the kind asks for."""
+    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=64)]
+    """Corners, circles and edges, or what lies between some, in the order that the kind asks for."""
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
-    """The value that is wanted, the scene's unit or degrees; two for a position; the object's own if left out."""
+    """The value that is wanted, the scene's unit or degrees; two for a place; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
-    """How far the value may lie from it, the scene's unit or degrees: one number for both sides, or plus and minus."""
+    """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's size."""
     weight: Positive = 1.0
     """In the planner's weighted sum."""
 
@@ -115,16 +147,21 @@ class Measurand(Model):
         if not kind.takes(self.features):
             got = ", ".join(" ".join(feature.edges) for feature in self.features)
             raise ValueError(f"features must be {kind.wanted} for kind {self.kind}, got {got}")
-        if self.nominal is not None and isinstance(self.nominal, tuple) != (self.kind == "position"):
-            number = "two numbers" if self.kind == "position" else "one number"
+        count = 0 if self.nominal is None else len(self.nominal) if isinstance(self.nominal, tuple) else 1
+        if self.nominal is not None and count != kind.nominals:
+            number = ("left out", "one number", "two numbers")[kind.nominals]
             raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
-        if isinstance(self.nominal, tuple) and len(self.features) > 1 and not min(self.nominal) > 0:
-            raise ValueError(f"nominal must be two numbers greater than 0 from datum edges, got {self.nominal}")
+        kind.check_values(self)
         return self
 
     @property
+    def zone(self) -> Zone | None:
+        """What a geometric tolerance limits; None of a dimension."""
+        return MEASURANDS[self.kind].zone_of(self)
+
+    @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The numbers that it consists of: one, or the two coordinates of a position."""
+        """The numbers that it consists of: one, or several, as the two coordinates of a position."""
         return MEASURANDS[self.kind].quantities(self, Quantity)
 
 

@@ -15,6 +15,7 @@ class Position(Offset):
     """Two offsets; of a ball's centre, whose z is that of the scene, two coordinates."""
 
     features = ("pee", "s")
+    nominals = 2
 
     def check(self, solid, key, quantity) -> None:
         """Without datum edges of a ball."""
@@ -22,6 +23,12 @@ class Position(Offset):
         feature = quantity.features[0]
         if isinstance(feature, Wall) and not isinstance(solid.round(feature.surface).surface, Sphere):
             raise ValueError(f"{key} must be a ball for kind position, got {feature.surface!r}")
+
+    def check_values(self, measurand) -> None:
+        """From datum edges both nominal values are greater than 0."""
+        wanted = measurand.nominal
+        if wanted is not None and len(measurand.features) > 1 and not min(wanted) > 0:
+            raise ValueError(f"nominal must be two numbers greater than 0 from datum edges, got {wanted}")
 
     def quantities(self, measurand, make) -> tuple:
         """NAME.x, from the first datum edge, and NAME.y, from the second."""

@@ -15,6 +15,7 @@ from tests.proofs.fits import fits
 from tests.proofs.hollow import hollow
 from tests.proofs.installed import installed
 from tests.proofs.kill import kill
+from tests.proofs.kinds import kinds
 from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
@@ -40,6 +41,7 @@ app.command()(fits)
 app.command()(hollow)
 app.command()(installed)
 app.command()(kill)
+app.command()(kinds)
 app.command()(large)
 app.command()(lights)
 app.command()(limbs)

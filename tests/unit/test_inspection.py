@@ -13,6 +13,7 @@ import planner
 import scenes
 from measure.measurands import Measurements
 from scenes import Picture, Tolerance, status
+from tests import toleranced as plates
 from validation import inspection
 from validation.inspection import Inspected, Inspection
 from validation.report import inspection_files, qif
@@ -41,7 +42,8 @@ def measured():
 
 
 def inspected(decision, number=1, name="bore", value=4.0, state="ok"):
-    told = Requirement(number, name, "cm", 4.0, Tolerance(plus=0.1, minus=0.1), 0.01, 0.0, 0.002, 0.02, state, "")
+    zone = None if decision is None else Tolerance(plus=0.1, minus=0.1)
+    told = Requirement(number, name, "cm", 4.0, zone, 0.01, 0.0, 0.002, 0.02, state, "")
     return Inspected(told, value, 0.0102, decision)
 
 
@@ -254,6 +256,70 @@ def test_qif_is_valid_by_its_published_schema(measured, serial):
     made = inspection.inspect(replace(found, value=lost, status=states, picture=found.picture.with_scene(open_ended)))
     for each in (made, inspection.inspect(found)):
         assert schema.validate(etree.fromstring(qif.document(each, serial))), schema.error_log
+
+
+@pytest.fixture(scope="module")
+def toleranced(tmp_path_factory):
+    """A bore's place within its zone by 0.03 and 0.04 of what is allowed, as measured by a picture of little noise."""
+    scene = plates.scene(tmp_path_factory.mktemp("plate"), ("in edges", "right"))
+    picture = Picture.of(scene, (20, 300), (30, 350))
+    told = planner.predict(picture).measurands
+    nominal = np.array([each.nominal for each in told])
+    spread = np.diag([1e-6, 4e-6, 1e-6])
+    spread[0, 1] = spread[1, 0] = 1e-6
+    return Measurements(
+        quantities=scene.quantities, units=tuple(each.unit for each in told), nominal=nominal,
+        value=nominal + [0.03, 0.04, 0.0], value_image=np.zeros(3), covariance=spread, covariance_image=spread,
+        status=np.array(["ok"] * 3, object), p_value=np.array(0.5), first=None, picture=picture,
+        saturated=np.array(0), bias=np.zeros(3), u_bias=np.full(3, 1e-3),
+    )  # fmt: skip
+
+
+def test_the_numbers_of_a_zone_are_decided_together(toleranced):
+    """The zone of 0.2 is needed by 2 * 0.05; its law holds noise, the correction's doubt and what the station says."""
+    made = inspection.inspect(toleranced)
+    assert [row.decision for row in made.rows] == [None, None, "pass"]
+    (zone,) = made.zones
+    assert zone.size.value == pytest.approx(0.1)
+    np.testing.assert_allclose(zone.size.covariance, [[2e-6, 1e-6], [1e-6, 5e-6]], rtol=1e-6)  # margin: rounding
+    assert (zone.decision, made.decision) == ("pass", "pass")
+    doubtful = toleranced.picture.scene.model_copy(update={"uncertainty": scenes.Uncertainty(part_shift=0.02)})
+    wide = inspection.inspect(replace(toleranced, picture=toleranced.picture.with_scene(doubtful)))
+    assert wide.zones[0].size.covariance[0, 0] > 2e-6
+    far = inspection.inspect(replace(toleranced, value=toleranced.nominal + [0.09, 0.09, 0.0]))
+    assert (far.zones[0].decision, far.decision) == ("fail", "fail")
+    assert inspection_files.sentence(far) == "Fail: in edges is beyond a limit by more than U; 1 of 2 pass."
+
+
+def test_a_zone_without_light_or_that_is_not_ok_is_not_decided(toleranced):
+    dark = Picture.of(toleranced.picture.scene, toleranced.picture.sensor)
+    (zone,) = inspection.inspect(replace(toleranced, picture=dark, u_bias=np.full(3, np.nan))).zones
+    assert (zone.size.is_known, zone.decision) == (False, "undecided")
+    states = np.array(["ok", "clutter", "ok"], object)
+    (zone,) = inspection.inspect(replace(toleranced, status=states)).zones
+    assert (zone.status, zone.decision) == ("clutter", "undecided")
+
+
+def test_a_zone_is_handed_on_below_its_numbers(toleranced, tmp_path):
+    made = inspection.inspect(toleranced)
+    image = np.zeros((toleranced.picture.scene.camera.height, toleranced.picture.scene.camera.width))
+    page, table, results, _ = inspection_files.write(made, [image], ABOUT, tmp_path)
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert [row["characteristic"] for row in rows] == ["in edges.x", "in edges.y", "right", "in edges"]
+    assert (rows[3]["kind"], rows[3]["upper"], rows[3]["decision"]) == ("true_position", "0.2", "pass")
+    assert float(rows[3]["value"]) == pytest.approx(0.1)
+    lines = [cells[1] for *_, cells in inspection_files._lines(made)]
+    assert lines == ["in edges, x", "in edges, y", "in edges", "right"]
+    assert "in edges" in page.read_text(encoding="utf-8")
+    _, told = _results(results.read_bytes())
+    zone = told["in edges"]
+    assert float(zone.find(f"{QIF}Value").text) == pytest.approx(0.1)
+    assert zone.find(f"{QIF}Status/{QIF}CharacteristicStatusEnum").text == "PASS"
+    assert told["in edges.x"].find(f"{QIF}Status/{QIF}CharacteristicStatusEnum").text == "NOT_ANALYZED"
+    if "ICE_QIF" in os.environ:
+        etree = pytest.importorskip("lxml.etree")
+        schema = etree.XMLSchema(etree.parse(Path(os.environ["ICE_QIF"])))
+        assert schema.validate(etree.fromstring(results.read_bytes())), schema.error_log
 
 
 def test_numbers_of_qif_have_no_exponent():

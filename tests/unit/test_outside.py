@@ -25,7 +25,7 @@ from tests.commands import ice
 from tests.oracle import block_image
 
 KINDS = {
-    "spotlight": LIGHTS, "median": measure.ESTIMATORS, "vignetting": EFFECTS, "concentricity": MEASURANDS,
+    "spotlight": LIGHTS, "median": measure.ESTIMATORS, "vignetting": EFFECTS, "eccentricity": MEASURANDS,
     "satin": MATERIALS, "fisheye": LENSES, "fixture_expansion": INFLUENCES,
 }  # fmt: skip
 SENSOR, LIGHT = (30, 135), (15, 315)
@@ -85,7 +85,7 @@ def test_a_median_s_variance_is_what_noisy_images_show(task1):
 @pytest.fixture(scope="module")
 def bracket():
     """The bracket before a camera of a fifth of the pixels each way, with the one requirement."""
-    wanted = {"name": "aligned", "kind": "concentricity", "tolerance": 0.1}
+    wanted = {"name": "aligned", "kind": "eccentricity", "tolerance": 0.1}
     features = [{"circle": "c2"}, {"circle": "c4"}, {"edge": "e10"}]
     camera = {"width": 490, "height": 410, "focal_px": 1450.0}
     whole = scenes.load("bracket_mm").with_(measurands=[{**wanted, "features": features}])
@@ -94,7 +94,7 @@ def bracket():
 
 def test_a_measurand_s_value_and_variance_are_what_noisy_images_show(bracket):
     told = planner.predict(bracket, (20, 0), (20, 225)).measurands[0]
-    assert (told.kind, told.unit) == ("concentricity", "mm")
+    assert (told.kind, told.unit) == ("eccentricity", "mm")
     assert told.value_object == pytest.approx(18.0 - 48.0)  # of the holes, along the part's length
     clean = render.image(bracket, (20, 0), (20, 225), effects=(*PLAIN, "cast_shadow"))
     known = measure.propagate(clean, bracket, (20, 0), (20, 225)).measurands

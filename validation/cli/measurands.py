@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +47,11 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
     return plain(rows)
 
 
+def zones(inspected: Inspection) -> list[dict[str, Any]]:
+    """One record a geometric tolerance that several numbers keep together; null for what is not known."""
+    return plain([each.facts for each in inspected.zones])
+
+
 def reasons(rows: list[dict[str, Any]], inspected: Inspection) -> list[str]:
     """What decided each record's status, with its number; empty where it is ``ok``, or nothing more is known."""
     every = [_reasons(rows, each.found) for each in inspected.taken]
@@ -77,12 +83,14 @@ def covariance(inspected: Inspection) -> list[list[float | None]]:
     return plain(inspected.covariance)
 
 
-def table(rows: list[dict[str, Any]]) -> Table:
-    """The same for a terminal."""
+def table(rows: list[dict[str, Any]], zones: Sequence[dict[str, Any]] = ()) -> Table:
+    """The same for a terminal, each zone in a row below its numbers."""
     columns = (
         "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "U", "nominal", "tolerance", "decision", "status",
     )  # fmt: skip
-    shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=_CAPTION)
+    caption = f"{_CAPTION} {_OF_ZONES}" if zones else _CAPTION
+    shown = cells.table("Measurands (+- u)", *columns, words=("name", "kind", "unit"), caption=caption)
+    after = {zone["parts"][-1]: zone for zone in zones}
     for row in rows:
         told = row["sigma"] if row["u"] is None else row["u"]
         places = digits(told)
@@ -93,7 +101,23 @@ def table(rows: list[dict[str, Any]]) -> Table:
         limits = "-" if zone is None else _limits(zone)
         about = row["name"], row["kind"], value, sigma, row["unit"], *off
         shown.add_row(*about, nominal, limits, _decision(row), row["status"])
+        if row["name"] in after:
+            shown.add_row(*_zone_cells(after[row["name"]]))
     return shown
+
+
+def _zone_cells(zone: dict[str, Any]) -> tuple[str, ...]:
+    """A zone's row: the size that is needed, and what it is below in 95 %."""
+    if zone["value"] is None:
+        value, below = "-", ""
+    else:
+        places = digits(zone["u"])
+        value, below = f"{zone['value']:.{places}f}", f"<= {zone['at_most']:.{places}f}"
+    size = "-" if zone["size"] is None else f"{zone['size']:g}"
+    return (
+        zone["name"], zone["kind"], value, "", zone["unit"], "-", "-", below, "0", size, zone["decision"] or "-",
+        zone["status"],
+    )  # fmt: skip
 
 
 def _decision(row: dict[str, Any]) -> str:
@@ -112,6 +136,11 @@ _CAPTION = (
     "--as-measured. U: expanded uncertainty (95 %) of all that the scene says is not exact; none where no light is "
     "given. pass, fail: by more than U within or beyond the tolerance (ISO 14253-1); only a value whose status is ok "
     "is decided."
+)
+
+_OF_ZONES = (
+    "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law "
+    "is not normal near 0. It is decided by that law, as surely as by 2 u; its numbers alone are not."
 )
 
 

@@ -220,14 +220,16 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
 def _say_measurands(given: Options, inspected: Inspection, distance: measure.Measurement | None) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(inspected)
-    told = {"measurands": rows, "covariance": measurands.covariance(inspected)}
+    told, zones = {"measurands": rows, "covariance": measurands.covariance(inspected)}, measurands.zones(inspected)
+    if zones:
+        told["zones"] = zones
     if distance is not None:
         told |= _distance_facts(distance)
     if given.as_json:
         say({"file": str(given.file), **told}, True, "")
     else:
         shown = console()
-        shown.print(measurands.table(rows))
+        shown.print(measurands.table(rows, zones))
         for line in legend([row["status"] for row in rows], measurands.reasons(rows, inspected)):
             shown.print(f" {line}", highlight=False)
         if distance is not None:

@@ -17,8 +17,9 @@ from validation.report import cells, qif, station_sketch, station_view
 from validation.report.budget_table import decimals
 from validation.report.camera_words import told as camera
 from validation.report.export import inert
-from validation.report.grades import LOOKS, MEANS
+from validation.report.grades import LOOKS, MEANS, Look
 from validation.report.page import Section, budget_sections, environment
+from validation.zones import MeasuredZone
 
 COLUMNS = (
     "no.", "characteristic", "kind", "nominal", "lower limit", "upper limit", "value", "U", "decision", "status",
@@ -27,7 +28,8 @@ NOTE = (
     "value: as measured in this picture, the bias taken off that a simulation of it tells. U: expanded uncertainty "
     "(95 %) of noise, of the bias' correction and of all else that the scene says is not exactly known. decision (ISO "
     "14253-1): pass where the value keeps both limits by at least U, fail where it is beyond one by more than U; only "
-    "a value whose status is ok is decided."
+    "a value whose status is ok is decided. A zone of several numbers (no balloon): the diameter that they need, how "
+    "much larger it may be (95 %), decided by the law of that, which is not normal near 0."
 )
 
 
@@ -94,35 +96,44 @@ def records(found: Inspection, about: About) -> list[dict[str, Any]]:
             "U": each.U, "sigma": finite(each.sigma), "u_bias": finite(u_bias),
             "decision": row.decision, "status": each.status, "reason": each.reason,
         })  # fmt: skip
+    for zone in found.zones:
+        facts = zone.facts
+        told.append(dict.fromkeys(told[0]) | {
+            "part": about.serial, "characteristic": facts["name"], "kind": facts["kind"], "unit": facts["unit"],
+            "nominal": 0.0, "lower": 0.0, "upper": facts["size"], "value": facts["value"],
+            "U": facts["at_most"] and facts["at_most"] - facts["value"], "decision": facts["decision"],
+            "status": facts["status"],
+        })  # fmt: skip
     return told
 
 
 def sentence(found: Inspection) -> str:
     """What the inspection says of the part."""
-    rows = found.rows
+    rows = [(row.decision, _number(row)) for row in found.rows]
+    rows += [(each.decision, each.zone.name) for each in found.zones]
     if found.decision is None:
         return "No characteristic has a tolerance: nothing is decided."
-    judged = [row for row in rows if row.decision is not None]
+    judged = [(decision, name) for decision, name in rows if decision is not None]
     if found.decision == "pass":
         many = f"all {len(judged)} characteristics keep their limits" if len(judged) > 1 else "it keeps its limits"
-        return f"Pass: {many} by at least U (ISO 14253-1){_untold(rows)}."
+        return f"Pass: {many} by at least U (ISO 14253-1){_untold(found)}."
     parts = []
-    if some := [row for row in judged if row.decision == "fail"]:
-        parts.append(f"Fail: {_named(some)} {'are' if len(some) > 1 else 'is'} beyond a limit by more than U")
-    if some := [row for row in judged if row.decision == "undecided"]:
-        parts.append(f"{'undecided' if parts else 'Undecided'}: {_named(some)}")
-    kept = sum(row.decision == "pass" for row in judged)
-    return f"{'; '.join(parts)}; {kept} of {len(judged)} pass{_untold(rows)}."
+    if some := [name for decision, name in judged if decision == "fail"]:
+        parts.append(f"Fail: {', '.join(some)} {'are' if len(some) > 1 else 'is'} beyond a limit by more than U")
+    if some := [name for decision, name in judged if decision == "undecided"]:
+        parts.append(f"{'undecided' if parts else 'Undecided'}: {', '.join(some)}")
+    kept = sum(decision == "pass" for decision, _ in judged)
+    return f"{'; '.join(parts)}; {kept} of {len(judged)} pass{_untold(found)}."
 
 
-def _untold(rows: Sequence[Inspected]) -> str:
+def _untold(found: Inspection) -> str:
     """Of those without a tolerance."""
-    count = sum(row.decision is None for row in rows)
+    count = sum(row.requirement.tolerance is None for row in found.rows)
     return f"; {count} without a tolerance" if count else ""
 
 
-def _named(rows: Sequence[Inspected]) -> str:
-    return ", ".join(f"{row.requirement.title} (no. {row.requirement.number})" for row in rows)
+def _number(row: Inspected) -> str:
+    return f"{row.requirement.title} (no. {row.requirement.number})"
 
 
 def _context(found: Inspection, about: About) -> dict[str, Any]:
@@ -137,14 +148,37 @@ def _context(found: Inspection, about: About) -> dict[str, Any]:
         "sentence": sentence(found),
         "key": [(MEANS[grade], LOOKS[grade]) for grade in grades],
         "columns": (*COLUMNS, "picture") if several else COLUMNS,
-        "rows": [(LOOKS[row.requirement.grade], row.decision or "", (*_cells(row), *[str(row.picture)] * several))
-                 for row in found.rows],
+        "rows": _lines(found),
         "note": NOTE,
         "why": [f"{row.requirement.title} (no. {row.requirement.number}), {row.requirement.status}: "
                 f"{row.requirement.reason}" for row in found.rows if row.requirement.reason],
         "sections": _budgets(found),
         "agrees": found.decision == "pass",
     }  # fmt: skip
+
+
+def _lines(found: Inspection) -> list[tuple[Look | None, str, tuple[str, ...]]]:
+    """Of each characteristic its balloon's look, decision and cells; a zone, which has no balloon, below its parts."""
+    lines, several = [], len(found.taken) > 1
+    for row in found.rows:
+        cells = *_cells(row), *[str(row.picture)] * several
+        lines.append((LOOKS[row.requirement.grade], row.decision or "", cells))
+        after = (each for each in found.zones if each.zone.parts[-1] == row.requirement.name)
+        lines += [(None, each.decision or "", (*_zone_cells(each), *["-"] * several)) for each in after]
+    return lines
+
+
+def _zone_cells(each: MeasuredZone) -> tuple[str, ...]:
+    """As `COLUMNS`: the size that is needed, and by how much the true one may be larger (95 %)."""
+    told = each.facts
+    size = "-" if told["size"] is None else cells.united(f"{told['size']:.6g}", told["unit"])
+    value = more = "-"
+    if told["value"] is not None:
+        places = decimals(told["u"])
+        value = cells.united(f"{told['value']:.{places}f}", told["unit"])
+        if is_trusted(each.status):
+            more = cells.united(f"+{told['at_most'] - told['value']:.{places}f}", told["unit"])
+    return "", told["name"], told["kind"], "0", "-", size, value, more, told["decision"] or "-", each.status
 
 
 def _budgets(found: Inspection) -> list[Section]:

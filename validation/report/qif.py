@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import count
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -16,7 +17,7 @@ import numpy as np
 from scenes.measurands.kinds import MEASURANDS
 from scenes.status import is_trusted
 from scenes.units import Unit, in_unit
-from validation.inspection import Inspected, Inspection
+from validation.inspection import Inspection
 
 _NAMESPACE = "http://qifstandards.org/xsd/qif3"
 _DEGREE = 0.017453292519943295
@@ -42,13 +43,51 @@ def document(found: Inspection, serial: str = "") -> bytes:
     _standard(root, standard)
     _units(root, scene.units)
     part = _child(_child(_child(root, "Product"), "PartSet", n="1"), "Part", id=str(next(ids)), label=scene.name)
-    items = _characteristics(root, found, standard, ids)
-    _results(root, found, items, serial, ids)
+    rows = _rows(found)
+    items = _characteristics(root, rows, standard, ids)
+    _results(root, list(zip(rows, items, strict=True)), _OF_PART[found.decision], serial, ids)
     root.set("idMax", str(next(ids) - 1))
     _child(part, "ModelNumber", scene.title or scene.name)
     identity.text = str(uuid.uuid5(uuid.NAMESPACE_URL, tostring(root, encoding="unicode")))
     indent(root)
     return tostring(root, encoding="utf-8", xml_declaration=True)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A characteristic as the document says it: ``of`` is QIF's name of its kind, ``limits`` of deviations."""
+
+    of: str
+    number: str
+    name: str
+    kind: str
+    nominal: float
+    limits: tuple[float, float] | None
+    value: float | None
+    u: float | None
+    U: float | None
+    decision: str | None
+    status: str
+    reason: str = ""
+
+
+def _rows(found: Inspection) -> list[_Row]:
+    """Every number, and every zone that several of them keep together."""
+    joint = {name for each in found.zones for name in each.zone.parts}
+    rows = []
+    for row in found.rows:
+        told = row.requirement
+        kind, zone = MEASURANDS[told.kind], None if told.name in joint else told.tolerance
+        of = kind.qif or ("UserDefinedAngular" if kind.is_angle else "UserDefinedLinear")
+        limits = None if zone is None else (-zone.minus, zone.plus)
+        rows.append(_Row(of, str(told.number), told.name, told.kind, told.nominal, limits, row.value, row.u, told.U,
+                         row.decision, told.status, told.reason))  # fmt: skip
+    for each in found.zones:
+        told = each.facts
+        limits = None if told["size"] is None else (0.0, told["size"])
+        rows.append(_Row("UserDefinedLinear", "", told["name"], told["kind"], 0.0, limits, told["value"], told["u"],
+                         None, each.decision, each.status))  # fmt: skip
+    return rows
 
 
 def _child(parent: Element, tag: str, text: str | None = None, /, **attributes: str) -> Element:
@@ -78,70 +117,70 @@ def _standard(root: Element, number: int) -> None:
     _child(standard, "Year", "2011")
 
 
-def _characteristics(root: Element, found: Inspection, standard: int, ids: Iterator[int]) -> list[int]:
+def _characteristics(root: Element, rows: list[_Row], standard: int, ids: Iterator[int]) -> list[int]:
     """Definitions, nominals and items, three of each characteristic; the identifiers of the items."""
-    parent, many = _child(root, "Characteristics"), str(len(found.rows))
+    parent, many = _child(root, "Characteristics"), str(len(rows))
     _child(parent, "FormalStandardId", str(standard))
     definitions = _child(parent, "CharacteristicDefinitions", n=many)
     nominals = _child(parent, "CharacteristicNominals", n=many)
     items = _child(parent, "CharacteristicItems", n=many)
     every = []
-    for row in found.rows:
-        kind, definition, nominal, item = _class(row), next(ids), next(ids), next(ids)
-        _defined(_child(definitions, f"{kind}CharacteristicDefinition", id=str(definition)), row)
-        target = _child(nominals, f"{kind}CharacteristicNominal", id=str(nominal))
+    for row in rows:
+        definition, nominal, item = next(ids), next(ids), next(ids)
+        _defined(_child(definitions, f"{row.of}CharacteristicDefinition", id=str(definition)), row)
+        target = _child(nominals, f"{row.of}CharacteristicNominal", id=str(nominal))
         _child(target, "CharacteristicDefinitionId", str(definition))
-        _child(target, "TargetValue", _number(row.requirement.nominal))
-        if kind in _MODES:
-            _child(target, "AnalysisMode", _MODES[kind])
-        said = _child(items, f"{kind}CharacteristicItem", id=str(item))
-        _child(said, "Name", row.requirement.name)
-        _child(_child(said, "CharacteristicDesignator"), "Designator", str(row.requirement.number))
+        _child(target, "TargetValue", _number(row.nominal))
+        if row.of in _MODES:
+            _child(target, "AnalysisMode", _MODES[row.of])
+        said = _child(items, f"{row.of}CharacteristicItem", id=str(item))
+        _child(said, "Name", row.name)
+        if row.number:
+            _child(_child(said, "CharacteristicDesignator"), "Designator", row.number)
         _child(said, "CharacteristicNominalId", str(nominal))
         every.append(item)
     return every
 
 
-def _defined(definition: Element, row: Inspected) -> None:
+def _defined(definition: Element, row: _Row) -> None:
     """Limits, and in words what it is where QIF has no class of its own for it."""
-    zone = row.requirement.tolerance
-    if zone is None:
+    if row.limits is None:
         _child(definition, "NonTolerance", "MEASURED")
     else:
         tolerance = _child(definition, "Tolerance")
-        _child(tolerance, "MaxValue", _number(zone.plus))
-        _child(tolerance, "MinValue", _number(-zone.minus))
+        _child(tolerance, "MaxValue", _number(row.limits[1]))
+        _child(tolerance, "MinValue", _number(row.limits[0]))
         _child(tolerance, "DefinedAsLimit", "false")
-    if _class(row).startswith("UserDefined"):
-        _child(definition, "WhatToMeasure", row.requirement.kind)
+    if row.of.startswith("UserDefined"):
+        _child(definition, "WhatToMeasure", row.kind)
 
 
-def _results(root: Element, found: Inspection, items: list[int], serial: str, ids: Iterator[int]) -> None:
+def _results(root: Element, rows: list[tuple[_Row, int]], state: str, serial: str, ids: Iterator[int]) -> None:
     """What was measured of one part."""
     results = _child(root, "Results")
     one = _child(_child(results, "MeasurementResultsSet", n="1"), "MeasurementResults", id=str(next(ids)))
-    measured = _child(_child(one, "MeasuredCharacteristics"), "CharacteristicMeasurements", n=str(len(items)))
+    measured = _child(_child(one, "MeasuredCharacteristics"), "CharacteristicMeasurements", n=str(len(rows)))
     part = next(ids)
-    for row, item in zip(found.rows, items, strict=True):
-        _measured(_child(measured, f"{_class(row)}CharacteristicMeasurement", id=str(next(ids))), row, item, part)
-    _child(_child(one, "InspectionStatus"), "InspectionStatusEnum", _OF_PART[found.decision])
+    for row, item in rows:
+        _measured(_child(measured, f"{row.of}CharacteristicMeasurement", id=str(next(ids))), row, item, part)
+    _child(_child(one, "InspectionStatus"), "InspectionStatusEnum", state)
     _child(_child(one, "ActualComponentIds", n="1"), "Id", str(part))
     component = _child(_child(_child(results, "ActualComponentSets", n="1"), "ActualComponentSet", n="1"),
                        "ActualComponent", id=str(part))  # fmt: skip
     if serial:
         _child(component, "SerialNumber", serial)
-    _child(_child(component, "Status"), "InspectionStatusEnum", _OF_PART[found.decision])
+    _child(_child(component, "Status"), "InspectionStatusEnum", state)
 
 
-def _measured(measurement: Element, row: Inspected, item: int, part: int) -> None:
+def _measured(measurement: Element, row: _Row, item: int, part: int) -> None:
     """The value with its combined standard uncertainty; without that where its status is not to be trusted."""
-    told, signed = row.requirement, row.value is not None and is_trusted(row.requirement.status)
-    facts = {"status": told.status} | ({"expanded uncertainty U (95 %)": _number(told.U)} if signed and told.U else {})
+    signed = row.value is not None and is_trusted(row.status)
+    facts = {"status": row.status} | ({"expanded uncertainty U (95 %)": _number(row.U)} if signed and row.U else {})
     attributes = _child(measurement, "Attributes", n=str(len(facts)))
     for name, value in facts.items():
         _child(attributes, "AttributeStr", name=name, value=value)
-    if told.reason:
-        _child(measurement, "Description", told.reason)
+    if row.reason:
+        _child(measurement, "Description", row.reason)
     state = "NOT_ANALYZED" if row.value is None else _DECIDED[row.decision]
     _child(_child(measurement, "Status"), "CharacteristicStatusEnum", state)
     _child(measurement, "CharacteristicItemId", str(item))
@@ -149,12 +188,6 @@ def _measured(measurement: Element, row: Inspected, item: int, part: int) -> Non
     if row.value is not None:
         doubt = {"combinedUncertainty": _number(row.u), "meanError": "0"} if signed and row.u is not None else {}
         _child(measurement, "Value", _number(row.value), **doubt)
-
-
-def _class(row: Inspected) -> str:
-    """QIF's name of a kind of characteristic."""
-    kind = MEASURANDS[row.requirement.kind]
-    return kind.qif or ("UserDefinedAngular" if kind.is_angle else "UserDefinedLinear")
 
 
 def _number(value: float) -> str:

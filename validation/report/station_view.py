@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from imaging.geometry.projection import project, sensor_position
 from scenes import Centre, Curved, Picture, Side, Wall
-from scenes.measurands.features import point_of
+from scenes.measurands.features import Between, ends_of, is_line, point_of
 from scenes.measurands.measurands import Quantity
 from scenes.parts.surfaces import Sphere
 from validation.explore import preview
@@ -52,8 +52,8 @@ def _mark(picture: Picture, quantity: Quantity) -> Mark:
     if quantity.is_angle:
         return Mark(tuple(lines), _nearest_ends(*lines[:2])[None])
     for i, feature in enumerate(quantity.features):
-        if isinstance(feature, Side):
-            ends = solid.vertices[list(solid.edge(feature.edge).ends)]
+        if is_line(feature):
+            ends = ends_of(solid, feature)
             places[i] = _foot(places[1 - i], ends) if len(places) == 2 else ends.mean(0)
     start, stop = _seen(picture, np.array([places[0], places[-1]]))
     return Mark((*lines, np.stack([start, stop])), _between(start, stop))
@@ -73,8 +73,8 @@ def _nearest_ends(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _place(picture: Picture, feature) -> np.ndarray:
     """Of a feature in space, (3,); of an edge its middle."""
     solid = picture.scene.solid
-    if isinstance(feature, Side):
-        return solid.vertices[list(solid.edge(feature.edge).ends)].mean(0)
+    if is_line(feature):
+        return ends_of(solid, feature).mean(0)
     return point_of(solid, feature)
 
 
@@ -85,10 +85,13 @@ def _foot(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 
 def _outline(picture: Picture, feature) -> list[np.ndarray]:
-    """Lines of a feature in the image; of a corner none."""
+    """Lines of a feature in the image; of a corner none, of what lies between others theirs, too."""
     solid = picture.scene.solid
+    if isinstance(feature, Between):
+        own = [_seen(picture, ends_of(solid, feature))] if feature.is_line else []
+        return [*own, *(line for part in feature.parts for line in _outline(picture, part))]
     if isinstance(feature, Side):
-        return [_seen(picture, solid.vertices[list(solid.edge(feature.edge).ends)])]
+        return [_seen(picture, ends_of(solid, feature))]
     if isinstance(feature, Centre):
         return [_seen(picture, preview.ring(solid.circle(feature.circle), _CHORDS))]
     if isinstance(feature, Wall):

@@ -6,7 +6,7 @@ from scenes.measurands.evaluated import Evaluated, across, pulled
 from scenes.measurands.kinds import MEASURANDS, MeasurandKind
 
 
-class Concentricity(MeasurandKind):
+class Eccentricity(MeasurandKind):
     """The offset of the first centre from the second along an edge: signed, so that its law is that of any length."""
 
     features = ("ppe",)
@@ -26,4 +26,4 @@ class Concentricity(MeasurandKind):
         return Evaluated((away * unit).sum(-1), pulled(moved))
 
 
-MEASURANDS.add("concentricity")(Concentricity())
+MEASURANDS.add("eccentricity")(Eccentricity())

@@ -1,0 +1,81 @@
+"""Geometric tolerances of a measured picture: the size of zone that each needs, and the decision by its law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from uncertainties import covariance_matrix
+
+from planner.budgeting.budgets import SceneBudget
+from planner.uncertainty.conformity import Decision
+from planner.uncertainty.zones import ZoneSize
+from scenes import status
+from scenes.measurands.zone import Zone
+
+if TYPE_CHECKING:
+    import measure
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredZone:
+    """A zone of several numbers, which decide together.
+
+    Attributes
+    ----------
+    zone : Zone
+    size : ZoneSize
+        What is known of the size that the part needs, the scene's unit; NaN within where something is not measured.
+    unit, status : str
+        The worst status of its numbers.
+    """
+
+    zone: Zone
+    size: ZoneSize
+    unit: str
+    status: str
+
+    @property
+    def decision(self) -> Decision | None:
+        """By the drawing's size (ISO 14253-1); None without one."""
+        return None if self.zone.size is None else self.size.decide(self.zone.size, status=self.status)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """For JSON and tables; None where nothing is measured."""
+        known, size = self.size.is_known, self.size
+        low, high = size.interval() if known else (None, None)
+        return {
+            "name": self.zone.name, "kind": self.zone.kind, "parts": list(self.zone.parts), "unit": self.unit,
+            "value": size.value if known else None, "mean": size.mean if known else None,
+            "u": size.u if known else None, "low": low, "high": high,
+            "at_most": size.quantile(0.95) if known else None, "size": self.zone.size, "decision": self.decision,
+            "status": self.status,
+        }  # fmt: skip
+
+
+def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tuple[MeasuredZone, ...]:
+    """Those of one picture's geometric tolerances that are about several numbers; one number is decided by itself.
+
+    ``known`` is the budget of what was measured; without it, or where it leaves out a number, nothing is known.
+    """
+    names, made = list(found.names), []
+    for zone in found.picture.scene.zones:
+        if zone.is_joint:
+            rows = [names.index(name) for name in zone.parts]
+            covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.parts)
+            size = ZoneSize((found.value - found.nominal)[rows], covariance, zone.factor)
+            state = status.worst(*(str(found.status[k]) for k in rows))
+            made.append(MeasuredZone(zone, size, found.units[rows[0]], state))
+    return tuple(made)
+
+
+def _covariance(noise: np.ndarray, known: SceneBudget | None, names: tuple[str, ...]) -> np.ndarray:
+    """Of some values by all that is not exactly known: what a station's inputs move together, and the noise; NaN where
+    it is not known."""
+    if known is None or not set(names) <= {each.name for each in known}:
+        return np.full_like(noise, np.nan)
+    values = known.ufloats()
+    shared = np.array(covariance_matrix([values[name] for name in names]))
+    return shared + noise - np.diag(np.diag(noise))  # each value's own noise is in its budget
