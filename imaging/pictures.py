@@ -33,8 +33,8 @@ class Pictures:
         Whether this is one picture to be looked at closely: with the light that surfaces send to each other, and along
         circles (`imaging.features.rim_look`). Many pictures are glanced at, which takes a thousandth of the time.
     roughly : bool
-        Whether a close look takes the light between faces from their patches and asks circles in fewer places: a fifth
-        of the time, for a setting that is one of many.
+        Whether a close look takes the light between faces from few rays and their patches: a part of the time, for a
+        setting that is one of many.
     """
 
     scene: Scene

@@ -35,19 +35,7 @@ FAR = 4.0  # standard deviations that a value may be from the part's own
 SIDAK = 0.01  # of all rows together
 OFF = 0.3  # standard deviations that the mean of what is ok may be off, beside its own uncertainty
 _VALUE = ("name", "status", "value", "nominal", "sigma", "u_bias")
-_VALIDATED = (
-    "name",
-    "status",
-    "value",
-    "predicted",
-    "empirical",
-    "n",
-    "failed",
-    "ratio",
-    "bias",
-    "u_bias",
-    "render_noise",
-)
+_VALIDATED = ("name", "status", "value", "predicted", "n", "failed", "ratio", "bias", "u_bias", "render_noise")
 
 
 @dataclass(frozen=True)
@@ -219,7 +207,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def _judged(rows: list[dict[str, Any]]) -> list[str]:
-    """Of what was validated and is ``ok``: whether the variance is the one that is told, and how far the mean is off."""
+    """Of what was validated and is ``ok``: whether the variance is the one that is told, how far the mean is off."""
     found = [
         (row["part"], each)
         for row in rows
@@ -247,7 +235,7 @@ def _judged(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def chance(ratio: float, count: int) -> float:
-    """By chance alone a variance of ``count`` values would be this far from the true one, ``ratio`` times it, or farther.
+    """How likely a variance of ``count`` values is this far from the true one, ``ratio`` times it, or farther.
 
     Examples
     --------
