@@ -28,6 +28,7 @@ _TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be u
 _FINE = np.radians(3.0)  # a plane as narrow as a facet of a surface that bends by so little is not likely
 _FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
 _LAST = 1.5  # widths of the facet before
+_MOSTLY = 0.5  # of a circle's length: its face goes on smoothly there
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
 
 
@@ -70,6 +71,8 @@ def facets(
     shape = Chains.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
     linked, crossed = _linked(shape, ~around & ~edging)
+    flush = _flush(shape, chains, rims, linked)
+    edging &= ~flush
     slight = (shape.certain <= _TANGENT_BEND) & ~edging
     linked |= slight
     inner = linked.copy()
@@ -77,13 +80,30 @@ def facets(
     facet[shape.faces[around].ravel()] = True
     facet[crossed] = True
     inner &= facet[shape.faces].all(1)
-    smooth = around | slight | inner | _continued(shape, linked & ~inner, inner)
+    smooth = around | flush | slight | inner | _continued(shape, linked & ~inner, inner)
     smooth |= _dangling(shape, ~smooth)
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
     open_ = ~smooth & ~edging
     return Facets(region, smooth, edging | curved(shape, region, open_))
+
+
+def _flush(shape: Chains, chains: list[Chain], rims: Iterable[Rim], linked: np.ndarray) -> np.ndarray:
+    """Pieces of circles in which a curved surface continues the circle's face smoothly, as a fillet does; bool, (C,).
+
+    What bends no more than within that surface, or hardly at all, is no edge: there is nothing to see.
+    """
+    known = {frozenset(ends): i for i, (ends, *_) in enumerate(chains)}
+    pieces = [[known[frozenset(pair)] for pair in rim.pieces] for rim in rims]
+    of_rims = np.zeros(len(chains), bool)
+    of_rims[[i for each in pieces for i in each]] = True
+    here = of_rims & (shape.bend <= _SLIGHT)
+    here = _continued(shape, here, linked) | here & (shape.certain <= _TANGENT_BEND)
+    found = np.zeros(len(chains), bool)
+    for each in pieces:
+        found[each] = shape.length[each] @ here[each] > _MOSTLY * shape.length[each].sum()
+    return found
 
 
 def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
