@@ -4,7 +4,9 @@ A face is a facet if two bends of the surface follow each other across it and it
 them: the plane between two rounded edges is no facet. They bend the same way, by at most 31 degrees (a prism of 12
 sides is a cylinder), or by at most 12 any way: so files divide surfaces that bend both ways. A chain of at least four
 bends is a curved surface; three are a polygon's, and so are those whose height over the chords is many times that of
-the file's other curves. Bends of less than a degree are none, and an edge that ends within a surface is none.
+the file's other curves. Bends of less than a degree are none, beside facets of less than two, and an edge that ends
+within a surface is none. Nor are those of small triangles that fill what is left between curved surfaces, and chords of
+the borders of such.
 """
 
 from __future__ import annotations
@@ -74,13 +76,13 @@ def facets(
     linked, crossed = _linked(shape, ~around & ~edging)
     flush = _flush(shape, chains, rims, linked)
     edging &= ~flush
-    slight = (shape.certain <= _TANGENT_BEND) & ~edging
-    linked |= slight
-    inner = linked.copy()
     facet = np.zeros(len(normals), bool)
     facet[shape.faces[around].ravel()] = True
     facet[crossed] = True
-    inner &= facet[shape.faces].all(1)
+    least = np.where(facet[shape.faces].any(1), 2 * _TANGENT_BEND, _TANGENT_BEND)
+    slight = (shape.certain <= least) & ~edging
+    linked |= slight
+    inner = linked & facet[shape.faces].all(1)
     smooth = around | flush | slight | inner | _continued(shape, linked & ~inner, inner)
     smooth |= _dangling(shape, ~smooth)
     facet = _last(shape, facet, smooth)
