@@ -32,12 +32,16 @@ class Pictures:
     closely : bool
         Whether this is one picture to be looked at closely: with the light that surfaces send to each other, and along
         circles (`imaging.features.rim_look`). Many pictures are glanced at, which takes a thousandth of the time.
+    roughly : bool
+        Whether a close look takes the light between faces from few rays and their patches: a part of the time, for a
+        setting that is one of many.
     """
 
     scene: Scene
     sensors: np.ndarray
     lights: tuple[np.ndarray, ...] = ()
     closely: bool = False
+    roughly: bool = False
     _known: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -59,7 +63,11 @@ class Pictures:
 
     def with_scene(self, scene: Scene) -> Pictures:
         """The same poses in another scene."""
-        return Pictures(scene, self.sensors, self.lights, self.closely)
+        return Pictures(scene, self.sensors, self.lights, self.closely, self.roughly)
+
+    def at(self, sensors: np.ndarray, lights: tuple[np.ndarray, ...]) -> Pictures:
+        """The same scene from other poses, looked at as closely."""
+        return Pictures(self.scene, sensors, lights, self.closely, self.roughly)
 
     @property
     def sensor_at(self) -> np.ndarray:

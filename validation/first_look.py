@@ -81,7 +81,7 @@ def first_look(
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
         some = _varied([candidates[m] for m in seen], max(_ASKED, most)) or candidates[:most]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
-        forecasts = planner.predict(scene.with_(measurands=some), sensor, light).measurands
+        forecasts = planner.predict(scene.with_(measurands=some), sensor, light, roughly=True).measurands
         told = {m: min((forecasts[k] for k in rows), key=_rank) for m, rows in zip(some, _rows(some), strict=True)}
         good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:

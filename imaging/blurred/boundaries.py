@@ -188,8 +188,8 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
 
     Shape (T, support, 3); whether the face is seen does not matter.
     """
-    scene, solid, camera = pictures.scene, pictures.scene.solid, pictures.scene.camera
-    of_each = Pictures(scene, *_of_each(pictures, picture), pictures.closely)
+    solid, camera = pictures.scene.solid, pictures.scene.camera
+    of_each = pictures.at(*_of_each(pictures, picture))
     at, axes = of_each.sensor_at[:, None], camera_frame(camera, of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
     near, far = (depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
@@ -234,12 +234,12 @@ def _interpolation(fractions: np.ndarray) -> np.ndarray:
 
 def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
     """Levels (P, 2) beside edges ``other`` at fractions of their images, as the sensor sees them."""
-    scene, solid = pictures.scene, pictures.scene.solid
+    solid = pictures.scene.solid
     beside, levels = sided(solid), np.empty((other.size, 2))
     for which in np.unique(other):
         edge, rows = solid.edges[which], np.flatnonzero(other == which)
         spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
-        alone = Pictures(scene, *_of_each(pictures, picture[rows]), pictures.closely)
+        alone = pictures.at(*_of_each(pictures, picture[rows]))
         found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
         levels[rows] = found if beside[which, 0] == edge.faces[0] else found[:, ::-1]
     return levels

@@ -30,12 +30,12 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
-    lent = _of_faces(scene, shining)
+    lent = _of_faces(scene, shining, pictures.roughly)
     found = np.zeros(shape) if lent is None else lent.at(points, faces)
     for bore in bores(scene.solid):
         inside = np.isin(faces, bore.faces)
         if inside.any():
-            found[inside] = _of_wall(scene, shining, bore).ev(*place_in(bore, points[inside]))
+            found[inside] = _of_wall(scene, shining, bore, pictures.roughly).ev(*place_in(bore, points[inside]))
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
     return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
@@ -76,12 +76,13 @@ def _plain(emitter: Emitter) -> Emitter:
     return emitter._replace(at=at, axis=axis)
 
 
-def _of_faces(scene: Scene, shining: tuple[Emitter, ...]) -> Exchanged | None:
+def _of_faces(scene: Scene, shining: tuple[Emitter, ...], roughly: bool = False) -> Exchanged | None:
     """Light between plane faces."""
-    return exchanged(scene, shining, tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces})))
+    walls = tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces}))
+    return exchanged(scene, shining, walls, roughly)
 
 
 @lru_cache(maxsize=64)
-def _of_wall(scene: Scene, shining: tuple[Emitter, ...], bore: Bore) -> RectBivariateSpline:
+def _of_wall(scene: Scene, shining: tuple[Emitter, ...], bore: Bore, roughly: bool) -> RectBivariateSpline:
     """Light that a bore's wall has."""
-    return light_in_bore(scene, shining, bore, _of_faces(scene, shining))
+    return light_in_bore(scene, shining, bore, _of_faces(scene, shining, roughly))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _AROUND, _DEEP = 48, 24  # patches
 _FINE = 5  # places in a patch, around, over which a form factor is averaged
-_FROM_WALL = 256  # rays
+_FROM_WALL, _ROUGHLY = 256, 32  # rays; where the light is told roughly
 _NODES = 13  # depths at which the light is told
 _ALIKE = 1e-3  # of the radius: by how much the two rims of one wall may differ
 _WITHIN = 1 - 1e-4  # of the radius of the widest free cylinder: where it is asked what reaches a facet
@@ -76,7 +76,7 @@ def light_in_bore(
     outside = 0.0, 0.0
     if others is not None:
         outside = [
-            others.gathered(each, _AROUND * deep, _FROM_WALL).reshape(_AROUND, deep)
+            others.gathered(each, _AROUND * deep, _rays(others.exchange)).reshape(_AROUND, deep)
             for each, deep in zip(_from_outside(bore, others.exchange), (_DEEP, _NODES), strict=True)
         ]
     direct = np.fft.fft(white * (_direct(scene, emitters, bore) + outside[0]), axis=0)
@@ -122,8 +122,12 @@ def _from_outside(bore: Bore, exchange: Exchange) -> tuple[Hits, Hits]:
     found = []
     for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
         points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
-        found.append(exchange.met(points, normals, _FROM_WALL))
+        found.append(exchange.met(points, normals, _rays(exchange)))
     return found[0], found[1]
+
+
+def _rays(exchange: Exchange) -> int:
+    return _ROUGHLY if exchange.roughly else _FROM_WALL
 
 
 @lru_cache(maxsize=64)

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _PATCHES = 400  # of the whole body
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
+_ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly
+_ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
 _REFLECTED = 128  # rays of a place that is asked what lit faces it sees
 _CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
 _LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell,
@@ -104,6 +106,8 @@ class Exchange:
         Of the patches' middles.
     floor : Floor or None
         Which reaches beyond its patches.
+    roughly : bool
+        Whether few rays tell the light, and patches that of faces that are smaller.
     """
 
     solid: Solid
@@ -113,6 +117,15 @@ class Exchange:
     patches: np.ndarray
     tree: KDTree
     floor: Floor | None = None
+    roughly: bool = False
+
+    @cached_property
+    def small(self) -> np.ndarray:
+        """Whether a face is told by patches alone, bool (F,): roughly, and it is narrower and shorter than one."""
+        low, high = (np.full((len(self.solid.faces), 3), end) for end in (np.inf, -np.inf))
+        np.minimum.at(low, self.solid.triangle_faces, self.solid.triangles.min(1))
+        np.maximum.at(high, self.solid.triangle_faces, self.solid.triangles.max(1))
+        return self.roughly & (np.linalg.norm(high - low, axis=1) < self.cell)
 
     @cached_property
     def has(self) -> np.ndarray:
@@ -124,10 +137,10 @@ class Exchange:
     @cached_property
     def between(self) -> np.ndarray:
         """Form factors between patches, (p, p)."""
-        met = self.met(self.places.points, self.places.normals, _RAYS, _square(len(self.places.points)))
-        count = self.tree.n
+        rays, count = _ROUGH_RAYS if self.roughly else _RAYS, self.tree.n
+        met = self.met(self.places.points, self.places.normals, rays, _square(len(self.places.points)))
         pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
-        return pairs.reshape(count, count) / (_RAYS * np.bincount(self.patches)[:, None])
+        return pairs.reshape(count, count) / (rays * np.bincount(self.patches)[:, None])
 
     def means(self, values: np.ndarray) -> np.ndarray:
         """Of values (m,) at places those of patches, (p,)."""
@@ -212,11 +225,23 @@ class Exchanged:
 
     def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What arrives at points (..., 3) on faces (...)."""
-        found = np.zeros(faces.shape)
-        places = {face: here for face, here in _by_face(faces.ravel()) if self.exchange.has[face]}
+        found, small = np.zeros(faces.shape), self.exchange.small
+        places = {face: here for face, here in _by_face(faces.ravel()) if self.exchange.has[face] and not small[face]}
         for told, here in zip(_told(self, list(places)), places.values(), strict=True):
             found.flat[here] = told.at(points.reshape(-1, 3)[here])
+        some = small[faces] & self.exchange.has[faces]
+        if some.any():
+            found[some] = self._by_patches[faces[some]]
         return found
+
+    @cached_property
+    def _by_patches(self) -> np.ndarray:
+        """What arrives in the middles of all faces, (F,): a mean of what does at the patches about them."""
+        solid, exchange = self.exchange.solid, self.exchange
+        middles = _middles(solid)
+        away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.cell), _ROUGH_PATCHES)
+        weights = np.exp(-2 * (away**2 - away[:, :1] ** 2))
+        return (weights * self.arriving[near]).sum(1) / weights.sum(1)
 
     def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:
         """What arrives at ``count`` points from what so many rays, int or (count,), from each of them met.
@@ -295,7 +320,9 @@ def room(bodies: Solid, floor: Floor | None) -> Solid:
 
 
 @lru_cache(maxsize=4)
-def exchange_of(bodies: Solid, without: tuple[int, ...], floor: Floor | None = None) -> Exchange | None:
+def exchange_of(
+    bodies: Solid, without: tuple[int, ...], floor: Floor | None = None, roughly: bool = False
+) -> Exchange | None:
     """Of the faces that see others, those ``without`` left out; None where fewer than two do."""
     from scipy.spatial import KDTree  # slow to load, and rarely needed
 
@@ -307,7 +334,7 @@ def exchange_of(bodies: Solid, without: tuple[int, ...], floor: Floor | None = N
     places, cell = Places.spread(solid, some, count * _PLACES), float(np.sqrt(area / count))
     coordinates = _placed(places.points, places.normals, cell)
     tree = KDTree(coordinates[_PLACES // 2 :: _PLACES])
-    return Exchange(solid, some, cell, places, tree.query(coordinates)[1], tree, floor)
+    return Exchange(solid, some, cell, places, tree.query(coordinates)[1], tree, floor, roughly)
 
 
 def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
@@ -347,6 +374,13 @@ def _ways(normals: np.ndarray, square: np.ndarray) -> np.ndarray:
     return along @ np.stack([one, np.cross(normals, one), normals], -2)
 
 
+def _middles(solid: Solid) -> np.ndarray:
+    """Of faces, (F, 3)."""
+    areas, found = _areas(solid.triangles), np.zeros((len(solid.faces), 3))
+    np.add.at(found, solid.triangle_faces, areas[:, None] * solid.triangles.mean(1))
+    return found / np.bincount(solid.triangle_faces, areas, len(solid.faces))[:, None]
+
+
 def _areas(triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
@@ -381,6 +415,7 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
     nodes = _onto(solid, face, nodes, min(within))
     rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
+    rays = _ROUGH_NODE if exchange.roughly else rays
     shift = _of_square(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
     sheet = Sheet(frame, u, v, NOTHING_MET, rays)
     return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
@@ -466,9 +501,11 @@ def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def exchanged(scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...]) -> Exchanged | None:
+def exchanged(
+    scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...], roughly: bool = False
+) -> Exchanged | None:
     """What the faces of a scene's bodies and its floor send to each other under some emitters."""
-    exchange = exchange_of(scene.bodies, without, scene.bright_floor)
+    exchange = exchange_of(scene.bodies, without, scene.bright_floor, roughly)
     if exchange is None:
         return None
     places, white = exchange.places, _white(scene, exchange.places.faces)

@@ -106,7 +106,7 @@ def _in_blocks(pictures: Pictures) -> Bias:
     for first in range(0, max(len(flat[0]), 1), _BLOCK):
         sensors, *lights = (poses[first : first + _BLOCK] for poses in flat)
         with np.errstate(all="ignore"):
-            parts.append(_bias(Pictures(pictures.scene, sensors, tuple(lights), pictures.closely)))
+            parts.append(_bias(pictures.at(sensors, tuple(lights))))
     whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Bias)}
     return Bias(**{name: values.reshape((*lead, *values.shape[1:])) for name, values in whole.items()})
 
@@ -148,7 +148,7 @@ def _by_prints(pictures: Pictures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.zeros((*lead, edges)), np.zeros((*lead, edges)), np.zeros((*lead, edges), bool)
     poses = [np.broadcast_to(each, (*lead, 2)) for each in (pictures.sensors, *pictures.lights)]
     for sensor, *lights in zip(*poses, strict=True):
-        found = texture_errors(Pictures(pictures.scene, sensor, tuple(lights), pictures.closely))
+        found = texture_errors(pictures.at(sensor, tuple(lights)))
         parts.append((found.printed[0::2], found.printed[1::2], found.disturbed))
     return tuple(np.array(part) for part in zip(*parts, strict=True))
 

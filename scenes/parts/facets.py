@@ -4,7 +4,9 @@ A face is a facet if two bends of the surface follow each other across it and it
 them: the plane between two rounded edges is no facet. They bend the same way, by at most 31 degrees (a prism of 12
 sides is a cylinder), or by at most 12 any way: so files divide surfaces that bend both ways. A chain of at least four
 bends is a curved surface; three are a polygon's, and so are those whose height over the chords is many times that of
-the file's other curves. Bends of less than a degree are none, and an edge that ends within a surface is none.
+the file's other curves. Bends of less than a degree are none, beside facets of less than two, and an edge that ends
+within a surface is none. Nor are those of small triangles that fill what is left between curved surfaces, and chords of
+the borders of such.
 """
 
 from __future__ import annotations
@@ -28,6 +30,8 @@ _TANGENT_SLIGHT = 1.6  # the same of slight bends: the steps of a curve may be u
 _FINE = np.radians(3.0)  # a plane as narrow as a facet of a surface that bends by so little is not likely
 _FULL = 0.7  # of the bend before: where a plane begins it is half of it, at a last facet all
 _LAST = 1.5  # widths of the facet before
+_ALONG, _SQUARE = np.cos(np.radians([30.0, 80.0]))  # angles between a straight border and the bends beside it
+_MOSTLY = 0.5  # of a circle's length: its face goes on smoothly there
 _COARSER = 5.0  # heights over chords: a polygon's beside those of the curves of its file
 
 
@@ -70,20 +74,40 @@ def facets(
     shape = Chains.of(vertices, chains, normals, areas)
     around, edging = _of_rims(chains, rims)
     linked, crossed = _linked(shape, ~around & ~edging)
-    slight = (shape.certain <= _TANGENT_BEND) & ~edging
-    linked |= slight
-    inner = linked.copy()
+    flush = _flush(shape, chains, rims, linked)
+    edging &= ~flush
     facet = np.zeros(len(normals), bool)
     facet[shape.faces[around].ravel()] = True
     facet[crossed] = True
-    inner &= facet[shape.faces].all(1)
-    smooth = around | slight | inner | _continued(shape, linked & ~inner, inner)
+    least = np.where(facet[shape.faces].any(1), 2 * _TANGENT_BEND, _TANGENT_BEND)
+    slight = (shape.certain <= least) & ~edging
+    linked |= slight
+    inner = linked & facet[shape.faces].all(1)
+    smooth = around | flush | slight | inner | _continued(shape, linked & ~inner, inner)
     smooth |= _dangling(shape, ~smooth)
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
-    open_ = ~smooth & ~edging
-    return Facets(region, smooth, edging | curved(shape, region, open_))
+    pieces = edging | curved(shape, region, ~smooth & ~edging)
+    pieces |= _unsure(shape, facet)[shape.faces].any(1) | _chords(shape, facet, smooth)
+    return Facets(region, smooth, pieces & ~smooth)
+
+
+def _flush(shape: Chains, chains: list[Chain], rims: Iterable[Rim], linked: np.ndarray) -> np.ndarray:
+    """Pieces of circles in which a curved surface continues the circle's face smoothly, as a fillet does; bool, (C,).
+
+    What bends no more than within that surface, or hardly at all, is no edge: there is nothing to see.
+    """
+    known = {frozenset(ends): i for i, (ends, *_) in enumerate(chains)}
+    pieces = [[known[frozenset(pair)] for pair in rim.pieces] for rim in rims]
+    of_rims = np.zeros(len(chains), bool)
+    of_rims[[i for each in pieces for i in each]] = True
+    here = of_rims & (shape.bend <= _SLIGHT)
+    here = _continued(shape, here, linked) | here & (shape.certain <= _TANGENT_BEND)
+    found = np.zeros(len(chains), bool)
+    for each in pieces:
+        found[each] = shape.length[each] @ here[each] > _MOSTLY * shape.length[each].sum()
+    return found
 
 
 def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
@@ -198,6 +222,39 @@ def _dangling(shape: Chains, edges: np.ndarray) -> np.ndarray:
         if not loose.any():
             return edges & ~left
         left &= ~loose
+
+
+def _unsure(shape: Chains, facet: np.ndarray) -> np.ndarray:
+    """Triangles beside facets, and beside such ones, that are about as narrow; bool, shape (F,).
+
+    With them files fill what is left between curved surfaces. They may look anywhere, and are no plane faces of a part.
+    """
+    triangle = (np.bincount(shape.faces.ravel(), minlength=len(facet)) == 3) & ~facet
+    narrow = shape.areas[shape.faces] <= _WIDER * shape.areas[shape.faces[:, ::-1]]
+    found = np.zeros(len(facet), bool)
+    while True:
+        beside = (facet | found)[shape.faces[:, ::-1]] & narrow & triangle[shape.faces] & ~found[shape.faces]
+        if not beside.any():
+            return found
+        found[shape.faces[beside]] = True
+
+
+def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Chains that are a side of a facet of three sides, and no straight line of its surface; bool, shape (C,).
+
+    Along a straight line of a curved surface, or square to it, run the bends about it; where a file cuts the border of
+    a surface into chords, its last triangles have bends at any angle.
+    """
+    triangle = facet & (np.bincount(shape.faces.ravel(), minlength=len(facet)) == 3)
+    side = np.flatnonzero(triangle[shape.faces].ravel())
+    pairs = side[pairs_of(shape.faces.ravel()[side])]
+    here, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    cosine = np.abs((shape.along[here // 2] * shape.along[other // 2]).sum(1))
+    cosine /= shape.length[here // 2] * shape.length[other // 2]
+    fits = smooth[other // 2] & ((cosine >= _ALONG) | (cosine <= _SQUARE))
+    straight = ~triangle[shape.faces].ravel()
+    straight[here[fits]] = True
+    return ~smooth & ~straight.reshape(-1, 2).all(1)
 
 
 def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:

@@ -156,6 +156,7 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
         known = facets(mesh.vertices, chains, normals, areas, circular)
     else:
         known = _told(told, mesh, group, chains, circular)
+    circular = _edged(circular, chains, known.smooth)
     whole = joined(mesh.vertices, chains, normals, known.region, known.kinds == "sharp")
     pieces = [(chain, "sharp") for chain in whole]
     pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
@@ -163,6 +164,12 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     plain = _assembled(mesh, group, used, pieces, loops, circular)
     found = replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
     return replace(found, arcs=arcs(found))
+
+
+def _edged(circular: list[Rim], chains: list[Chain], smooth: np.ndarray) -> list[Rim]:
+    """Those circles that are edges, for most of their pieces are none between surfaces that continue each other."""
+    none = {frozenset(chain[0]) for chain, flat in zip(chains, smooth, strict=True) if flat}
+    return [rim for rim in circular if 2 * sum(frozenset(piece) in none for piece in rim.pieces) <= len(rim.pieces)]
 
 
 def _told(told: Told, mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], circular: list[Rim]) -> Facets:

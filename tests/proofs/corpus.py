@@ -16,12 +16,13 @@ import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from scipy.stats import chi2
 
 from scenes.parts import mesh, step
 
@@ -31,6 +32,10 @@ PATIENCE = 6  # times that on the wall, for a machine that does other things, to
 COMMANDS = ("new", "show", "plan", "render", "measure", "validate")
 VALIDATED = 3  # measurands
 FAR = 4.0  # standard deviations that a value may be from the part's own
+SIDAK = 0.01  # of all rows together
+OFF = 0.3  # standard deviations that the mean of what is ok may be off, beside its own uncertainty
+_VALUE = ("name", "status", "value", "nominal", "sigma", "u_bias")
+_VALIDATED = ("name", "status", "value", "predicted", "n", "failed", "ratio", "bias", "u_bias", "render_noise")
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class Step:
         Most that it held.
     told : str
         Its result in short, or the line by which it refused.
+    rows : list of dict
+        Of measurands that were measured or validated: what is said of each.
     """
 
     command: str
@@ -55,6 +62,7 @@ class Step:
     seconds: float
     mebibytes: float
     told: str
+    rows: list[dict[str, Any]] = field(default_factory=list)
 
 
 def _limited() -> None:
@@ -102,10 +110,13 @@ def steps(part: Path, folder: Path, renders: int) -> Iterator[Step]:
     rendered, _ = run("render", scene, "--sensor", poses[0], "--light", poses[1], "--noise-seed", 1, "-o", picture)
     yield _told(rendered, "")
     measured, values = run("measure", picture, scene, "--sensor", poses[0], "--light", poses[1])
-    yield _told(measured, _measured(values.get("measurands", [])))
+    found = values.get("measurands", [])
+    yield replace(_told(measured, _measured(found)), rows=[{key: row.get(key) for key in _VALUE} for row in found])
     few.write_text(_only(scene.read_text("utf-8"), plan), "utf-8")
     judged, verdict = run("validate", few, "--renders", renders, "--out", folder / "run", "--estimators", "gradient")
-    yield _told(judged, verdict.get("verdict", "").split(";")[0])
+    found = [row for setting in verdict.get("settings", []) for row in setting["measurands"]]
+    told = verdict.get("verdict", "").split(";")[0]
+    yield replace(_told(judged, told), rows=[{key: row.get(key) for key in _VALIDATED} for row in found])
 
 
 def _told(step_: Step, told: str) -> Step:
@@ -114,7 +125,7 @@ def _told(step_: Step, told: str) -> Step:
 
 
 def _with(step_: Step, told: str) -> Step:
-    return Step(step_.command, step_.status, step_.seconds, step_.mebibytes, told)
+    return replace(step_, told=told)
 
 
 def _worst(plan: dict[str, Any]) -> str:
@@ -192,4 +203,50 @@ def table(rows: list[dict[str, Any]]) -> str:
         for each in row["steps"]:
             if each["status"]:
                 lines.append(f"  {row['part']}: {each['command']} ended with {each['status']}: {each['told'][:160]}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_judged(rows)])
+
+
+def _judged(rows: list[dict[str, Any]]) -> list[str]:
+    """Of what was validated and is ``ok``: whether the variance is the one that is told, how far the mean is off."""
+    found = [
+        (row["part"], each)
+        for row in rows
+        for step_ in row["steps"]
+        if step_["command"] == "validate"
+        for each in step_.get("rows", [])
+    ]
+    good = [(part, each) for part, each in found if each["status"] == "ok" and (each["ratio"] or 0) > 0]
+    if not found:
+        return []
+    level = 1 - (1 - SIDAK) ** (1 / max(len(good), 1))
+    outside = [(part, each) for part, each in good if chance(each["ratio"], each["n"]) < level]
+    off = [(part, each) for part, each in good if abs(each["bias"]) > allowed(each)]
+    lines = [
+        f"{len(found)} measurands validated of {len({part for part, _ in found})} parts, {len(good)} ok: "
+        f"{len(outside)} of these outside the Sidak {SIDAK:.0%}, {len(off)} more than {OFF:g} sigma off"
+    ]
+    for word, some in (("ratio", outside), ("off", off)):
+        for part, each in some:
+            sigma = each["bias"] / np.sqrt(each["predicted"])
+            lines.append(
+                f"  {word}: {part}, {each['name']}: ratio {each['ratio']:.3f} of {each['n']}, {sigma:+.2f} sigma"
+            )
+    return lines
+
+
+def chance(ratio: float, count: int) -> float:
+    """How likely a variance of ``count`` values is this far from the true one, ``ratio`` times it, or farther.
+
+    Examples
+    --------
+    >>> round(chance(1.2, 200), 3), round(chance(0.8, 200), 3)
+    (0.056, 0.035)
+    """
+    below = chi2.cdf(ratio * (count - 1), count - 1)
+    return float(2 * min(below, 1 - below))
+
+
+def allowed(row: dict[str, Any]) -> float:
+    """How far the mean of a validated measurand may be off: `OFF` standard deviations, and three of the mean's own."""
+    own = row["predicted"] / row["n"] + (row["render_noise"] or 0.0) ** 2
+    return OFF * row["predicted"] ** 0.5 + 3 * own**0.5

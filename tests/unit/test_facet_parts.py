@@ -96,6 +96,36 @@ def found(*parts, **more):
     return facets.facets(*strip(*parts, **more), ())
 
 
+def sides(faces, along, bend=10.0, areas=(1.0,) * 9):
+    """Chains between pairs of faces, in directions."""
+    along, count = np.array(along, float), len(faces)
+    length = np.linalg.norm(along, axis=1)
+    bends, convex = np.full(count, np.radians(bend)), np.ones(count, bool)
+    ends = np.arange(2 * count).reshape(-1, 2)
+    return Chains(ends, np.array(faces), convex, along, length, bends, np.array(areas), 1e-6)
+
+
+@pytest.mark.parametrize(("area", "is_sure"), [(4.9, False), (5.1, True)])
+def test_a_triangle_beside_facets_that_is_about_as_narrow_is_no_plane_face(area, is_sure):
+    """Face 0 beside facet 1; face 2 beside that triangle; at most 5 times as wide; one of four sides is a face."""
+    rows = [(0, 1), (0, 2), (0, 3), (2, 4), (2, 5)]
+    shape = sides(rows, [(1, 0, 0)] * 5, areas=[area, 1, area, 9, 9, 9])
+    facet = np.arange(6) == 1
+    assert facets._unsure(shape, facet).tolist() == [not is_sure, False, not is_sure, False, False, False]
+    four = sides([*rows, (0, 5)], [(1, 0, 0)] * 6, areas=[area, 1, area, 9, 9, 9])
+    assert not facets._unsure(four, facet).any()
+
+
+@pytest.mark.parametrize(("turn", "is_chord"), [(28, False), (32, True), (78, True), (82, False)])
+def test_a_side_of_a_last_triangle_is_a_chord_unless_bends_run_along_it_or_square_to_it(turn, is_chord):
+    """Within 30 degrees of it, or 10 of the square: the facet is face 0, the others' sides at 55 degrees say nothing."""
+    ways = [(np.cos(a), np.sin(a), 0) for a in np.radians([0, turn, 125])]
+    shape, facet = sides([(0, 1), (0, 2), (0, 3)], ways), np.arange(4) != 1
+    smooth = np.array([False, True, True])
+    assert facets._chords(shape, facet, smooth).tolist() == [is_chord, False, False]
+    assert not facets._chords(shape, np.arange(4) > 0, smooth).any()
+
+
 def test_four_bends_that_follow_each_other_are_a_curved_surface():
     """The outer faces are planes that it continues smoothly; three bends are a polygon's."""
     four = found([9, 1, 1.2, 0.9, 7], np.radians([20, 21, 22, 19]))

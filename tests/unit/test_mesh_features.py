@@ -88,6 +88,27 @@ def test_a_fillet_has_no_sharp_edges_of_its_own(steps):
     assert (kinds.count("smooth"), kinds.count("rim")) == (steps + 1, 2 * steps)
 
 
+def disc(*rim, sections=72):
+    """A disc of radius 10 and height 6 whose upper rim goes through some places (radius, height)."""
+    return trimesh.creation.revolve([(0, 0), (10, 0), *rim, (0, 6)], sections=sections)
+
+
+@pytest.mark.parametrize(
+    ("rim", "radii"),
+    [
+        ([(8 + 2 * np.cos(a), 4 + 2 * np.sin(a)) for a in np.linspace(0, np.pi / 2, 10)], [10]),
+        ([(10, 4), (8, 6)], [8, 10]),
+        ([(10, 5.6), (7, 6)], [7, 10]),
+    ],
+    ids=["rounded", "chamfered", "shallow"],
+)
+def test_a_circle_in_which_a_rounding_goes_on_smoothly_is_no_edge(rim, radii):
+    """From the upper face into a rounding of nine steps nothing is seen; a chamfer of 45 degrees and a slope of 8 are."""
+    solid = mesh.solid(disc(*rim))
+    assert sorted(circle.radius for circle in solid.circles) == pytest.approx(radii)
+    assert not solid.sharp
+
+
 def test_chamfers_and_shallow_roofs_stay_sharp():
     """A chamfer of 45 degrees, two of 30, a ridge of 10: plane faces, whatever their angles."""
     roof = mesh.solid(prism([(0, 0), (60, 0), (60, 10), (30, 15), (0, 10)], 40.0))

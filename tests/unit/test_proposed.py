@@ -116,7 +116,8 @@ def test_setting_where_most_can_be_relied_on_is_taken(monkeypatch):
     for goods in ([0, 1, 2, 1], [0, 0, 0, 0], [1, 5, 6, 2]):
         asked = []
 
-        def predict(told, sensor, light, goods=goods, asked=asked):
+        def predict(told, sensor, light, *, roughly, goods=goods, asked=asked):
+            assert roughly
             good = goods[len(asked)] if len(asked) < len(goods) else 0
             asked.append((sensor, light))
             return _Told([_Forecast("ok" if i < good else "clutter") for i in range(len(told.measurands))])
