@@ -10,10 +10,10 @@ import numpy as np
 
 from imaging.features.measurand import required_edges
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.constraints import Constraints
+from planner.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
 from planner.prediction import Prediction
-from planner.search.candidates import Candidate, RayTraced, Searched, candidates, trusted
-from planner.search.constraints import Constraints
-from planner.search.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
+from planner.search.candidates import Candidate, RayTraced, Searched, SettingUp, candidates, trusted
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid, as_array, as_poses
 from planner.search.lights import Mixture, applies, shares_of, with_shares
@@ -28,7 +28,6 @@ from planner.search.objective import (
     SearchProblem,
     check_choice,
 )
-from planner.search.setting_up import SettingUp
 from planner.search.varying import Variation
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses

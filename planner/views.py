@@ -10,8 +10,9 @@ import numpy as np
 
 from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import Combination, combine
+from planner.constraints import Constraints
 from planner.planning import COARSE_STEP
-from planner.search.constraints import Constraints
+from planner.search.candidates import SettingUp
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid
 from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over, Report, SearchProblem
@@ -30,7 +31,6 @@ from planner.search.sets import (
     undominated,
     undominated_shared,
 )
-from planner.search.setting_up import SettingUp
 from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Quantity, Scene
 

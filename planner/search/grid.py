@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
-from planner.search.constraints import WHOLE, Constraints
+from planner.constraints import WHOLE, Constraints
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given

@@ -15,10 +15,9 @@ import numpy as np
 
 from imaging.geometry.projection import direction
 from planner.prediction import Prediction, predict
-from planner.search.candidates import DEAREST
+from planner.search.candidates import DEAREST, SettingUp
 from planner.search.local import refine
 from planner.search.objective import Aim, Report, SearchProblem
-from planner.search.setting_up import SettingUp
 from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one

@@ -15,7 +15,7 @@ import measure
 import planner
 import scenes
 from planner.budgeting.budgets import budget
-from planner.search.design import Choice
+from planner.design import Choice
 from render import Tolerance as LeaveOut
 from render.phenomena import Decision, Influence
 from scenes import Pose, Tolerance

@@ -9,8 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
-from planner.search.candidates import Candidate
-from planner.search.setting_up import how_far
+from planner.search.candidates import Candidate, how_far
 from render import Tolerance
 from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
