@@ -79,11 +79,6 @@ class Directions(ABC):
         near = self._tree.query_ball_point(self.directions[index], 2 * np.sin(np.radians(self._reach) / 2))
         return np.array([i for i in near if i != index], int)
 
-    @cached_property
-    def neighbour_pairs(self) -> np.ndarray:
-        """All pairs of directions that are neighbours, shape (M, 2)."""
-        return self._tree.query_pairs(2 * np.sin(np.radians(self._reach) / 2), output_type="ndarray")
-
     @property
     def _reach(self) -> float:
         return _NEIGHBOUR * self.step_deg

@@ -11,7 +11,7 @@ import scenes
 from imaging.features import rim_look
 from imaging.light import appearance
 from imaging.pictures import Pictures
-from measure import bounds, calibration
+from measure import calibration
 from measure.boards import adjustment, parameters
 from measure.boards.camera import calibrate_camera
 from measure.features.arranged import find_arranged, goodness
@@ -84,15 +84,10 @@ def _bounds():
     scene = load("task1")
     pose = uneven(scene)
     layout = layout_of(Picture.of(scene, *pose))
-    polygon = polygon_layout(_SQUARE, Optics((105, 120), 0.8, 1.7))
     return {
         "bound": [without_error(partial(measure.bound, load(name), *uneven(load(name)))) for name in (
             "task1", "wedge", "plate", "two_lights")],
-        "dark": without_error(lambda: measure.bound(scene, pose[0])), "image": bounds.image_bound(
-            planner.image(scene, *pose), scene, *pose),
-        "empty": bounds.image_bound(np.full((240, 256), 30.0), scene, *pose), "plate": without_error(
-            lambda: bounds.image_bound(np.ones((240, 256)), load("plate"), *uneven(load("plate")))),
-        "corner": bounds.corner_bound(polygon, 90.0, 1.7), "names": layout.names,
+        "dark": without_error(lambda: measure.bound(scene, pose[0])), "names": layout.names,
     }  # fmt: skip
 
 
