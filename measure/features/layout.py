@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from skimage.measure import points_in_poly
@@ -178,15 +177,17 @@ class Layout:
         return found
 
 
-@lru_cache(maxsize=64)
 def layout_of(picture: Picture) -> Layout:
     """The straight edges of a scene's quantities as a sensor pose projects them, in ideal image coordinates.
 
     With the lights known, the shading of each face is known too, and a face that is not lit is background.
-
     """
-    scene = picture.scene
-    pictures, solid, pose = Pictures.of(picture), scene.bodies, np.array(list(picture.sensor))
+    pictures = Pictures.of(picture)
+    return pictures.once("layout", lambda: _layout(picture, pictures))
+
+
+def _layout(picture: Picture, pictures: Pictures) -> Layout:
+    scene, solid, pose = picture.scene, picture.scene.bodies, np.array(list(picture.sensor))
     names = straight(scene)
     view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
