@@ -18,7 +18,7 @@ from measure.fitting.fit import fit
 from measure.fitting.result import Fit
 from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
-from measure.photo.lens import Lens, load_lens
+from measure.photo.lens import Intrinsics, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
@@ -37,7 +37,7 @@ __all__ = [
     "EstimatorKind",
     "Fit",
     "Images",
-    "Lens",
+    "Intrinsics",
     "MeasuredShape",
     "MeasuredValue",
     "Measurement",

@@ -17,7 +17,7 @@ from planner.search.candidates import Candidate, RayTraced, Searched, SettingUp,
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid, as_array, as_poses
 from planner.search.lights import Mixture, applies, shares_of, with_shares
-from planner.search.local import Step, refine
+from planner.search.local import SearchStep, refine
 from planner.search.objective import (
     DEFAULT_OBJECTIVE,
     DEFAULT_OVER,
@@ -67,7 +67,7 @@ class Plan(Shown):
         The best pair of the grid.
     prediction : Prediction
         At the poses, in both units.
-    trace : tuple of Step
+    trace : tuple of SearchStep
         Of the alternating search.
     partial_variance : float
         Where the alternating search stopped.
@@ -103,7 +103,7 @@ class Plan(Shown):
     grid_light: Pose | tuple[Pose, ...]
     grid_variance: float
     prediction: Prediction
-    trace: tuple[Step, ...]
+    trace: tuple[SearchStep, ...]
     partial_variance: float
     gap: float | None
     guarantee: str

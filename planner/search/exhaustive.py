@@ -19,7 +19,7 @@ from imaging.features.measurand import Measurands, measurands
 from imaging.features.projected_edges import circles, image_fractions
 from imaging.geometry.projection import facing
 from imaging.light.appearance import edge_distance2, is_separable, of_sides, paper_step, side_strengths
-from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
+from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
 from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
 from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS
 from imaging.pictures import Pictures
@@ -340,7 +340,9 @@ def _calibrated(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndar
     return np.concatenate([dark, part], -1) if scene.noise.gain > 0 else dark, good
 
 
-def _coefficients(nodes: Nodes, a: np.ndarray, b: np.ndarray, per_point, scale: float, good: np.ndarray) -> np.ndarray:
+def _coefficients(
+    nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, per_point, scale: float, good: np.ndarray
+) -> np.ndarray:
     """Those of r^6 for A d + B theta of each edge at unit noise, shape (S, E, 1 + _DEGREE)."""
     weight, slope = (make(nodes, a, b) for make in (line_weight, line_slope))
     factor = long_edge(nodes, weight, slope, scale) * per_point

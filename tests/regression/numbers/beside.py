@@ -171,7 +171,7 @@ def _cameras():
 
 
 def _lenses():
-    one = lens.Lens(fx=420.0, fy=431.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001))
+    one = lens.Intrinsics(fx=420.0, fy=431.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001))
     points = np.array([[[3.0, 7.0], [200.0, 30.0]], [[131.0, 97.0], [77.0, 190.0]]])
     image, corners = rectangle(120, 70, 13), turned(120, 70, 13)
     optics = Optics(image.shape, 0.8, 2.3, 1.1, 5.0)
@@ -183,7 +183,7 @@ def _lenses():
         "straight": one.straighten(points), "bent": one.distort(points), "none": [one.straighten(points[:0]),
         one.distort(
             points[:0])], "matrix": one.matrix, "coefficients": one.coefficients, "corners": ok,
-        "refused": [_words(partial(lens.Lens, **(given | each))) for each in asked], "beside": [without_error(
+        "refused": [_words(partial(lens.Intrinsics, **(given | each))) for each in asked], "beside": [without_error(
             partial(lens.straight_corners, image, polygon_layout(each, optics), one)) for each in beside],
     }  # fmt: skip
 

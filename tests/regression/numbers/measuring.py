@@ -55,7 +55,7 @@ def _sharpness():
 
 
 def _lens():
-    lens = measure.Lens(fx=420.0, fy=423.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001, 0.0))
+    lens = measure.Intrinsics(fx=420.0, fy=423.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001, 0.0))
     return without_error(lambda: measure.measure_quadrilateral(rectangle(120, 70, 13), lens=lens))
 
 
