@@ -122,8 +122,7 @@ def _positions(shape: np.ndarray, optics: Optics, spacing: float) -> tuple[np.nd
     count = max(8, int(length[-1] / (spacing * optics.scale_px)))
     t = np.interp(length[-1] * np.arange(count) / count, length, fine)
     places, normals = outline(shape, t)
-    margin = optics.window_px + 4 * optics.scale_px + 1
-    inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
+    inside = optics.has_room(places)
     return t[inside], places[inside], normals[inside]
 
 

@@ -58,7 +58,10 @@ def test_it_would_be_seen(tmp_path):
 
 
 def test_what_a_command_may_say_is_known_before_anything_that_computes_is_loaded():
-    """Help and refusals of options wait for no package but `scenes` and what reads pictures; loading the others takes half a second."""
+    """Help and refusals of options wait for no package but `scenes` and what reads pictures.
+
+    Loading the others takes half a second.
+    """
     modules = sorted({f"validation.cli.{module}" for module, _ in COMMANDS.values()})
     code = f"import sys, {', '.join(modules)}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
